@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import pytest
+
+from tests.programs import require
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -22,10 +25,11 @@ def chromium() -> str | None:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     program = chromium()
-    if program is None:
-        pytest.skip("no Chromium is installed")
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with playwright.sync_playwright() as running:
+    require(program, "no Chromium is installed")
+    require(find_spec("playwright"), "playwright is not installed")
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - not everywhere
+
+    with sync_playwright() as running:
         # Chromium refuses to start as root with its sandbox, and what is opened here is our own.
         browser = running.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield browser

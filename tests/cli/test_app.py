@@ -59,11 +59,22 @@ def test_no_summary_is_truncated_at_80_columns(
     group: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    _, _, lines = compose(*group, "--help").out.partition("Commands:\n")
-    listed = lines.partition("\n\n")[0].splitlines()
+    _, _, page = compose(*group, "--help").out.partition("\nCommands")
+    page, _, _ = page.partition("\n  Examples:")
+    listed = [line for line in page.splitlines()[1:] if line.startswith(" ")]
     assert listed
     assert [line for line in listed if line.endswith("...")] == []
     assert all(line.startswith("  ") and line[2] != " " for line in listed), "one line per command"
+
+
+def test_the_help_lists_all_commands_whatever_follows() -> None:
+    page = compose("--help").out
+    assert [line for line in page.splitlines() if line.startswith("Commands for")] == [
+        "Commands for systems:",
+        "Commands for files:",
+        "Commands for ROS 2:",
+    ]
+    assert compose("--help", "run").out == compose("-h", "nothing").out == page
 
 
 @pytest.mark.parametrize("group", ["node", "topic", "service", "action", "param"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +12,10 @@ from composer.document import read_document
 from composer.resources import nodes_folder, schemas_folder, systems_folder
 from composer.tree import Entry, Mapping, Sequence, Tree
 from tests.language_server.client import Cursor, LanguageServer
+from tests.programs import require_package
 
-SERVER = Path(__file__).parent / "node_modules/yaml-language-server/bin/yaml-language-server"
+HERE = Path(__file__).parent
+SERVER = HERE / "node_modules/yaml-language-server/bin/yaml-language-server"
 SYSTEM = schemas_folder() / "system.schema.json"
 NODE = schemas_folder() / "node.schema.json"
 
@@ -30,6 +31,11 @@ WORDS = [
     ("system: s\nexecutors:\n  e:\n    kind: |", "events single_threaded multi_threaded"),
     ("system: s\nexecutors:\n  e:\n    kind: mul|", "events single_threaded multi_threaded"),
     ("system: s\ndelivery: |", "auto dds"),
+    ("system: s\ndiscovery:\n  kind: |", "multicast server peers"),
+    (NODE_OF + "executable:\n      kind: |", "node task"),
+    (NODE_OF + "executable:\n      lifecycle: |", "managed none"),
+    (NODE_OF + "external:\n      lifecycle: |", "managed none"),
+    (NODE_OF + "log_level: |", "debug info warn error fatal"),
     ("system: s\nlifecycle:\n  on_failure: |", "restart isolate shutdown"),
     ("system: s\nconnections:\n  - topic: t\n    isolation: |", "share copy"),
     (NODE_OF + "lifecycle:\n      autostart: |", "active inactive unconfigured"),
@@ -49,8 +55,7 @@ FREE = frozenset({"variables", "state", "publish", "call", "respond", "set", "fe
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[LanguageServer]:
-    if shutil.which("node") is None or not SERVER.exists():
-        pytest.skip("it is not installed: npm ci --prefix tests/language_server")
+    require_package(HERE, "yaml-language-server")
     server = LanguageServer(SERVER)
     try:
         yield server
@@ -110,6 +115,18 @@ def test_all_forms_of_a_connection_are_offered(
         (NODE_OF + "{type: relay, parameters: {p|p: 1.0}}", "The value of a parameter"),
         (NODE_OF + "{type: relay, remappings: {p|p: q}}", "The ROS name to use instead"),
         (NODE_OF + "lifecycle: {auto|start: active}", "The target lifecycle state"),
+        ("system: s\nprocesses: {p: {mem|ory_mb: 5}}", "Maximum size of its memory"),
+        ("system: s\nprocesses: {p|p: {cpus: [1]}}", "A process with some of the nodes"),
+        ("system: s\nhosts: {h: {work|space: ~/a}}", "The folder of the project there"),
+        ("system: s\nhosts: {h|h: {user: a}}", "A computer that runs processes"),
+        ("system: s\ndiscovery: {ki|nd: server}", "through a discovery server of Fast DDS"),
+        (NODE_OF + "cla|ss: a:B", "An existing rclpy class"),
+        (NODE_OF + "executable: {pack|age: a}", "The ROS or Python package"),
+        (NODE_OF + "external: {ready|_timeout_ms: 5}", "How long the start may take"),
+        (NODE_OF + "transforms: {look|up: [map]}", "The frames that the node looks up"),
+        (NODE_OF + "transforms: {static: {l: {par|ent: b}}}", "The parent frame"),
+        (NODE_OF + "transforms: {static: {l|l: {parent: b}}}", "The pose of a child frame"),
+        (NODE_OF + "transforms: {dynamic: {l: {fr|om: b}}}", "A subscription of the node"),
     ],
 )
 def test_a_key_is_described(server: LanguageServer, text: str, shown: str) -> None:
@@ -123,7 +140,7 @@ def test_a_key_is_described(server: LanguageServer, text: str, shown: str) -> No
     [
         *(
             (systems_folder() / f"{name}.yaml", SYSTEM)
-            for name in ("pipeline", "supervised", "fleet")
+            for name in ("pipeline", "supervised", "fleet", "frames")
         ),
         *((nodes_folder() / f"{name}.yaml", NODE) for name in ("motor_controller", "action_stub")),
     ],

@@ -1,6 +1,6 @@
 """The parser of Mermaid reads every diagram as intended.
 
-Requires Node.js and ``npm ci --prefix tests/mermaid``; skipped otherwise.
+Requires Node.js and ``npm ci --prefix tests/mermaid``.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import html
 import json
 import re
-import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,16 +20,17 @@ from composer.graph.diagram import Graph
 from composer.graph.formats import mermaid
 from composer.loading import load
 from composer.resources import systems_folder
+from tests.programs import require_package
 from tests.unit.graph.test_renderers import EVIL, evil_graph
 from tests.unit.support.fleets import fleet_graph
 
 HERE = Path(__file__).parent
 SYSTEMS = sorted(systems_folder().glob("*.yaml"))
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("node") is None or not (HERE / "node_modules" / "mermaid").is_dir(),
-    reason="Mermaid is not installed: npm ci --prefix tests/mermaid",
-)
+
+@pytest.fixture(scope="module", autouse=True)
+def parser() -> None:
+    require_package(HERE, "mermaid")
 
 
 def read(graphs: Sequence[Graph]) -> list[dict[str, Any]]:

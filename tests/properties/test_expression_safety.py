@@ -123,7 +123,7 @@ def evaluate(source: str) -> object:
     except (ExpressionError, EvaluationError) as error:
         return error
     finally:
-        assert time.process_time() - started < 0.5
+        assert time.process_time() - started < 5.0
 
 
 @pytest.mark.parametrize("source", ESCAPES)

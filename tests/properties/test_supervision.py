@@ -6,8 +6,10 @@ without ROS and threads: wherever another thread could run, some external reques
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from hypothesis import strategies as st
@@ -160,11 +162,24 @@ class SimulatedNode:
         return outcome
 
 
+class NoOtherProcesses:
+    """The other processes of a system that has none."""
+
+    def requests_together(self) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def keep_goals(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
+        pass
+
+
 class World:
     """A node set of simulated nodes, and what the test knows about them."""
 
+    process_of: Mapping[str, str] = MappingProxyType({})
+
     def __init__(self) -> None:
         self.nodes: dict[str, SimulatedNode] = {}
+        self.other_processes = NoOtherProcesses()
         self.hung: frozenset[str] = frozenset()
         self._script: Iterator[Request | None] = iter(())
         self._clock = 0
@@ -211,6 +226,12 @@ class World:
 
     # --- the node set
 
+    def run_step(
+        self, name: str, transition: str, is_outdated: Callable[[], bool], _: Sequence[str]
+    ) -> Future[TransitionOutcome]:
+        node = self.nodes[name]
+        return node.run_task(node.run_step(transition, is_outdated))
+
     def states(self) -> Mapping[str, PrimaryState]:
         found = {}
         for name, node in self.nodes.items():
@@ -220,6 +241,9 @@ class World:
         return found
 
     def is_lost(self, _: str) -> bool:
+        return False
+
+    def is_absent(self, _: str) -> bool:
         return False
 
     def timeout_s(self, _: str) -> float:

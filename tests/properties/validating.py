@@ -42,6 +42,20 @@ OTHERS = (
         ],
         "connections": [{"topic": "/all", "from": "r*_simulator.sensor_data"}],
     },
+    {
+        "system": "rover",
+        "discovery": {"kind": "server", "address": "192.168.1.10", "start": True},
+        "hosts": {"jetson": {"address": "192.168.1.20", "user": "robot", "workspace": "~/rover"}},
+        "processes": {"vision": {"nodes": ["camera", "mast"], "host": "jetson"}},
+        "nodes": {
+            "camera": {"class": "rover.camera:Camera", "arguments": {"width": 640}},
+            "driver": {"executable": {"command": ["rover_driver", "--port", "/dev/ttyUSB0"]}},
+            "planner": {"external": True, "publishers": {"path": {"type": "nav_msgs/msg/Path"}}},
+            "mast": {"transforms": {"static": {
+                "mast": {"parent": "base_link", "translation_m": {"z": 0.2}},
+            }}},
+        },
+    },
 )  # fmt: skip
 RENDERERS = (report.render, sarif.render, github.render, text.render)
 

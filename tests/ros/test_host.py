@@ -9,7 +9,7 @@ import pytest
 from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import (
     BroughtUp,
     CallbackFailed,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -20,10 +19,10 @@ from composer.resources import nodes_folder, systems_folder
 from composer.schema import REPORT, SCHEMAS, check_schema, kind_of, schema
 from composer.source import SourceFile
 from composer.tree import plain
+from tests.programs import require_package
 from tests.properties.mutation import mutated
 
 HERE = Path(__file__).parent
-INSTALLED = HERE / "node_modules" / "ajv"
 NAMES = (*SCHEMAS, REPORT)
 Ajv = Callable[[list[tuple[str, Any]]], list[list[str]]]
 
@@ -75,13 +74,11 @@ INVALID = [
 
 @pytest.fixture(scope="module")
 def ajv() -> Ajv:
-    node = shutil.which("node")
-    if node is None or not INSTALLED.exists():
-        pytest.skip("ajv is not installed: npm ci --prefix tests/schema_ajv")
+    require_package(HERE, "ajv")
 
     def check(documents: list[tuple[str, Any]]) -> list[list[str]]:
         done = subprocess.run(
-            [str(node), "check.mjs"],
+            ["node", "check.mjs"],
             cwd=HERE,
             input=json.dumps({"schemas": {name: schema(name) for name in NAMES},
                               "documents": documents}),

@@ -17,7 +17,7 @@ from benchmarks.figures import ratios
 from benchmarks.rounds import COMPOSED, SINGLE, Case, rows, run_rounds
 from benchmarks.systems import cpu_us
 
-ROUNDS = 3
+ROUNDS = 6
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(180)]
 

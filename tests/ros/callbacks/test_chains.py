@@ -55,7 +55,7 @@ def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_pa
     assert stop.late == stop.times.count
     assert see.late == 0
     assert see.times.mean_s > 0.003
-    # Not the mean: the motor may receive a late message together with the next one.
-    assert stop.times.percentile_s(0.5) > see.times.percentile_s(0.5)
+    # The shortest, within a tenth: the motor may receive a late message together with the next.
+    assert stop.times.percentile_s(0.0) >= see.times.percentile_s(0.0) >= 0.0027
     reported = {item.chain: item for item in system.stop().chains}
     assert reported["stop"].count == stop.times.count

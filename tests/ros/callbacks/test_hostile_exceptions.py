@@ -116,6 +116,7 @@ def test_whatever_a_handler_raises_is_counted_and_answered(
             assert peer.call(Trigger, service).success
         client = ActionClient(peer.node, Navigate, "/drive")
         wait_until(client.server_is_ready)
+        peer.wait_until_known("/hostile")
         for number in range(7):
             goal = Navigate.Goal(max_velocity=float(number))
             handle = finished(peer.run(partial(client.send_goal_async, goal)))

@@ -10,7 +10,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import LogLevel
 from composer.runtime.callbacks.log import ErrorLimit
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import Logged
 from tests.ros.support.in_process import Peer, running, wait_until
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from tests.ros.support.in_process import running, wait_until
 from tests.ros.support.system_process import RunningSystem as InAProcess
 

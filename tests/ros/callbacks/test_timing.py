@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from composer.runtime.metrics.statistics import CallbackStatistics
 from tests.ros.support.in_process import RunningSystem, running, wait_until
 

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -79,12 +78,11 @@ def test_native_nodes_with_our_own(prefix: Path, tmp_path: Path, peer: Peer) -> 
 
         for round_, name in enumerate(("driver", "camera"), 1):
             node = system.node(name)
-            killed_s = time.monotonic() - system.host._reporter._started_at_s
             os.kill(node.pid, signal.SIGKILL)
             wait_until(lambda n=round_: len(system.reported(NodeFailed)) == n, "the fault")
             failed = system.reported(NodeFailed)[-1]
             assert failed.node == node.full_name
-            assert failed.elapsed_s - killed_s < 0.1 * max(1.0, os.getloadavg()[0])
+            assert failed.reason == "its process was ended by SIGKILL"  # and not its DDS lease
             wait_until(lambda: system.node("listener").state == "inactive", "the pause")
             wait_until(lambda n=round_: len(system.reported(Restarted)) == n, "the restart")
             wait_until(lambda: system.node("listener").state == "active", "the end of the pause")
@@ -92,4 +90,4 @@ def test_native_nodes_with_our_own(prefix: Path, tmp_path: Path, peer: Peer) -> 
         assert response.current_state.label == "active"
         pids = [system.node(name).pid for name in ("driver", "camera")]
         assert system.stop().exit_code == 0
-    assert not any(Path("/proc", str(pid)).exists() for pid in pids)
+    wait_until(lambda: not any(Path("/proc", str(pid)).exists() for pid in pids), "their end")

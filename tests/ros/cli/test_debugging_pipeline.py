@@ -8,7 +8,6 @@ import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,14 +15,16 @@ import yaml
 from std_msgs.msg import String
 
 from composer.remote.graph_names import GraphNames
-from composer.remote.local_graph import local_names
-from composer.remote.local_queries import (
+from composer.remote.session import Deadline, Session
+from composer.remote.systems.local_graph import local_names
+from composer.remote.systems.local_queries import (
+    local_action,
     local_node,
     local_parameters,
     local_report,
     local_reports,
+    local_topic,
 )
-from composer.remote.session import Deadline, Session
 from composer.runtime.process.query_socket import KINDS
 from tests.ros.support.commands import PATIENCE_S, compose, hand_written, listed, output_of, running
 from tests.ros.support.in_process import Peer, wait_until
@@ -53,6 +54,12 @@ ANSWERED = (
     ("lifecycle", "get", "planner"),
     ("node", "info", "planner"),
     ("node", "info", "planner", "--include-hidden"),
+    ("topic", "info", "-v", "sensor_data"),
+    ("topic", "info", "/rosout", "--json"),
+    ("topic", "info", "/sensor_dat"),
+    ("action", "info", "/navigate"),
+    ("action", "info", "navigate", "--json"),
+    ("action", "info", "/navigat"),
     ("param", "list", "--param-type"),
     ("param", "list", "planner", "--json"),
     ("param", "get", "motor_controller", "waypoints"),
@@ -60,6 +67,11 @@ ANSWERED = (
     ("param", "dump", "/pipeline/manager"),
     ("param", "get", "planner", "max_velocit"),
 )
+
+
+def without_figures(text: str) -> str:
+    """Hide rates, durations with their units, and the widths of columns, which depend on them."""
+    return re.sub(" +", " ", re.sub(r"\d+\.?\d*( *\b(s|min)\b)?", " 0 ", text))
 
 
 def test_a_running_system_answers_as_the_graph_does(
@@ -71,6 +83,8 @@ def test_a_running_system_answers_as_the_graph_does(
     assert planner is not None
     assert planner.values(["max_velocity"]) == {"max_velocity": 1.0}
     assert local_node("planner", PATIENCE_S, hidden=False)
+    wait_until(lambda: local_topic("sensor_data", PATIENCE_S), "the endpoints of a topic")
+    wait_until(lambda: local_action("navigate", PATIENCE_S), "the nodes of an action")
     with ThreadPoolExecutor(4) as pool:
         from_system = list(pool.map(lambda words: compose(*words), ANSWERED))
         timed = local_report("pipeline", PATIENCE_S, callbacks=True)
@@ -80,9 +94,8 @@ def test_a_running_system_answers_as_the_graph_does(
     expected_callbacks = {item["name"] for node in system["nodes"] for item in node["callbacks"]}
     assert timed is not None
     assert {item.name for item in timed.callbacks} == expected_callbacks
-    hide = partial(re.sub, r"\d+\.?\d* *", "0 ")  # rates, durations and the width of columns
     for words, found, expected in zip(ANSWERED, from_system, from_graph, strict=True):
-        assert hide(found.stdout) == hide(expected.stdout), words
+        assert without_figures(found.stdout) == without_figures(expected.stdout), words
         assert found.stderr == expected.stderr, words
         assert found.returncode == expected.returncode, words
 

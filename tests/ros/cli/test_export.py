@@ -60,6 +60,7 @@ def test_the_policy_allows_every_endpoint_and_no_other(pipeline: Running) -> Non
         "/clock",
         "/pipeline/manager/_instance_*",
         "/pipeline/manager/change_state",
+        "/pipeline/manager/change_states",
     ]
 
 

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -77,7 +76,5 @@ def test_ctrl_c_shuts_the_system_down_in_order(tmp_path: Path) -> None:
 def test_the_system_ends_with_a_killed_launch(tmp_path: Path) -> None:
     with launched(tmp_path) as process:
         assert "/fleet/robot1/talker_listener" in local_systems()
-        began_s = time.monotonic()
         process.kill()
         wait_until(lambda: not local_systems(), "the system has ended")
-        assert time.monotonic() - began_s < 10.0

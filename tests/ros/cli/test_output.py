@@ -7,7 +7,6 @@ import os
 import signal
 import socket
 import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import dedent
@@ -16,7 +15,7 @@ import pytest
 from std_msgs.msg import Int64
 
 from tests.ros.support.commands import COMPOSE, PATIENCE_S
-from tests.ros.support.in_process import Peer, end_limit_s, wait_until
+from tests.ros.support.in_process import Peer, wait_until
 
 LOUD = """
 system: loud
@@ -76,9 +75,7 @@ def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(
         beats = peer.listen(Int64, "/beat")
         wait_until(lambda: beats and beats[-1].data > 50, "beats while the output is blocked")
         process.send_signal(signal.SIGINT)
-        stopped_s = time.monotonic()
-        assert process.wait(PATIENCE_S) == 0
-        assert time.monotonic() - stopped_s < end_limit_s(), "the end took too long"
+        assert process.wait(PATIENCE_S) == 0, "with the time limit of the shutdown, it is 1"
     finally:
         process.kill()
         process.wait()

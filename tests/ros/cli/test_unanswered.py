@@ -70,7 +70,8 @@ def test_writes_are_sent_once(forgetful: subprocess.Popen[str]) -> None:
 def test_a_missing_acknowledgment_prints_a_warning(
     forgetful: subprocess.Popen[str],
 ) -> None:
-    arguments = ("--times", "2", "--rate", "0.5", "/lab/in", "std_msgs/msg/String")
+    # Slow, so that the peer stops between the two messages, also on a busy machine.
+    arguments = ("--times", "2", "--rate", "0.25", "/lab/in", "std_msgs/msg/String")
     process = start("topic", "pub", *arguments)
     assert process.stderr is not None
     assert any("published #1" in line for line in process.stderr)

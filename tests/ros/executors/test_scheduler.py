@@ -1,4 +1,4 @@
-"""Properties of the composer's own loop only: fairness, precise waits, no leaks."""
+"""Properties of the composer's own loop only: fairness, no lost wake-ups, no leaks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import os
 import threading
 import time
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -43,24 +42,6 @@ def test_calls_of_each_thread_keep_their_order(on: Bench) -> None:
     wait_until(lambda: len(seen) == 2000)
     for number in range(4):
         assert [what[1] for what in seen if what[0] == number] == list(range(500))
-
-
-def test_a_wake_up_takes_far_less_than_a_millisecond(on: Bench) -> None:
-    delays_s: list[float] = []
-    for _ in range(50):
-        time.sleep(0.002)  # until it sleeps
-        begin = time.perf_counter()
-        on.loop.run(lambda begin=begin: delays_s.append(time.perf_counter() - begin), 5.0)
-    assert sorted(delays_s)[25] < 0.002  # the median; the machine may be busy
-
-
-def test_timers_are_not_rounded_to_milliseconds(on: Bench) -> None:
-    at: list[float] = []
-    timer = on.loop.call_every(0.0005, lambda: at.append(time.monotonic()))
-    wait_until(lambda: len(at) > 400)
-    timer.cancel()
-    gaps_s = sorted(later - earlier for earlier, later in pairwise(at))
-    assert gaps_s[len(gaps_s) // 2] < 0.0008
 
 
 @pytest.mark.parametrize("post", ["call_soon", "call_later in the past", "call_later at once"])

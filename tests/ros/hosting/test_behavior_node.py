@@ -54,6 +54,11 @@ class User:
 def test_what_a_library_creates_follows_the_lifecycle(tmp_path: Path, peer: Peer) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     with running(SYSTEM, tmp_path, user=USER) as system:
+        undeclared = [line for line in system.log() if "is not declared" in line]
+        assert undeclared == [
+            "publisher on /frames is not declared: it uses DDS (std_msgs/msg/String)",
+            "subscription on /commands is not declared: it uses DDS (std_msgs/msg/Int64)",
+        ]
         numbers, frames = peer.listen(Int64, "/numbers"), peer.listen(String, "/frames", latched)
         commands = peer.publisher(Int64, "/commands")
         library = system.behavior("user").helper
@@ -74,7 +79,7 @@ def test_what_a_library_creates_follows_the_lifecycle(tmp_path: Path, peer: Peer
         system.change("user", "configure", "activate")
         again = system.behavior("user").helper
         wait_until(lambda: again.count >= 1)
-        assert again.node.get_parameter("library.rate").value == 100.0
+        assert again.node.get_parameter("library.rate").value == 50.0
         assert again.node.get_parameter("gain").value == 2.0
         counted = system.summary("/user")
     assert counted.errors == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from typing import Any
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
+from tests.ros.support.external_processes import soon_missed
 from tests.ros.support.in_process import Peer, running, wait_until
 
 CLASSES = "tests.ros.support.node_classes"
@@ -94,7 +96,8 @@ def shown(found: list[tuple[str, list[str]]]) -> list[tuple[str, str]]:
 
 
 def test_a_class_has_the_names_and_parameters_of_ros2_run(tmp_path: Path, peer: Peer) -> None:
-    with subprocess.Popen([sys.executable, "-c", PROGRAM, *ARGUMENTS]) as program:
+    command = [sys.executable, "-c", PROGRAM, *ARGUMENTS]
+    with subprocess.Popen(command, env={**os.environ, **soon_missed(tmp_path)}) as program:
         try:
             expected = described(peer)
         finally:

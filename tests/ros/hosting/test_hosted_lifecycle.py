@@ -28,20 +28,31 @@ def test_an_instance_lives_from_configure_to_cleanup(tmp_path: Path, peer: Peer)
         assert peer.change("/talker", "activate")
         numbers = peer.listen(Int64, "/numbers")
         wait_until(lambda: numbers)
+        assert peer.set_parameter("/talker", "word", "kept") == ""
         assert peer.change("/talker", "deactivate")
         assert peer.change("/talker", "cleanup")
         assert history == ["constructed", "destroyed"]
         wait_until(lambda: peer.node.count_publishers("/numbers") == 0)
         assert peer.set_parameter("/talker", "word", "x")  # not declared any more
         system.change("talker", "configure", "activate")
-        assert system.node("talker").instance is not first
+        again = system.node("talker").instance
+        assert again is not first
+        assert again.get_parameter("word").value == "kept"
+        assert again.get_parameter("period").value == 0.01
     assert history == ["constructed", "destroyed"] * 2
 
 
 def test_the_handlers_of_a_lifecycle_node_class_are_called(tmp_path: Path, peer: Peer) -> None:
     history.clear()
-    text = f'system: counting\nnodes: {{counter: {{class: "{CLASSES}:Counter"}}}}'
+    text = f"""
+    system: counting
+    nodes:
+      counter:
+        class: {CLASSES}:Counter
+        publishers: {{numbers: {{type: std_msgs/msg/Int64, external: true}}}}
+    """
     with running(text, tmp_path) as system:
+        assert "has not created" not in system.log_text()  # on_configure does
         numbers = peer.listen(Int64, "/numbers")
         wait_until(lambda: len(numbers) >= 3)
         counter = system.node("counter").instance
@@ -77,6 +88,8 @@ def test_a_handler_can_refuse_a_transition(tmp_path: Path, peer: Peer) -> None:
         ("SpinsInConstructor", "spins its node in its constructor or a transition"),
         ("MakesSecondNode", "creates a second node, 'helper'"),
         ("HasOwnArguments", "command-line arguments of its own; use 'remappings'"),
+        ("HasOwnContext", "a context of its own; a hosted node joins the context of the system"),
+        ("CallsInitTwice", "the class calls Node.__init__ twice"),
         ("HasWaitable", "has a waitable of its own, Waitable; run it as an 'executable'"),
         ("Exits", "the constructor ends the process: SystemExit(3)"),
         ("NotANode", "is not derived from rclpy's Node"),
@@ -88,12 +101,13 @@ def test_a_handler_can_refuse_a_transition(tmp_path: Path, peer: Peer) -> None:
 def test_what_cannot_be_hosted_is_refused_with_the_reason(
     tmp_path: Path, name: str, reason: str
 ) -> None:
+    timeout_ms = 300 if name == "NeverReturns" else 20_000
     text = f"""
     system: refused
     nodes:
       refused:
         class: tests.ros.support.refused_classes:{name}
-        lifecycle: {{timeout_ms: 300}}
+        lifecycle: {{timeout_ms: {timeout_ms}}}
     """
     with running(text, tmp_path) as system:
         outcome = system.end()

@@ -8,7 +8,7 @@ import pytest
 from std_msgs.msg import Int64
 
 from composer.model import LogLevel
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from tests.ros.support.in_process import running, wait_until
 
 SENT = 30

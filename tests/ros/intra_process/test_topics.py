@@ -18,7 +18,7 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Int64
 
 from composer.model import LogLevel
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from composer.runtime.intra_process import match_flag
 from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until

@@ -11,7 +11,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
-from composer.runtime.host import Host, HostOptions
+from composer.plan import bring_up, tear_down
+from composer.runtime.host import Host
+from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.process import StartRefused
 from composer.runtime.ros.manager_protocol import STATE_QOS
@@ -259,9 +261,9 @@ def test_the_start_of_a_diamond_with_a_failing_node_is_rolled_back(
 
 
 def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) -> None:
-    with running(ROBOT, tmp_path, planner=PLANNER) as first:
+    with running(ROBOT, tmp_path, planner=PLANNER):
         system = system_of(ROBOT, tmp_path)
-        second = Host(system, first.host._up, first.host._down, HostOptions())
+        second = Host(system, bring_up(system), tear_down(system), HostOptions())
         with pytest.raises(StartRefused, match="system '/fleet/robot' already runs") as refusal:
             second.run()
         assert "process" in str(refusal.value)
@@ -274,9 +276,9 @@ def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) ->
 def test_the_length_of_reported_texts_is_limited() -> None:
     node = NodeStatus("/planner", "active", last_error=10_000 * "x", held_down=10_000 * "y")
     status = SystemStatus("robot", "running", (node,), "host", 1, 0.0)
-    for part in status_message(status, 0.0, ()).status:
+    for part in status_message(status, 0.0, (), 0):
         assert len(part.message) < 600
-        assert all(len(item.value) < 600 for item in part.values)
+        assert all(len(value) < 600 for value in part.values.values())
 
 
 def test_no_published_status_is_lost(tmp_path: Path) -> None:

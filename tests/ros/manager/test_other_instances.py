@@ -12,7 +12,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from std_srvs.srv import Trigger
 
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from composer.runtime.manager import other_instances
 from composer.runtime.manager.other_instances import Instance, parse_instance
 from composer.runtime.ros.manager_protocol import STATE_QOS

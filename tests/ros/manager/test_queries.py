@@ -1,36 +1,58 @@
-"""The manager leaves large answers to the services of ROS."""
+"""The manager knows all endpoints, and leaves large answers to the services of ROS."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 
 import pytest
 
-from composer.remote.local_queries import local_parameters
-from tests.ros.support.commands import running
+from composer.remote.session import Session
+from composer.remote.systems.local_endpoints import local_endpoints
+from composer.remote.systems.local_queries import local_parameters
+from composer.runtime.ros.endpoints_by_node import endpoints
+from tests.ros.support.commands import Running, running
 from tests.ros.support.in_process import wait_until
 
 SYSTEM = """
 system: queried
 nodes:
+  talker:
+    publishers: {out: {type: std_msgs/msg/String, topic: /talk, qos: sensor_data}}
+    services: {ask: {type: std_srvs/srv/Trigger, service: /ask}}
   small: {parameters: {numbers: {type: integer_array, default: [1, 2]}, limit: 1.5}}
   large: {parameters: {numbers: {type: integer_array, default: [%s]}}}
 """
 LIMIT_S = 10.0
 
 
-def test_large_parameters_are_left_to_the_parameter_services(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # as the system
-    path = tmp_path / "queried.yaml"
-    path.write_text(SYSTEM % ", ".join(["7"] * 20_001), encoding="utf-8")
-    with running(tmp_path / "log", str(path)) as system:
-        system.wait_for("2 of 2 nodes active")
-        wait_until(lambda: local_parameters("small", LIMIT_S), "an answer")
-        small = local_parameters("/small", LIMIT_S)
-        assert small is not None
-        assert small.values(["numbers", "limit"]) == {"numbers": [1, 2], "limit": 1.5}
-        assert [item.type for item in small.describe(["limit"])] == ["double"]
-        assert local_parameters("/large", LIMIT_S) is None
-        assert local_parameters("/unknown", LIMIT_S) is None
+@pytest.fixture(scope="module", autouse=True)
+def system(shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # as the system
+        folder = tmp_path_factory.mktemp("queried")
+        path = folder / "queried.yaml"
+        path.write_text(SYSTEM % ", ".join(["7"] * 20_001), encoding="utf-8")
+        with running(folder / "log", str(path)) as started:
+            started.wait_for("3 of 3 nodes active")
+            yield started
+
+
+def test_large_parameters_are_left_to_the_parameter_services() -> None:
+    wait_until(lambda: local_parameters("small", LIMIT_S), "an answer")
+    small = local_parameters("/small", LIMIT_S)
+    assert small is not None
+    assert small.values(["numbers", "limit"]) == {"numbers": [1, 2], "limit": 1.5}
+    assert [item.type for item in small.describe(["limit"])] == ["double"]
+    assert local_parameters("/large", LIMIT_S) is None
+    assert local_parameters("/unknown", LIMIT_S) is None
+
+
+def test_endpoints_are_those_that_another_process_discovers() -> None:
+    with Session() as session:
+        wait_until(lambda: dict(endpoints(session.graph)).keys() >= {"/talker", "/large"})
+
+        def is_equal() -> bool:
+            known, discovered = local_endpoints(), dict(endpoints(session.graph))
+            return known is not None and known[0] == discovered
+
+        wait_until(is_equal, "equal endpoints")

@@ -53,6 +53,8 @@ def test_a_behavior_does_not_shadow_the_standard_library(tmp_path: Path) -> None
 
 
 HELPED = """\
+from importlib import import_module
+
 import helper
 import tools.geometry
 from helper import text as shown
@@ -64,6 +66,8 @@ class Planner:
     def on_tick(self):
         from late import LATE
 
+        by_name = import_module("helper"), import_module("tools.units")
+        assert by_name == (helper, tools.units)
         return helper.NAME, tools.geometry.AREA, g.AREA, METERS, shown(), LATE, helper.signal
 """
 

@@ -248,6 +248,7 @@ def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) ->
 def test_repeated_requests_that_are_refused_do_not_fill_the_log(tmp_path: Path, peer: Peer) -> None:
     with running("{system: calm, nodes: {subject: {}}}", tmp_path) as system:
         client = peer.client(ChangeState, "/subject/change_state")
+        peer.wait_until_known("/subject")
         for number in range(100):
             label = f"\x1b[2J{number}" + 10_000 * "x"
             request = ChangeState.Request(transition=Transition(label=label))

@@ -67,6 +67,7 @@ class Subject:
     def __init__(self, peer: Peer) -> None:
         self._change = peer.client(ChangeState, "/subject/change_state")
         self._state = peer.client(GetState, "/subject/get_state")
+        peer.wait_until_known("/subject")
 
     def change(self, transition: str | int) -> bool:
         request = ChangeState.Request(transition=transition_of(transition))
@@ -121,6 +122,7 @@ def test_all_requests_get_a_response(tmp_path: Path, peer: Peer) -> None:
 
         requests = (*CYCLE, "nonsense", 99, 0, Transition.TRANSITION_DESTROY)
         clients = [Client(peer, requests, first) for first in range(8)]
+        peer.wait_until_known("/subject")
         for client in clients:
             client.send()
         wait_until(lambda: all(len(client.answers) == 125 for client in clients), "the answers")

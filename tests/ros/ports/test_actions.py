@@ -41,11 +41,12 @@ KINDS = ["events", "single_threaded", "multi_threaded"]
 class Navigator:
     """A hand-written client."""
 
-    def __init__(self, peer: Peer) -> None:
+    def __init__(self, peer: Peer, node: str = "/handled") -> None:
         self._peer = peer
         self.feedback: list[float] = []
         self.client = ActionClient(peer.node, Navigate, "/navigate")
         wait_until(self.client.server_is_ready, "the action server")
+        peer.wait_until_known(node)
 
     def send(self, x: float = 1.0, max_velocity: float = 1.0) -> Any:
         goal = Navigate.Goal(max_velocity=max_velocity)
@@ -73,7 +74,7 @@ def test_a_declared_action_gives_feedback_and_a_result(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
-        navigator = Navigator(peer)
+        navigator = Navigator(peer, "/server")
         server = system.node("server")._context.node
         wait_until(
             lambda: server.count_subscribers("/navigate/_action/feedback"),
@@ -93,7 +94,7 @@ def test_goals_are_rejected_by_accept_and_by_a_node_that_is_not_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(SERVER.replace("KIND", "events"), tmp_path) as system:
-        navigator = Navigator(peer)
+        navigator = Navigator(peer, "/server")
         assert not navigator.send(max_velocity=0.0).accepted
         system.wait_for_log("rejects a goal: it does not fulfill 'accept'")
         assert peer.change("/server", "deactivate")

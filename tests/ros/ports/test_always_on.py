@@ -157,6 +157,7 @@ def test_clients_and_actions_that_are_always_on(tmp_path: Path, peer: Peer) -> N
     def goal_is_taken(name: str) -> bool:
         client = ActionClient(peer.node, Navigate, name)
         wait_until(client.server_is_ready)
+        peer.wait_until_known("/power")
         goal = finished(peer.run(lambda: client.send_goal_async(Navigate.Goal())))
         if goal.accepted:
             status = finished(peer.run(goal.get_result_async)).status

@@ -87,8 +87,16 @@ def test_an_inactive_publisher_misses_no_deadline(tmp_path: Path, peer: Peer) ->
     with running(TIMED.format(kind="events", deadline_ms=200), tmp_path) as system:
         wait_until(lambda: len(lines(system, "got a message")) > 10)
         assert peer.change("/talker", "deactivate")
+
+        def wait_for_misses(count: int) -> None:
+            missed = counts(system, "listener").get("deadline_missed", 0)
+            wait_until(lambda: counts(system, "listener")["deadline_missed"] >= missed + count)
+
+        # On a busy machine the talker may have missed one before, which is counted later.
+        wait_until(lambda: counts(system, "listener").get("deadline_missed", 0))
+        wait_for_misses(1)
         before = counts(system, "talker")
-        wait_until(lambda: counts(system, "listener").get("deadline_missed", 0) > 3)
+        wait_for_misses(3)
         assert counts(system, "talker") == before  # an inactive node must be silent
 
 
@@ -96,12 +104,16 @@ def test_the_time_before_an_activation_does_not_count(tmp_path: Path, peer: Peer
     with running(TIMED.format(kind="events", deadline_ms=600), tmp_path) as system:
         assert peer.set_parameter("/talker", "period_ms", 350.0) == ""
         wait_until(lambda: lines(system, "got a message"))
-        assert peer.change("/talker", "deactivate")
-        over_s = time.monotonic() + 0.4
-        wait_until(lambda: time.monotonic() > over_s, "most of the deadline")
-        before, received = counts(system, "talker"), len(lines(system, "got a message"))
-        assert peer.change("/talker", "activate")
-        wait_until(lambda: len(lines(system, "got a message")) > received)
+        is_in_time = False
+        while not is_in_time:  # again if a busy machine itself has needed the rest of the deadline
+            assert peer.change("/talker", "deactivate")
+            over_s = time.monotonic() + 0.4
+            wait_until(lambda: time.monotonic() > over_s, "most of the deadline")  # noqa: B023
+            before, received = counts(system, "talker"), len(lines(system, "got a message"))
+            began_s = time.monotonic()
+            assert peer.change("/talker", "activate")
+            wait_until(lambda: len(lines(system, "got a message")) > received)  # noqa: B023
+            is_in_time = time.monotonic() - began_s < 0.55
         assert counts(system, "talker") == before
 
 

@@ -68,7 +68,7 @@ def test_messages_that_are_lost_are_counted_one_by_one(tmp_path: Path) -> None:
 
 SILENCE = """
 system: silence
-qos_profiles: {alive: {extends: command, liveliness_lease_duration_ms: 500}}
+qos_profiles: {alive: {extends: command, liveliness_lease_duration_ms: 1500}}
 nodes:
   listener:
     subscriptions:
@@ -80,9 +80,9 @@ def test_a_silent_publisher_is_logged_and_one_that_leaves_is_not(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(SILENCE, tmp_path) as system:
-        qos = QoSProfile(depth=10, liveliness_lease_duration=Duration(nanoseconds=500_000_000))
+        qos = QoSProfile(depth=10, liveliness_lease_duration=Duration(nanoseconds=1_500_000_000))
         leaving = peer.publisher(String, "/alive", qos)
-        with hand_written("hand_written_flood.py", "500", "0") as flood:
+        with hand_written("hand_written_flood.py", "1500", "0") as flood:
             system.wait_for_log("got a message")
             node = system.node("listener")._context.node
             wait_until(lambda: "flood" in node.get_node_names(), "its name")
@@ -90,7 +90,7 @@ def test_a_silent_publisher_is_logged_and_one_that_leaves_is_not(
             flood.kill()
             assert system.wait_for_log("did not assert its liveliness") == (
                 "subscription 'alive' on /alive: a publisher did not assert its liveliness "
-                "within the lease of 500 ms; it is published by /flood"
+                "within the lease of 1500 ms; it is published by /flood"
             )
         assert counts(system)["liveliness_changed"] == 1
 
@@ -117,7 +117,7 @@ def test_constant_events_do_not_deadlock(tmp_path: Path) -> None:
         wait_until(lambda: counts(system).get("liveliness_changed", 0) > 100)
         ticks = system.log().count("tick")
         wait_until(lambda: system.log().count("tick") > ticks + 20)
-        assert counts(system)["message_lost"]
+        wait_until(lambda: counts(system).get("message_lost"))
         system.change("listener", "deactivate", "cleanup", "configure", "activate")
         before = counts(system)["liveliness_changed"]
         wait_until(lambda: counts(system)["liveliness_changed"] > before + 20)

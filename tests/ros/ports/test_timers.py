@@ -8,7 +8,7 @@ import pytest
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 from std_msgs.msg import Int64
 
-from composer.runtime.host import HostOptions
+from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import RollingBack
 from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
 

@@ -8,6 +8,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import pytest
 from std_msgs.msg import Empty
 
 from composer.runtime.process.dds_participants import count_participants
@@ -18,8 +19,9 @@ from tests.ros.support.in_process import Peer, wait_until
 #: that is every second one. The share allows for delays on a busy machine.
 JOINS, ENOUGH = 16, 12
 AT_ONCE_S = 0.9
-#: The lease of a command is 4 s, the default is 20 s.
-FORGOTTEN_WITHIN_S = 10.0
+ATTEMPTS = 3
+#: The lease of a command is 4 s. With the default of 20 s, it would be known for 17 s at least.
+FORGOTTEN_WITHIN_S = 15.0
 #: Enough for several packets.
 TOPICS = [f"/flood/topic_{number}" for number in range(250)]
 JOIN = f"""
@@ -64,16 +66,21 @@ def test_nodes_of_tests_do_not_use_shared_memory(peer: Peer) -> None:
     assert "/dev/shm/fast" not in Path("/proc/self/maps").read_text(encoding="utf-8")
 
 
+@pytest.mark.timeout(200)
 def test_a_new_process_discovers_others_with_all_topics_at_once(peer: Peer) -> None:
     for topic in TOPICS:
         peer.node.create_publisher(Empty, topic, 1)
-    done = subprocess.run(
-        [*PYTHON, "-c", JOIN], check=True, capture_output=True, text=True, timeout=50.0
-    )
-    assert "XML" not in done.stderr + done.stdout  # printed if the profile is invalid
-    took_s, missing = json.loads(done.stdout.splitlines()[-1])
-    assert sum(join_s < AT_ONCE_S for join_s in took_s) >= ENOUGH, took_s
-    assert missing.count(0) >= ENOUGH, missing
+    attempts = []
+    for _ in range(ATTEMPTS):
+        done = subprocess.run(
+            [*PYTHON, "-c", JOIN], check=True, capture_output=True, text=True, timeout=50.0
+        )
+        assert "XML" not in done.stderr + done.stdout  # printed if the profile is invalid
+        took_s, missing = json.loads(done.stdout.splitlines()[-1])
+        if sum(join_s < AT_ONCE_S for join_s in took_s) >= ENOUGH <= missing.count(0):
+            return
+        attempts.append((took_s, missing))
+    raise AssertionError(f"discovery took longer: {attempts}")
 
 
 def test_each_participant_on_this_host_is_counted(peer: Peer) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import time
 from pathlib import Path
 from textwrap import dedent
 
@@ -84,11 +83,10 @@ def test_a_start_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
     hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": "rcl_node_init"}
     process = start("minimal", "--grace", 1, **hanging)
     wait_for_line(process, "hanging")
-    began_s = time.monotonic()
     process.send_signal(signal.SIGTERM)
     output = rest_of(process)
     assert process.returncode == 1
-    assert time.monotonic() - began_s < 9.0  # the start of a system gets at least 5 s
+    assert "Timeout (0:00:05)!" in output  # the start of a system gets at least 5 s
     assert "manager/node.py" in output, "the Python stack"
 
 
@@ -96,11 +94,10 @@ def test_an_end_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
     hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": "rcl_node_fini"}
     process = start("minimal", "--grace", 1, **hanging)
     wait_for_line(process, "1 of 1 nodes active")
-    began_s = time.monotonic()
     process.send_signal(signal.SIGTERM)
     output = rest_of(process)
     assert process.returncode == 1
-    assert time.monotonic() - began_s < 5.0  # the default is 10 s
+    assert "Timeout (0:00:01)!" in output  # the default is 10 s
     assert "in destroy_node" in output
 
 
@@ -125,8 +122,7 @@ def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:
     )
     process = start(path, "--for", 0.1, "--grace", 1)
     wait_for_line(process, "shutting down: --for elapsed")
-    began_s = time.monotonic()
     output = rest_of(process)
     assert process.returncode == 1
-    assert time.monotonic() - began_s < 5.0
+    assert "Timeout (0:00:01)!" in output
     assert "in work_forever" in output

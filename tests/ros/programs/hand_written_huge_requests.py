@@ -75,8 +75,11 @@ def main() -> None:
         for kind, name, request in prepared:
             client = node.create_client(kind, f"{target}/{name}")
             client.wait_for_service()
-            future = client.call_async(request)
-            rclpy.spin_until_future_complete(node, future, timeout_sec=10.0)
+            for _ in range(3):  # the server may discover the client later than the request
+                future = client.call_async(request)
+                rclpy.spin_until_future_complete(node, future, timeout_sec=10.0)
+                if future.done():
+                    break
             answer = outcome(future.result()) if future.done() else "no response"
             print(json.dumps([name, answer]), flush=True)
             node.destroy_client(client)

@@ -6,6 +6,7 @@ node has an executor of its own: other nodes of its executor are blocked until i
 
 from __future__ import annotations
 
+import os
 import re
 import time
 from collections.abc import Iterator, Mapping
@@ -278,7 +279,8 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
             for subject in subjects:
                 fail(system, subject, "shutdown")
             hang(system, hanging)
-        assert metronomes.ratio == pytest.approx(1.0, abs=0.05)
+        overload = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+        assert metronomes.ratio == pytest.approx(1.0, abs=0.05 * overload)
 
         for subject in (*subjects, *hanging.values()):
             if subject.state != "finalized":

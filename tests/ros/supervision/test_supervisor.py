@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
 from std_msgs.msg import String
 
 from composer.runtime.supervision.events import NodeFailed, Restarted, StateChanged, Stuck
-from tests.ros.support.in_process import Peer, RunningSystem, end_limit_s, running, wait_until
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 ROBOT = """
 system: robot
@@ -24,7 +23,7 @@ nodes:
     parameters: {fault: ""}
     publishers: {scan: {type: std_msgs/msg/String, external: true}}
     timers: {tick: {period_ms: 10}}
-    lifecycle: {watch: {topic_silence_ms: 150, callback_ms: 100, max_errors: 2}, timeout_ms: 2500}
+    lifecycle: {watch: {WATCH}, timeout_ms: 2500}
   camera:
     publishers: {image: {type: std_msgs/msg/String, external: true}}
     timers: {tick: {period_ms: 10, publish: {image: {data: picture}}}}
@@ -61,9 +60,15 @@ class Sensor(Behavior):
 """
 
 
-def robot(policy: str = "restart", budget: str = "backoff_ms: 20", kind: str = "events") -> str:
+#: What is watched for each fault: on a busy machine, another limit might be exceeded first.
+WATCH = {"silent": "topic_silence_ms: 300", "loop": "callback_ms: 200", "raise": "max_errors: 2"}
+
+
+def robot(
+    fault: str, policy: str = "restart", budget: str = "backoff_ms: 20", kind: str = "events"
+) -> str:
     text = ROBOT.replace("POLICY", policy).replace("BUDGET", budget)
-    return text.replace("KIND", kind)
+    return text.replace("KIND", kind).replace("WATCH", WATCH.get(fault, ""))
 
 
 def since(system: RunningSystem, failed: NodeFailed) -> list[str]:
@@ -88,15 +93,15 @@ RESTART_CHANGES = [
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [
-        ("silent", "silent for 150 ms"),
-        ("loop", "on_tick took longer than 100 ms"),
+        ("silent", "silent for 300 ms"),
+        ("loop", "on_tick took longer than 200 ms"),
         ("raise", "more than 2 errors within 60 s"),
     ],
 )
 def test_a_failed_node_is_restarted_while_its_dependents_wait(
     tmp_path: Path, peer: Peer, fault: str, reason: str, kind: str
 ) -> None:
-    with running(robot(kind=kind), tmp_path, sensor=SENSOR) as system:
+    with running(robot(fault, kind=kind), tmp_path, sensor=SENSOR) as system:
         images = peer.listen(String, "/image")
         scans = peer.listen(String, "/scan")
         assert peer.set_parameter("/sensor", "fault", fault) == ""
@@ -111,7 +116,7 @@ def test_a_failed_node_is_restarted_while_its_dependents_wait(
         wait_until(lambda: len(images) > seen, "more images")
         if fault == "loop":
             stuck = system.reported(Stuck)[0]
-            assert "return from on_tick within 100 ms" in str(stuck)
+            assert "return from on_tick within 200 ms" in str(stuck)
             assert "time.sleep(0.001)" in stuck.stack
         assert system.stop().exit_code == 0, "a successful restart"
     assert "restart" not in "".join(system.states("/camera"))
@@ -119,7 +124,7 @@ def test_a_failed_node_is_restarted_while_its_dependents_wait(
 
 def test_a_failed_restart_is_retried(tmp_path: Path, peer: Peer) -> None:
     module = SENSOR.replace('if fault == "raise"', 'if fault == "configure" and self.life == 1')
-    with running(robot(budget="backoff_ms: 50"), tmp_path, sensor=module) as system:
+    with running(robot("raise", budget="backoff_ms: 50"), tmp_path, sensor=module) as system:
         assert peer.set_parameter("/sensor", "fault", "configure") == ""
         wait_until(lambda: system.reported(Restarted), "the restart")
         failures = system.reported(NodeFailed)
@@ -135,7 +140,7 @@ def test_a_failed_restart_is_retried(tmp_path: Path, peer: Peer) -> None:
 def test_too_many_restarts_end_the_system_in_order(tmp_path: Path, peer: Peer) -> None:
     """After five restarts within the window, the system shuts down and reports the reason."""
     budget = "max_attempts: 5, window_ms: 60000, backoff_ms: 1"
-    with running(robot(budget=budget), tmp_path, sensor=SENSOR) as system:
+    with running(robot("silent", budget=budget), tmp_path, sensor=SENSOR) as system:
         assert peer.set_parameter("/sensor", "fault", "always silent") == ""
         outcome = system.end()
     failures = system.reported(NodeFailed)
@@ -146,7 +151,7 @@ def test_too_many_restarts_end_the_system_in_order(tmp_path: Path, peer: Peer) -
     assert len(system.reported(Restarted)) == 5
     assert outcome.exit_code == 1
     assert outcome.reason == (
-        "/sensor failed: silent for 150 ms; restarted 5 times within 60 s before"
+        "/sensor failed: silent for 300 ms; restarted 5 times within 60 s before"
     )
     assert since(system, failures[0])[:8] == RESTART_CHANGES
     assert [node.state for node in outcome.nodes] == ["finalized"] * 4
@@ -159,7 +164,7 @@ def test_too_many_restarts_end_the_system_in_order(tmp_path: Path, peer: Peer) -
 def test_a_failed_node_is_isolated_and_the_others_continue(
     tmp_path: Path, peer: Peer, fault: str
 ) -> None:
-    with running(robot("isolate"), tmp_path, sensor=SENSOR) as system:
+    with running(robot(fault, "isolate"), tmp_path, sensor=SENSOR) as system:
         images = peer.listen(String, "/image")
         assert peer.set_parameter("/sensor", "fault", fault) == ""
         if fault == "deactivate":
@@ -186,32 +191,28 @@ def test_a_failed_node_is_isolated_and_the_others_continue(
 
 
 def test_an_isolated_node_makes_the_exit_code_1(tmp_path: Path, peer: Peer) -> None:
-    with running(robot("isolate"), tmp_path, sensor=SENSOR) as system:
+    with running(robot("silent", "isolate"), tmp_path, sensor=SENSOR) as system:
         assert peer.set_parameter("/sensor", "fault", "silent") == ""
         wait_until(lambda: peer.state("/motor") == "inactive")
         assert system.stop().exit_code == 1
 
 
 def test_a_failing_node_can_end_the_system(tmp_path: Path, peer: Peer) -> None:
-    with running(robot("shutdown"), tmp_path, sensor=SENSOR) as system:
+    with running(robot("silent", "shutdown"), tmp_path, sensor=SENSOR) as system:
         assert peer.set_parameter("/sensor", "fault", "silent") == ""
         outcome = system.end()
-    assert (outcome.exit_code, outcome.reason) == (1, "/sensor failed: silent for 150 ms")
+    assert (outcome.exit_code, outcome.reason) == (1, "/sensor failed: silent for 300 ms")
     assert [node.state for node in outcome.nodes] == ["finalized"] * 4
 
 
 def test_an_executor_that_cannot_be_interrupted_is_abandoned_until_it_returns(
     tmp_path: Path, peer: Peer
 ) -> None:
-    text = robot("isolate").replace("  camera:\n", "  camera:\n    executor: own\n")
+    text = robot("loop", "isolate").replace("  camera:\n", "  camera:\n    executor: own\n")
     with running(text, tmp_path, sensor=SENSOR) as system:
         assert peer.set_parameter("/sensor", "fault", "block") == ""
         wait_until(lambda: system.reported(NodeFailed), "the failure")
-        # It hangs, and is therefore silent as well: either may be detected first.
-        assert system.reported(NodeFailed)[0].reason in (
-            "on_tick does not return",
-            "silent for 150 ms",
-        )
+        assert system.reported(NodeFailed)[0].reason == "on_tick does not return"
         wait_until(lambda: "/motor inactive" in system.states(), "the inactive dependent")
         wait_until(lambda: "/sensor unconfigured" in system.states(), "the end of the callback")
         assert peer.state("/camera") == "active"
@@ -221,9 +222,7 @@ def test_an_executor_that_cannot_be_interrupted_is_abandoned_until_it_returns(
 
 
 def test_a_stop_does_not_wait_for_a_restart(tmp_path: Path, peer: Peer) -> None:
-    with running(robot(budget="backoff_ms: 8000"), tmp_path, sensor=SENSOR) as system:
+    with running(robot("silent", budget="backoff_ms: 600000"), tmp_path, sensor=SENSOR) as system:
         assert peer.set_parameter("/sensor", "fault", "silent") == ""
         wait_until(lambda: "/sensor unconfigured" in system.states())
-        began_s = time.monotonic()
         assert system.stop().exit_code == 1
-        assert time.monotonic() - began_s < end_limit_s()

@@ -11,19 +11,30 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from tests.ros.support.sequences import Sequences, number
+from tests.ros.support.sequences import Sequences
 
 PEER = "tests.ros.programs.delivery_peer"
 ROOT = Path(__file__).parents[3]
 #: A topic with in-process delivery, and one by DDS only.
 STREAM, CONTROL = TOPICS = ("/stream", "/control")
 
-#: A killed process is noticed after 3 s instead of 20 s.
-SOON_MISSED = """<builtin>
+_SOON_MISSED = """<builtin>
           <discovery_config>
             <leaseDuration><sec>3</sec></leaseDuration>
             <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
           </discovery_config>"""
+
+
+def soon_missed(folder: Path) -> dict[str, str]:
+    """Return variables of a process that others miss after 3 s instead of 20 s.
+
+    This matters if it is killed, or if its goodbye message, which is sent once, is lost.
+    """
+    profile_of_tests = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
+    profiles = folder / "external.xml"
+    text = profile_of_tests.read_text(encoding="utf-8").replace("<builtin>", _SOON_MISSED)
+    profiles.write_text(text, encoding="utf-8")
+    return {"FASTRTPS_DEFAULT_PROFILES_FILE": str(profiles)}
 
 
 class ExternalProcess:
@@ -33,10 +44,6 @@ class ExternalProcess:
     """
 
     def __init__(self, what: str, profile: tuple[str, int], writer: int, folder: Path) -> None:
-        profile_of_tests = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
-        profiles = folder / "external.xml"
-        text = profile_of_tests.read_text(encoding="utf-8").replace("<builtin>", SOON_MISSED)
-        profiles.write_text(text, encoding="utf-8")
         self._process = subprocess.Popen(
             [sys.executable, "-m", PEER, what, *map(str, (*profile, writer, *TOPICS))],
             stdin=subprocess.PIPE,
@@ -45,7 +52,7 @@ class ExternalProcess:
             env={
                 **os.environ,
                 "PYTHONPATH": f"{ROOT}:{os.environ.get('PYTHONPATH', '')}",
-                "FASTRTPS_DEFAULT_PROFILES_FILE": str(profiles),
+                **soon_missed(folder),
             },
         )
         self.received: dict[str, list[int]] = {topic: [] for topic in TOPICS}
@@ -99,19 +106,6 @@ class Missing:
         stream, control = (sequences_of(received[topic]) for topic in TOPICS)
         self.add_counted(stream.missing, control.missing)
 
-    def add_of_both(self, received: Mapping[str, Sequence[int]]) -> None:
-        """Count missing messages of the time in which both topics were received.
-
-        What is lost by the way is lost when the machine is busy, so the time has to be the same.
-        """
-        stream, control = (sequences_of(received[topic]) for topic in TOPICS)
-        for writer in stream.last.keys() & control.last.keys():
-            first = number(writer, max(stream.first[writer], control.first[writer]))
-            last = number(writer, min(stream.last[writer], control.last[writer]))
-            if first < last:
-                self.stream += missing_between(first, last, received[STREAM])
-                self.control += missing_between(first, last, received[CONTROL])
-
     def add_counted(self, stream: Mapping[int, int], control: Mapping[int, int]) -> None:
         """Add up missing messages by writer."""
         self.stream += sum(stream.values())
@@ -125,7 +119,3 @@ def sequences_of(numbers: Iterable[int]) -> Sequences:
         sequences.take(item)
     assert sequences.disordered == []
     return sequences
-
-
-def missing_between(first: int, last: int, received: Iterable[int]) -> int:
-    return last - first + 1 - sum(first <= item <= last for item in received)

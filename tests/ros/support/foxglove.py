@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import queue
-import shutil
 import subprocess
 import threading
 import time
@@ -16,10 +15,6 @@ from typing import Any
 from tests.ros.support.dashboard import PATIENCE_S, Address
 
 FOLDER = Path(__file__).parents[2] / "foxglove"
-IS_INSTALLED = (
-    shutil.which("node") is not None
-    and (FOLDER / "node_modules" / "@foxglove" / "ws-protocol").is_dir()
-)
 
 
 def url_of(address: Address) -> str:

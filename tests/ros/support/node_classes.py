@@ -15,11 +15,7 @@ import rclpy
 from composer_interfaces.action import Navigate
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import ActionClient, ActionServer, CancelResponse
-from rclpy.callback_groups import (
-    CallbackGroup,
-    MutuallyExclusiveCallbackGroup,
-    ReentrantCallbackGroup,
-)
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, State, TransitionCallbackReturn
@@ -106,40 +102,6 @@ class Announcer(Node):
         self.create_publisher(String, "map", LATCHED).publish(String(data="the map"))
 
 
-class BlockingCaller(Node):
-    """Calls a service from a timer, and waits for the response there."""
-
-    def __init__(self) -> None:
-        super().__init__("caller")
-        self.client = self.create_client(Trigger, "count")
-        self.responses: list[Any] = []
-        self.overlaps = 0
-        self.busy = False
-        self.create_timer(0.01, self.tick)
-
-    def tick(self) -> None:
-        self.overlaps += self.busy
-        self.busy = True
-        self.responses.append(self.client.call(Trigger.Request()))
-        future = self.client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(self, future)
-        self.responses.append(future.result())
-        self.busy = False
-
-
-class AsyncCaller(Node):
-    """Awaits one service in the callback of another one."""
-
-    def __init__(self) -> None:
-        super().__init__("caller")
-        self.group = ReentrantCallbackGroup()
-        self.client = self.create_client(Trigger, "count", callback_group=self.group)
-        self.create_service(Trigger, "relay", self.on_relay, callback_group=self.group)
-
-    async def on_relay(self, request: Any, _: Any) -> Any:
-        return await self.client.call_async(request)
-
-
 class WaitingConstructor(Node):
     """Calls a service in its constructor, on an executor of its own."""
 
@@ -189,50 +151,6 @@ class Stubborn(Node):
     def __init__(self) -> None:
         super().__init__("stubborn")
         threading.Thread(target=self.release.wait, name="stubborn", daemon=True).start()
-
-
-class Groups(Node):
-    """Two callback groups: a callback of one runs while the other blocks."""
-
-    def __init__(self) -> None:
-        super().__init__("groups")
-        self.done = threading.Event()
-        self.together = 0
-        first, second = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
-        self.create_subscription(String, "wait", self.on_wait, 10, callback_group=first)
-        self.create_subscription(String, "finish", self.on_finish, 10, callback_group=second)
-
-    def on_wait(self, _: String) -> None:
-        self.together += self.done.wait(5.0)
-
-    def on_finish(self, _: String) -> None:
-        self.done.set()
-
-
-class OwnGroup(CallbackGroup):
-    """A callback group of the class's own."""
-
-    def can_execute(self, entity: Any) -> bool:
-        return True
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return True
-
-    def ending_execution(self, entity: Any) -> None:
-        pass
-
-
-class Grouped(Node):
-    """A timer in a callback group of the class's own."""
-
-    def __init__(self) -> None:
-        super().__init__("grouped")
-        self.count = 0
-        self.create_timer(0.01, self.tick, callback_group=OwnGroup())
-
-    def tick(self) -> None:
-        self.count += 1
-        self.get_logger().debug(f"tick {self.count}")
 
 
 class Counter(LifecycleNode):
@@ -302,7 +220,7 @@ class Sender(Node):
 
     def __init__(self) -> None:
         super().__init__("sender")
-        self.client = ActionClient(self, Navigate, "navigate")
+        self.client = ActionClient(node=self, action_type=Navigate, action_name="navigate")
         self.statuses: list[int] = []
         self.feedback = 0
         self.timer = self.create_timer(0.01, self.send)

@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 import rclpy
+from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.waitable import Waitable
 
@@ -25,6 +26,17 @@ class MakesSecondNode(Node):
 class HasOwnArguments(Node):
     def __init__(self) -> None:
         super().__init__("own", cli_args=["--ros-args", "-r", "a:=b"])
+
+
+class HasOwnContext(Node):
+    def __init__(self) -> None:
+        super().__init__("own", context=Context())
+
+
+class CallsInitTwice(Node):
+    def __init__(self) -> None:
+        super().__init__("one")
+        super().__init__("two")
 
 
 class NeverReturns(Node):

@@ -16,7 +16,6 @@ class Sequences:
     def __init__(self) -> None:
         self.count = 0
         self.last: dict[int, int] = {}
-        self.first: dict[int, int] = {}
         self.missing: dict[int, int] = {}
         self.disordered: list[str] = []
 
@@ -24,10 +23,8 @@ class Sequences:
         """Check a number that was received."""
         self.count += 1
         writer, sequence = divmod(received, _PER_WRITER)
-        last = self.last.get(writer)
-        if last is None:
-            self.first[writer] = sequence
-        elif sequence > last + 1:
+        last = self.last.get(writer, sequence - 1)
+        if sequence > last + 1:
             self.missing[writer] = self.missing.get(writer, 0) + sequence - last - 1
         elif sequence <= last:
             what = "again" if sequence == last else "out of order"

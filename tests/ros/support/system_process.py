@@ -20,11 +20,13 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from tests.ros.support.forked import ForkedCommand
+from tests.ros.support.service_calls import ServiceCall
 
 T = TypeVar("T")
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-PATIENCE_S = 20.0
+#: Longer than a participant is known whose goodbye message was lost: 20 s.
+PATIENCE_S = 30.0
 
 
 class RunningSystem:
@@ -158,13 +160,13 @@ class ExternalNode:
         return future.result()
 
     def call(self, service_type: Any, name: str, request: Any) -> Any:
-        """Call a service and return its response."""
-        client = self.node.create_client(service_type, name)
+        """Call a service and return its response; see :class:`.ServiceCall`."""
+        call = ServiceCall(self.node, service_type, name, request)
         try:
-            self.spin_until(client.service_is_ready)
-            return self.result(client.call_async(request))
+            self.spin_until(call.is_done)
+            return call.result()
         finally:
-            self.node.destroy_client(client)
+            call.close()
 
     def state(self, node: str) -> str:
         """Return the label of a node's lifecycle state."""

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import re
 import signal
-from itertools import pairwise
 
 import pytest
-from action_msgs.msg import GoalStatus
-from composer_interfaces.action import Navigate
-from composer_interfaces.srv import PlanTrajectory
-from geometry_msgs.msg import Point, Twist
-from nav_msgs.msg import Odometry, Path
-from rclpy.action import ActionClient
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
 from rclpy.qos import QoSPresetProfiles
 
+from tests.ros.support.in_process import end_limit_s
+from tests.ros.support.pipeline import (
+    NODES,
+    check_a_deactivated_planner,
+    check_the_drive,
+    check_the_navigation,
+    check_the_planner,
+)
 from tests.ros.support.system_process import ExternalNode, RunningSystem
-
-NODES = ("/perception/sensor_simulator", "/planning/planner", "/control/motor_controller")
-MAX_VELOCITY = 1.0  # the motor controller's default, in m/s
-ROUNDING = 0.02  # in m/s and m
-
-
-def _seconds(path: Path) -> list[float]:
-    return [pose.header.stamp.sec + pose.header.stamp.nanosec * 1e-9 for pose in path.poses]
-
-
-def _distance(first: Point, second: Point) -> float:
-    return math.dist((first.x, first.y, first.z), (second.x, second.y, second.z))
 
 
 def test_nodes_are_activated_in_dependency_order(external: ExternalNode) -> None:
@@ -38,7 +28,7 @@ def test_nodes_are_activated_in_dependency_order(external: ExternalNode) -> None
         code, took_s = system.stop(signal.SIGINT)
     activated = _order(system, r"active$|active\b")
     assert code == 0
-    assert took_s < 2.0
+    assert took_s < end_limit_s()
     assert activated.index("/planning/planner") < activated.index("/control/motor_controller")
     assert "Traceback" not in system.output
 
@@ -57,7 +47,8 @@ def test_every_signal_shuts_down_cleanly(external: ExternalNode, number: signal.
     with RunningSystem("systems/pipeline.yaml") as system:
         external.wait_for_state(NODES[-1], "active")
         code, took_s = system.stop(number)
-    assert (code, took_s < 2.0) == (0, True)
+    assert code == 0
+    assert took_s < end_limit_s()
 
 
 def test_the_robot_follows_the_planned_path(external: ExternalNode) -> None:
@@ -66,89 +57,22 @@ def test_the_robot_follows_the_planned_path(external: ExternalNode) -> None:
     # A straight path that is long enough for a slow discovery.
     with RunningSystem("systems/pipeline.yaml", "--set", "motor_controller.waypoints=[6.0, 0.0]"):
         external.spin_until(lambda: bool(odometry) and odometry[-1].pose.pose.position.x > 5.9)
-    speeds = [math.hypot(message.linear.x, message.linear.y) for message in commands]
-    assert len(speeds) > 50
-    assert 0.7 < max(speeds) <= MAX_VELOCITY + ROUNDING
-    on_the_way = [message.pose.pose.position for message in odometry]
-    assert max(abs(position.y) for position in on_the_way) < 0.05
-    assert all(after.x >= before.x - ROUNDING for before, after in pairwise(on_the_way))
-    for message in odometry:
-        twist = message.twist.twist.linear
-        assert math.hypot(twist.x, twist.y) <= MAX_VELOCITY + ROUNDING
+    check_the_drive(commands, odometry, line_m=0.0)
 
 
 def test_an_external_node_calls_the_planner(external: ExternalNode) -> None:
-    start, goal = Point(x=1.0, y=1.0), Point(x=4.0, y=5.0)
-    request = PlanTrajectory.Request(start=start, goal=goal, max_velocity=0.5)
     with RunningSystem("systems/pipeline.yaml"):
-        response = _wait_for_plan(external, request)
-        refused = external.call(PlanTrajectory, "/plan_trajectory", PlanTrajectory.Request())
-    assert response.success
-    positions = [pose.pose.position for pose in response.path.poses]
-    times_s = _seconds(response.path)
-    assert _distance(positions[0], start) < 1e-9
-    assert _distance(positions[-1], goal) < 1e-9
-    for (before, after), (earlier, later) in zip(
-        pairwise(positions), pairwise(times_s), strict=True
-    ):
-        assert _distance(before, after) / (later - earlier) <= 0.5 + ROUNDING
-    assert times_s[-1] - times_s[0] == pytest.approx(5.0 / 0.5, abs=0.2)
-    assert not refused.success
-    assert "max_velocity" in refused.message
-
-
-def _wait_for_plan(
-    external: ExternalNode, request: PlanTrajectory.Request
-) -> PlanTrajectory.Response:
-    """Call the planner until it has received odometry and returns a path."""
-    responses: list[PlanTrajectory.Response] = []
-
-    def has_path() -> bool:
-        responses.append(external.call(PlanTrajectory, "/plan_trajectory", request))
-        return bool(responses[-1].success)
-
-    external.spin_until(has_path)
-    return responses[-1]
+        check_the_planner(external)
 
 
 def test_an_external_node_navigates_and_cancels(external: ExternalNode) -> None:
     # Without waypoints the robot waits for goals.
     with RunningSystem("systems/pipeline.yaml", "--set", "motor_controller.waypoints=[]"):
         external.wait_for_state(NODES[-1], "active")
-        client = ActionClient(external.node, Navigate, "/navigate")
-        external.spin_until(client.server_is_ready)
-        goal = Navigate.Goal(target=Point(x=0.0, y=1.0), max_velocity=1.0)
-        outcome = external.result(external.result(client.send_goal_async(goal)).get_result_async())
-        assert outcome.status == GoalStatus.STATUS_SUCCEEDED
-        # The robot overshoots if its controller is delayed on a busy machine.
-        assert 0.9 < outcome.result.distance_traveled < 1.5
-        feedback: list[float] = []
-        handle = external.result(
-            client.send_goal_async(
-                Navigate.Goal(target=Point(x=50.0, y=50.0), max_velocity=0.5),
-                feedback_callback=lambda m: feedback.append(m.feedback.progress_percent),
-            )
-        )
-        external.spin_until(lambda: bool(feedback) and feedback[-1] > feedback[0])
-        busy = external.result(client.send_goal_async(goal))
-        assert not busy.accepted
-        external.result(handle.cancel_goal_async())
-        outcome = external.result(handle.get_result_async())
-        client.destroy()
-    assert outcome.status == GoalStatus.STATUS_CANCELED
-    assert outcome.result.message == "canceled on the way"
+        check_the_navigation(external)
 
 
 def test_a_deactivated_planner_rejects_requests(external: ExternalNode) -> None:
-    request = PlanTrajectory.Request(goal=Point(x=1.0), max_velocity=0.5)
     with RunningSystem("systems/pipeline.yaml"):
         external.wait_for_state(NODES[-1], "active")
-        _wait_for_plan(external, request)
-        assert external.change_state("/planning/planner", "deactivate")
-        refusal = external.call(PlanTrajectory, "/plan_trajectory", request)
-        assert not refusal.success
-        assert "/planning/planner" in refusal.message
-        assert "inactive" in refusal.message
-        assert external.state("/control/motor_controller") == "active"
-        assert external.change_state("/planning/planner", "activate")
-        _wait_for_plan(external, request)
+        check_a_deactivated_planner(external)

@@ -42,7 +42,10 @@ def test_the_generic_node_types(external: ExternalNode) -> None:
     degrees = external.listen(String, "/reading/degrees")
     relayed = external.listen(Float64, "/reading/relayed")
     with RunningSystem("systems/toolbox.yaml"):
-        # Enough messages of each topic, as discovery times differ.
+        # Counted from the same time on, as discovery times differ.
+        external.spin_until(lambda: bool(relayed and slow))
+        relayed.clear()
+        slow.clear()
         external.spin_until(lambda: len(large) >= 5 and len(slow) >= 20)
         assert external.call(Trigger, "/trigger", Trigger.Request()).message == "request 0"
         assert external.call(Trigger, "/trigger", Trigger.Request()).message == "request 1"

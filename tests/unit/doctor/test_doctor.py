@@ -1,16 +1,21 @@
 from __future__ import annotations
 
 import fcntl
+import socket
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from composer.doctor.discovery import check_declared_discovery
 from composer.doctor.environment import check_environment, discovery_range
 from composer.doctor.interfaces import check_interfaces
 from composer.doctor.network import check_network
 from composer.doctor.result import CheckResult, Level
 from composer.doctor.versions import check_rclpy
 from composer.interfaces import Interfaces
+from composer.model import Discovery, DiscoveryKind, Host
+from composer.source import Located, SourceFile, Span
 
 
 def problems(results: list[CheckResult]) -> list[tuple[str, str]]:
@@ -126,3 +131,71 @@ def test_outdated_interface_packages_are_reported(tmp_path: Path) -> None:
     assert result.message.endswith("built from different definitions of json/msg/Grip")
     (result,) = check_interfaces(["json"], new, new)
     assert result == CheckResult("interfaces", Level.OK, "built: json")
+
+
+def declared(kind: str, **settings: object) -> Discovery:
+    span = Span(SourceFile("robot.yaml"), 1, 1)
+
+    def located(value: object) -> object:
+        return (Located(value, span),) if isinstance(value, str) else value
+
+    given = {name: located(value) for name, value in settings.items()}
+    return Discovery(Located(DiscoveryKind(kind), span), span, **given)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+@pytest.mark.parametrize(
+    ("discovery", "level", "message"),
+    [
+        (declared("server", addresses="127.0.0.1"), "error", "does not run: nothing listens"),
+        (declared("server", addresses="127.0.0.1", start=True), "ok", "'compose run' starts it"),
+        (declared("server", addresses="robot.invalid"), "error", "name cannot be resolved"),
+        (declared("peers", peers="robot.invalid"), "error", "name cannot be resolved"),
+        (declared("peers", peers="127.0.0.1"), "ok", "there is a route to 127.0.0.1"),
+        (declared("multicast", interfaces="lo"), "ok", "network interface lo exists"),
+        (declared("multicast", interfaces="no0"), "error", "there is no network interface no0"),
+    ],
+)
+def test_the_discovery_of_a_system_is_checked(
+    discovery: Discovery, level: str, message: str, free_port: int
+) -> None:
+    (result,) = check_declared_discovery(replace(discovery, port=free_port), {})
+    assert result.level.value == level
+    assert message in result.message
+    assert (result.remedy is None) is (level == "ok")
+
+
+def test_a_port_in_use_is_taken_for_a_server() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        discovery = declared("server", addresses="127.0.0.1", port=listener.getsockname()[1])
+        (result,) = check_declared_discovery(discovery, {})
+    assert (result.level, "listens on that port" in result.message) == (Level.OK, True)
+
+
+def test_an_environment_that_overrides_the_discovery_is_reported() -> None:
+    environment = {"ROS_DISCOVERY_SERVER": "10.9.9.9:1"}
+    (result,) = check_declared_discovery(declared("peers", peers="10.0.0.1"), environment)
+    assert result.level is Level.WARNING
+    assert "ROS_DISCOVERY_SERVER is set to '10.9.9.9:1'" in result.message
+
+
+def test_the_results_of_a_host_name_it() -> None:
+    hosts = pytest.importorskip("composer.doctor.hosts", reason="asyncssh is not installed")
+    text = '[{"area": "qos", "level": "note", "message": "is odd", "remedy": "change it"}]'
+    span = Span(SourceFile("robot.yaml"), 1, 1)
+    host = Host(Located("jetson", span), span, Located("10.0.0.2", span))
+    (result,) = hosts.read_results(host, text)
+    assert (result.level, result.message, result.remedy) == (
+        Level.NOTE,
+        "jetson: is odd",
+        "change it",
+    )
+    with pytest.raises(ValueError, match="not a valid Level"):
+        hosts.read_results(host, text.replace("note", "odd"))

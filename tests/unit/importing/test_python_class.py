@@ -109,7 +109,8 @@ clients:
     ("text", "message", "hint"),
     [
         ("driver:Lidr", "module 'driver' has no class 'Lidr'", "did you mean 'Lidar'?"),
-        ("drver:Lidar", "no Python module named 'drver'", "this folder"),
+        ("drver:Lidar", "no Python module named 'drver'", "did you mean 'driver'?"),
+        ("zzz.zzz:Lidar", "no Python module named 'zzz.zzz'", "this folder"),
         ("driver", "'driver' does not name a class", "demo_nodes_py"),
         ("broken:A", "module 'broken' is not Python", None),
     ],
@@ -122,3 +123,11 @@ def test_what_is_not_a_class_is_explained(
     with pytest.raises(ClassNotFound, match=message) as raised:
         describe_class(text, tmp_path)
     assert hint is None or hint in str(raised.value.hint)
+
+
+def test_a_source_folder_with_the_name_of_rclpy_is_read(tmp_path: Path) -> None:
+    folder = tmp_path / "rclpy"
+    folder.mkdir()
+    (folder / "driver.py").write_text(DRIVER, encoding="utf-8")
+    node, _ = describe_class("driver:Lidar", folder)
+    assert node.ports

@@ -167,6 +167,8 @@ def test_the_nodes_of_a_launch_file_are_executables() -> None:
         write_system(found)
         == """\
 # Imported by 'compose import launch r.launch.py a:=b'.
+# A launch file does not show topics, services and actions, so the nodes have no ports.
+# To add them, start it, and copy the ports from the output of 'compose import live'.
 #
 # Left out:
 # - x

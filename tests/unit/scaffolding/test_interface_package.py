@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.scaffolding.interface_package import InvalidPackage, read_package
+from composer.scaffolding.interface_package import InvalidPackage, bundled_package, read_package
 
 VERSIONS = {"builtin_interfaces": "2.0.3", "geometry_msgs": "5.3.6"}
 
@@ -63,3 +63,17 @@ def test_what_cannot_be_built_is_explained(folder: Path, tmp_path: Path) -> None
     (tmp_path / "empty").mkdir()
     with pytest.raises(InvalidPackage, match=r"has no \.msg, \.srv or \.action file"):
         read_package("robot_msgs", tmp_path / "empty")
+
+
+def test_packages_of_ros_come_with_the_composer() -> None:
+    package = bundled_package("tf2_msgs")
+    assert (
+        package.definitions["msg/TFMessage.msg"] == "geometry_msgs/TransformStamped[] transforms\n"
+    )
+    assert set(package.definitions) == {
+        "msg/TF2Error.msg",
+        "msg/TFMessage.msg",
+        "srv/FrameGraph.srv",
+        "action/LookupTransform.action",
+    }
+    assert "geometry_msgs" in package.dependencies

@@ -38,6 +38,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
 from composer_interfaces.action import Navigate
 from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Odometry, Path

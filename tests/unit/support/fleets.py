@@ -15,15 +15,18 @@ _STAGES = ("camera", "detector", "tracker", "planner", "controller", "driver", "
 _STRING = "type: std_msgs/msg/String"
 
 
-def fleet_text(count: int) -> str:
-    """Return the YAML of a system with ``count`` nodes."""
+def fleet_text(count: int, *, frames: bool = False) -> str:
+    """Return the YAML of a system with ``count`` nodes.
+
+    With ``frames`` it has transforms too, and needs tf2_msgs to run.
+    """
     lines = [f"system: fleet_of_{count}", "nodes:"]
     for number in range(count):
-        lines += _node(number // len(_STAGES) + 1, number % len(_STAGES))
+        lines += _node(number // len(_STAGES) + 1, number % len(_STAGES), frames=frames)
     return "\n".join(lines) + "\n"
 
 
-def _node(area: int, stage: int) -> list[str]:
+def _node(area: int, stage: int, *, frames: bool) -> list[str]:
     name = _STAGES[stage]
     half = "sense" if stage < 3 else "act"
     lines = [f"  {name}_{area}:", f"    namespace: area{area}/{half}", "    publishers:"]
@@ -43,6 +46,10 @@ def _node(area: int, stage: int) -> list[str]:
     if name == "controller":
         lines += ["    clients:", f"      {trigger}", "    lifecycle:"]
         lines.append(f"      depends_on: [planner_{area}]")
+    parent = f"{before}_{area}" if stage else f"base_{area % 3}"
+    frame = f"{name}_{area}: {{parent: {parent}, translation_m: {{x: 1}}}}"
+    if frames:
+        lines += ["    transforms:", f"      static: {{{frame}}}"]
     if name == "camera":
         lines += ["    timers:", "      tick: {rate_hz: 30, publish: {camera_out: {data: seen}}}"]
     return lines
@@ -51,7 +58,7 @@ def _node(area: int, stage: int) -> list[str]:
 @cache
 def fleet(count: int) -> tuple[System, tuple[Diagnostic, ...]]:
     """Return a system with ``count`` nodes, and what the checks say about it."""
-    text = fleet_text(count).encode()
+    text = fleet_text(count, frames=True).encode()
     loading = load_bytes(text, Path("/nowhere"), shown=f"fleet_of_{count}.yaml")
     assert loading.system is not None
     assert len(loading.system.nodes) == count

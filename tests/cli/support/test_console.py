@@ -12,7 +12,7 @@ import threading
 import time
 from pathlib import Path
 
-from composer.cli.support.output_queue import FileDescriptor, OutputQueue
+from composer.cli.support.output.output_queue import FileDescriptor, OutputQueue
 
 LIMIT_S = 20.0
 
@@ -80,7 +80,7 @@ def test_the_end_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
     queue.put("text\n")
     closing = threading.Thread(target=queue.close)
     closing.start()
-    closing.join(2.0)
+    closing.join(LIMIT_S)
     assert not closing.is_alive()
     pipe.close_writing()
     os.close(pipe.reading)
@@ -107,7 +107,7 @@ def test_lines_that_a_full_disk_refuses_are_counted() -> None:
 #: ``fprintf`` holds the GIL, as rclpy does when rcl logs.
 PROGRAM = """
 import ctypes, os, subprocess, sys
-from composer.cli.support.console import queued_output
+from composer.cli.support.output.console import queued_output
 libc = ctypes.PyDLL(None)
 stderr = ctypes.c_void_p.in_dll(libc, "stderr")
 with queued_output():

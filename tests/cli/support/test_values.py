@@ -5,11 +5,11 @@ import io
 import pytest
 import yaml
 
-from composer.cli.commands.topic.message_format import truncated
+from composer.cli.commands.ros.topic.message_format import truncated
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
-from composer.cli.support.output import as_yaml
-from composer.cli.support.terminal import columns
+from composer.cli.support.output.results import as_yaml
+from composer.cli.support.output.terminal import columns
 from tests.cli.compose import compose
 
 

@@ -43,13 +43,13 @@ def test_a_system_with_errors_is_rejected_even_with_ignore_comments(
         f"system: broken\nnodes:\n  one: {{lifecycle: {{depends_on: [two]}}}}{comment}\n"
     )
     done = compose("run", str(path), "--dry-run")
-    assert (done.code, done.out) == (1, "")
+    assert (done.code, done.out) == (78, "")
     assert "is not a node of this system" in done.err
 
 
 def test_parameter_overrides_are_validated() -> None:
     done = compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocty=1.0")
-    assert done.code == 1
+    assert done.code == 78
     assert "did you mean 'max_velocity'?" in done.err
     assert compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
 
@@ -58,7 +58,7 @@ def test_paths_that_are_not_files_are_reported(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     assert "expected a file, found a pipe" in compose("run", str(tmp_path / "pipe.yaml")).err
     done = compose("run", "a" * 5000)
-    assert (done.code, done.out) == (1, "")
+    assert (done.code, done.out) == (78, "")
     assert "this file cannot be read: File name too long" in done.err
 
 
@@ -66,12 +66,20 @@ def test_a_node_type_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "relay.yaml"
     path.write_text("node: relay\n")
     done = compose("run", str(path), "--dry-run")
-    assert done.code == 1
+    assert done.code == 78
     assert "is a node type, not a system" in done.err
 
 
 def test_a_folder_is_a_usage_error(tmp_path: Path) -> None:
     assert compose("run", str(tmp_path)).code == 2
+
+
+def test_one_process_alone_starts_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text("system: robot\nprocesses: {a: {nodes: [b]}}\nnodes: {b: {}}\n")
+    done = compose("run", str(path), "--process", "a", "--await-processes")
+    assert done.code == 2
+    assert "--await-processes cannot be used with --process" in done.err
 
 
 def test_without_rclpy_the_hint_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

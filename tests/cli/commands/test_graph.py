@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 
@@ -51,6 +52,33 @@ def test_an_unwritable_file_is_reported(tmp_path: Path) -> None:
     done = compose("graph", PIPELINE, "-o", str(tmp_path / "no" / "p.svg"))
     assert done.code == 1
     assert "No such file or directory" in done.err
+
+
+def test_a_failed_write_leaves_the_file_as_it_was(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    target = tmp_path / "p.svg"
+    target.write_text("before", encoding="utf-8")
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("composer.cli.support.new_files.os.replace", fail)
+    done = compose("graph", PIPELINE, "-o", str(target))
+    assert (done.code, done.out) == (1, "")
+    assert f"cannot write '{target}': No space left on device" in done.err
+    assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.iterdir()] == [
+        ("p.svg", "before")
+    ]
+
+
+def test_a_diagram_goes_to_a_device_or_through_a_link(tmp_path: Path) -> None:
+    done = compose("graph", PIPELINE, "-f", "svg", "-o", "/dev/null")
+    assert (done.code, done.err) == (0, "wrote /dev/null\n")
+    (tmp_path / "link.svg").symlink_to("p.svg")
+    assert compose("graph", PIPELINE, "-o", str(tmp_path / "link.svg")).code == 0
+    assert (tmp_path / "link.svg").is_symlink()
+    assert (tmp_path / "p.svg").read_text(encoding="utf-8").startswith("<svg ")
 
 
 def test_views() -> None:

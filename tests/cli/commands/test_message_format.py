@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from composer.cli.commands.topic.message_format import MessageFormat
+from composer.cli.commands.ros.topic.message_format import MessageFormat
 from composer.cli.support.errors import UsageError
 
 SCAN = {"frame": "laser, left", "ranges": [0.5, 1.5, 2.5], "pose": {"x": 1.0}}

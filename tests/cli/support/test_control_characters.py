@@ -11,12 +11,14 @@ import pytest
 import yaml
 
 from composer.characters import is_safe
-from composer.cli.commands import diff, doctor, ps
-from composer.cli.commands.topic.info import _as_text
-from composer.cli.commands.topic.message_format import MessageFormat
-from composer.cli.support.output import as_json, as_yaml, print_names
-from composer.cli.support.progress import Progress
-from composer.cli.support.terminal import columns, lines, say, write
+from composer.cli.commands.files import diff
+from composer.cli.commands.ros import doctor
+from composer.cli.commands.ros.topic.info import _as_text
+from composer.cli.commands.ros.topic.message_format import MessageFormat
+from composer.cli.commands.systems import ps
+from composer.cli.support.output.progress import Progress
+from composer.cli.support.output.results import as_json, as_yaml, print_names
+from composer.cli.support.output.terminal import columns, lines, say, write
 from composer.doctor.result import warning
 from composer.drift.drift import Drift, DriftKind
 from composer.model import LogLevel
@@ -97,7 +99,7 @@ def test_a_hostile_check_has_the_usual_lines() -> None:
 
 
 def test_a_hostile_topic_has_the_usual_lines() -> None:
-    found: Any = SimpleNamespace(types=(HOSTILE,), publishers=(), subscriptions=())
+    found = {"types": [HOSTILE], "publishers": [], "subscriptions": []}
     assert len(_as_text(found, verbose=True).split("\n")) == 3
 
 

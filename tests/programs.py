@@ -1,0 +1,24 @@
+"""Programs that some tests need. Without them, these tests are skipped, but in CI they fail."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+
+def require(is_installed: object, missing: str) -> None:
+    """Skip the test, or fail in CI, if something is not installed; ``missing`` says what."""
+    if is_installed:
+        return
+    if os.environ.get("CI") == "true":
+        pytest.fail(missing, pytrace=False)
+    pytest.skip(missing)
+
+
+def require_package(folder: Path, package: str) -> None:
+    """Require Node.js and the npm packages of a folder of tests, ``package`` among them."""
+    is_installed = shutil.which("node") and (folder / "node_modules" / package).exists()
+    require(is_installed, f"{package} is not installed: npm ci --prefix tests/{folder.name}")

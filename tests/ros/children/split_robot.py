@@ -1,0 +1,79 @@
+"""A robot whose nodes are in three processes, for tests."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from composer.runtime.host_options import HostOptions
+from tests.ros.support.in_process import RunningSystem, running
+
+TEXT = """
+system: robot
+namespace: lab
+lifecycle: {on_failure: restart, restart: {backoff_ms: 100}}
+processes:
+  sensing: {nodes: [camera], cpus: [0], environment: {ROLE: sensing}}
+  acting: {}
+nodes:
+  camera:
+    publishers: {image: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 50, publish: {image: {data: picture}}}}
+  detector:
+    process: acting
+    behavior: detector:Detector
+    parameters: {mood: ""}
+    subscriptions: {image: {type: std_msgs/msg/String, qos: command}}
+    publishers: {found: {type: std_msgs/msg/String, qos: command}}
+    lifecycle: {depends_on: [camera], watch: {callback_ms: 300}}
+  arm:
+    subscriptions: {found: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+    lifecycle: {depends_on: [detector]}
+"""
+DETECTOR = """
+import time
+from composer.behavior import Behavior
+
+class Detector(Behavior):
+    def on_configure(self):
+        if self.parameters.mood == "broken":
+            raise ValueError("no lens")
+
+    def on_image(self, message):
+        while self.parameters.mood == "hang":
+            time.sleep(0.01)
+        if self.parameters.mood == "block":
+            time.sleep(60.0)  # cannot be interrupted
+        if self.parameters.mood == "angry":
+            raise ValueError("no cat")
+        found = self.publishers.found
+        found.publish(found.message_type(data=f"found {message.data}"))
+
+class Arm(Behavior):
+    async def on_deactivate(self):
+        await self.clock.sleep(0.3)
+"""
+
+
+def command_of(path: Path) -> tuple[str, ...]:
+    return (sys.executable, "-m", "composer", "run", str(path))
+
+
+@contextmanager
+def split(
+    folder: Path, text: str = TEXT, *, fail_on_error: bool = False
+) -> Iterator[RunningSystem]:
+    """Run the system as ``compose run`` does, with this process as the coordinating one."""
+    path = folder / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    options = HostOptions(
+        stop_within_s=6.0, member_command=command_of(path), fail_on_error=fail_on_error
+    )
+    with running(text, folder, options=options, detector=DETECTOR) as system:
+        yield system
+
+
+def states(system: RunningSystem) -> set[str]:
+    return {system.node(name).state for name in ("camera", "detector", "arm")}

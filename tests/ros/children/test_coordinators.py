@@ -1,0 +1,166 @@
+"""Processes that outlive the one that coordinates them, and who starts them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import TransitionEvent
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from composer.runtime.host_options import HostOptions
+from composer.runtime.process.instance_lock import hold_instance_lock
+from composer.runtime.ros.manager_protocol import STATE_QOS
+from composer.runtime.supervision.events import NodeFailed
+from tests.ros.children.split_robot import DETECTOR, TEXT, command_of, split, states
+from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system_of, wait_until
+from tests.ros.support.system_process import RunningSystem as CommandProcess
+
+
+@pytest.mark.timeout(200)
+def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
+    tmp_path: Path, peer: Peer
+) -> None:
+    path = tmp_path / "robot.yaml"
+    # With this backoff, the process returns before the coordinator starts one in its place.
+    text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
+    text = text.replace("  arm:\n", "  arm:\n    behavior: detector:Arm\n")
+    path.write_text(text, encoding="utf-8")
+    tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
+    members = [
+        subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.DEVNULL)
+        for name in ("sensing", "acting")
+    ]
+    try:
+        wait_until(lambda: len(running_managers(peer)) == 2, "the processes", 2.0 * PATIENCE_S)
+        moves = coordinate_and_pause(path, peer)
+        with split(tmp_path, text) as system:  # another one, and the pause goes on
+            assert system.node("camera").pid is None
+            assert system.host._status.without_nodes.activity == "paused"
+            assert states(system) == {"inactive"}
+            assert not moves
+            assert peer.call(Trigger, "/lab/robot/manager/resume").success
+            system.wait_for_log("found picture")
+            assert states(system) == {"active"}
+            forget(moves, "active")
+            found = peer.listen(String, "/lab/found")
+            wait_until(lambda: len(found) > 10, "messages")
+            assert not system.reported(NodeFailed)
+            assert not moves
+
+            members[0].kill()
+            failed = wait_for_failure(system)
+            # Only what has started it may start it again, whatever the policy.
+            assert str(failed).endswith("process 'sensing' has ended; waiting for its return")
+            assert system.node("detector").state == "inactive"
+            members[0].wait()
+            members[0] = subprocess.Popen([*command_of(path), "--process", "sensing"])
+            wait_until(lambda: states(system) == {"active"}, "the return")
+
+            moves.clear()
+            members[1].send_signal(signal.SIGSTOP)
+            wait_until(lambda: system.node("arm").state == "deactivating", "the pause")
+            failed = system.reported(NodeFailed)[-1]
+            assert failed.node == "/lab/detector"
+            assert failed.reason == "process 'acting' has not reported for 5 s"
+            members[1].send_signal(signal.SIGCONT)  # it returns before the pause is complete
+            wait_until(lambda: "/lab/arm inactive" in system.states()[-3:], "the end of the pause")
+            wait_until(lambda: states(system) == {"active"}, "the return")
+            assert not moves  # it was active all the time
+            assert system.node("camera").activations == 2
+        assert all(member.poll() is None for member in members)
+    finally:
+        for member in members:
+            member.send_signal(signal.SIGINT)
+        codes = [member.wait(20) for member in members]
+    assert codes == [0, 0]
+
+
+def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:
+    """Let two coordinators run one after the other, and be killed; return moves of the detector.
+
+    The first one leaves a node that a user has deactivated, the second one a pause.
+    """
+    with CommandProcess(str(path)) as coordinator:
+        coordinator.wait_for("3 of 3 nodes active")
+        moves = peer.listen(TransitionEvent, "/lab/detector/transition_event")
+        assert peer.change("/lab/arm", "deactivate")
+        reports = peer.listen(DiagnosticArray, f"{running_managers(peer)[0]}/state", STATE_QOS)
+        wait_until(lambda: reports and "arm=inactive" in kept_goals(reports), "the goals")
+        coordinator.stop(signal.SIGKILL)
+    found = peer.listen(String, "/lab/found")
+    wait_until(lambda: len(found) > 10, "messages without the coordinator")
+    with CommandProcess(str(path)) as coordinator:
+        coordinator.wait_for("2 of 3 nodes active")
+        assert not moves
+        assert peer.call(Trigger, "/lab/robot/manager/pause").success
+        coordinator.stop(signal.SIGKILL)
+    forget(moves, "inactive")
+    return moves
+
+
+def forget(moves: list[TransitionEvent], goal: str) -> None:
+    """Wait for the event of the last transition, and forget all."""
+    wait_until(lambda: moves and moves[-1].goal_state.label == goal, f"the event of '{goal}'")
+    moves.clear()
+
+
+def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
+    members = [
+        subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.PIPE, text=True)
+        for name in ("sensing", "acting")
+    ]
+    try:
+        with split(tmp_path) as system:  # it starts both as well, at the same time
+            assert states(system) == {"active"}
+            for member, node in zip(members, ("camera", "detector"), strict=True):
+                if system.node(node).pid is not None:
+                    assert member.wait(20) == 1
+                    assert member.stderr is not None
+                    assert "already runs in ROS domain" in member.stderr.read()
+            assert "already runs" not in system.log_text()
+            assert not system.reported(NodeFailed)
+    finally:
+        for member in members:
+            member.send_signal(signal.SIGINT)
+            member.communicate(timeout=20)
+
+
+def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
+    """It may belong to a process that is about to end with an earlier coordinator."""
+    with hold_instance_lock("/lab/robot/sensing"):
+        (tmp_path / "robot.yaml").write_text(TEXT, encoding="utf-8")
+        options = HostOptions(stop_within_s=6.0, member_command=command_of(tmp_path / "robot.yaml"))
+        system = RunningSystem(system_of(TEXT, tmp_path, detector=DETECTOR), options, None)
+        wait_until(lambda: len(system.host._node_set.nodes) == 3, "the nodes")
+        wait_until(lambda: system.node("detector").pid, "the start of the other process")
+        assert system.node("camera").pid is None
+    try:
+        wait_until(lambda: states(system) == {"active"}, "all nodes")
+        assert system.node("camera").pid is not None
+    finally:
+        system.stop()
+
+
+def kept_goals(reports: list[DiagnosticArray]) -> str:
+    """Return the goals of the system that a process keeps, according to its last report."""
+    return next((item.value for item in reports[-1].status[0].values if item.key == "goals"), "")
+
+
+def running_managers(peer: Peer) -> list[str]:
+    """Return the manager nodes of processes that are up."""
+    names = ("/lab/robot/sensing/manager", "/lab/robot/acting/manager")
+    return [name for name in names if peer.node.count_publishers(f"{name}/state")]
+
+
+def wait_for_failure(system: RunningSystem) -> NodeFailed:
+    wait_until(lambda: system.reported(NodeFailed), "the failure")
+    wait_until(lambda: system.node("detector").state == "inactive", "the pause")
+    return system.reported(NodeFailed)[0]

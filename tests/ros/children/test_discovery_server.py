@@ -1,0 +1,226 @@
+"""A system of three processes with a discovery server: found by commands and other ROS programs."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.ros.support.commands import (
+    PATIENCE_S,
+    Running,
+    compose,
+    output_of,
+    running,
+    start,
+)
+from tests.ros.support.observers import observing
+
+SYSTEM = """
+system: robot
+discovery: {{kind: server, address: 127.0.0.1, port: {port}, start: true}}
+processes: {{sensing: {{nodes: [camera]}}, acting: {{nodes: [arm]}}}}
+nodes:
+  camera:
+    publishers: {{image: {{type: std_msgs/msg/String, qos: command}}}}
+    timers: {{tick: {{period_ms: 50, publish: {{image: {{data: picture}}}}}}}}
+  arm:
+    subscriptions:
+      image: {{type: std_msgs/msg/String, qos: command, publish: {{move: {{data: go}}}}}}
+    publishers: {{move: {{type: std_msgs/msg/String, qos: command}}}}
+    lifecycle: {{depends_on: [camera]}}
+  logger:
+    subscriptions: {{move: {{type: std_msgs/msg/String, qos: command, log: "{{message.data}}"}}}}
+"""
+NODES = ("arm", "camera", "logger")
+ALL = [*NODES, *["manager"] * 3]
+
+
+@pytest.fixture(scope="module")
+def port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def written(folder: Path, port: int, address: str = "127.0.0.1") -> Path:
+    """Return the path of the system, which is written to ``folder``."""
+    path = folder / "robot.yaml"
+    text = SYSTEM.replace("127.0.0.1", address).format(port=port)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def system(
+    port: int, shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Running]:
+    folder = tmp_path_factory.mktemp("robot")
+    with running(folder / "log.txt", str(written(folder, port))) as run:
+        run.wait_for("3 of 3 nodes active")
+        yield run
+
+
+def environment(port: int | None = None) -> dict[str, str]:
+    """Return the environment of a program of ROS, with that of a client if there is a ``port``."""
+    server = {"ROS_DISCOVERY_SERVER": f"127.0.0.1:{port}", "ROS_SUPER_CLIENT": "TRUE"}
+    return {**os.environ, **({} if port is None else server)}
+
+
+def servers(port: int) -> list[int]:
+    """Return the process ids of the servers with this port."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = entry.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if b"fast-discovery-server" in words[0] and str(port).encode() in words:
+            found.append(int(entry.parent.name))
+    return found
+
+
+# The first test, as commands wait for the killed programs of others.
+def test_commands_discover_it_without_settings(system: Running) -> None:
+    assert "/robot/sensing: running, 1 of 1 nodes active" in output_of("ps")
+    assert "data: go" in output_of("topic", "echo", "/move", "--once")
+    assert output_of("topic", "info", "/move").count("count: 1") >= 1
+
+
+def test_the_system_and_other_programs_discover_each_other(system: Running, port: int) -> None:
+    variables = f"export ROS_DISCOVERY_SERVER=127.0.0.1:{port} ROS_SUPER_CLIENT=TRUE"
+    assert f"to discover this system with other tools: {variables}\n" in system.log.read_text()
+    with (
+        observing("/move", *NODES, environment=environment(port)) as client,
+        observing("/move", environment=environment()) as other,
+    ):
+        client.wait_until_ready()
+        count, names = client.ask()
+        while count == 0:
+            count, names = client.ask()
+        assert [name for name in names if name != "observer"] == ALL
+        other.wait_until_ready()
+        assert other.ask() == (0, ["observer"])
+
+
+@pytest.mark.soak
+def test_a_killed_server_is_replaced(system: Running, port: int) -> None:
+    with observing("/move", *NODES, environment=environment(port)) as before:
+        before.wait_until_ready()
+        (pid,) = servers(port)
+        os.kill(pid, signal.SIGKILL)
+        system.wait_for("has ended by signal 9; the next one starts in 6 s")
+        count, _ = before.ask()
+        until_s = time.monotonic() + PATIENCE_S
+        while before.ask()[0] < count + 20:  # a second of messages
+            assert time.monotonic() < until_s
+        assert servers(port) == []
+        system.wait_for("is started again")
+        (successor,) = servers(port)
+        assert successor != pid
+        with observing("/move", *NODES, environment=environment(port)) as after:
+            after.wait_until_ready()
+            count, _ = after.ask()
+            while after.ask()[0] == count:
+                assert time.monotonic() < until_s
+
+
+def test_the_server_ends_with_the_system(system: Running, port: int) -> None:
+    (pid,) = servers(port)
+    ended = system.log.read_text().count("has ended")
+    code, _, log = system.stop()
+    assert code == 0, log
+    assert not Path("/proc", str(pid)).exists()
+    assert log.count("has ended") == ended  # not reported as a failure
+
+
+def test_a_system_uses_a_server_that_does_not_end_with_it(port: int, tmp_path: Path) -> None:
+    path = written(tmp_path, port)
+    assert compose("discovery-server", path, "--ready").returncode == 1
+    server = start("discovery-server", str(path))
+    try:
+        until_s = time.monotonic() + PATIENCE_S
+        while compose("discovery-server", path, "--ready").returncode:
+            assert time.monotonic() < until_s
+        running_now = servers(port)
+        assert len(running_now) == 1
+        assert "runs already\n" in compose("discovery-server", path).stderr
+        with running(tmp_path / "log.txt", str(path)) as run:
+            run.wait_for("3 of 3 nodes active")
+            code, _, log = run.stop()
+        assert code == 0
+        assert f"discovery server 127.0.0.1:{port} runs already, and is used" in log
+        assert servers(port) == running_now
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=PATIENCE_S)
+    assert server.returncode == 0
+    assert servers(port) == []
+
+
+@pytest.mark.soak
+def test_clients_discover_a_system_that_starts_after_a_killed_one(
+    port: int, shared_domain_id: int, tmp_path: Path
+) -> None:
+    path = written(tmp_path, port)
+    with observing("/move", *NODES, environment=environment(port)) as client:
+        with running(tmp_path / "killed.txt", str(path)) as killed:
+            killed.wait_for("3 of 3 nodes active")
+            client.wait_until_ready()
+            killed.process.kill()
+            killed.process.wait()
+        with running(tmp_path / "next.txt", str(path)) as run:
+            run.wait_for("starts in 6 s: the last one was lost")
+            assert servers(port) == []
+            count, _ = client.ask()  # nothing is sent before the server runs
+            run.wait_for("3 of 3 nodes active")
+            until_s = time.monotonic() + PATIENCE_S
+            while client.ask()[0] == count:
+                assert time.monotonic() < until_s
+            assert run.stop()[0] == 0
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(200)
+def test_clients_discover_a_system_that_starts_after_one_that_has_ended(
+    port: int, shared_domain_id: int, tmp_path: Path
+) -> None:
+    path = written(tmp_path, port)
+    for _ in range(12):
+        with observing("/move", *NODES, environment=environment(port)) as client:
+            for log in ("first.txt", "next.txt"):
+                count, _ = client.ask() if log == "next.txt" else (0, [])
+                with running(tmp_path / log, str(path)) as run:
+                    run.wait_for("3 of 3 nodes active")
+                    if log == "first.txt":
+                        client.wait_until_ready()
+                    until_s = time.monotonic() + PATIENCE_S
+                    while client.ask()[0] <= count:
+                        assert time.monotonic() < until_s
+                    assert run.stop()[0] == 0
+
+
+def test_a_server_of_another_computer_cannot_be_started(tmp_path: Path) -> None:
+    done = compose("run", written(tmp_path, 11811, "203.0.113.77"))
+    assert done.returncode == 1
+    assert "the discovery server cannot be started here: this computer is not 203" in done.stderr
+
+
+@pytest.mark.soak
+def test_the_doctor_starts_the_server_for_its_check(
+    port: int, shared_domain_id: int, tmp_path: Path
+) -> None:
+    assert servers(port) == []
+    done = compose("doctor", written(tmp_path, port))
+    assert done.returncode == 0, done.stdout
+    assert (
+        f"discovery server 127.0.0.1:{port} does not run yet: 'compose run' starts" in done.stdout
+    )
+    assert re.search(rf"discovered each other within .* s through .* 127.0.0.1:{port}", done.stdout)
+    assert servers(port) == []

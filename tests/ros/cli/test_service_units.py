@@ -1,0 +1,94 @@
+"""What systemd would do with the units of a system over two processes."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from tests.ros.support.commands import PATIENCE_S, compose
+
+SYSTEM = """\
+system: robot
+namespace: fleet
+processes: {ears: {nodes: [listener, spare], environment: {MODE: "a b"}}}
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}
+    lifecycle: {depends_on: [listener]}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+  spare: {on_configure: {log: ready}, lifecycle: {autostart: inactive}}
+"""
+
+
+class Service:
+    """A service: its process, and what it reports to its service manager."""
+
+    def __init__(self, unit: Path, folder: Path) -> None:
+        lines = unit.read_text().splitlines()
+        settings = [line.split("=", 1) for line in lines if "=" in line]
+        (command,) = (value for name, value in settings if name == "ExecStart")
+        variables = (shlex.split(value)[0] for name, value in settings if name == "Environment")
+        address = folder / unit.stem
+        self.messages = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.messages.bind(str(address))
+        self.messages.settimeout(PATIENCE_S)
+        environment = {**os.environ, **dict(variable.split("=", 1) for variable in variables)}
+        environment["NOTIFY_SOCKET"] = str(address)
+        self.process = subprocess.Popen(
+            shlex.split(command), env=environment, stderr=subprocess.PIPE, text=True
+        )
+
+    def wait_for(self, message: str) -> None:
+        while message not in self.messages.recv(1000).decode().splitlines():
+            pass
+
+    def stop(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        self.wait_for("STOPPING=1")
+        return self.process.wait(PATIENCE_S)
+
+
+@contextmanager
+def started(unit: Path, folder: Path) -> Iterator[Service]:
+    service = Service(unit, folder)
+    try:
+        yield service
+    finally:
+        service.process.kill()
+        service.process.communicate()
+        service.messages.close()
+
+
+def is_ready(system: str) -> bool:
+    return compose("ps", system, "--ready").returncode == 0
+
+
+def test_services_become_ready_and_stop_in_order(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(SYSTEM)
+    done = compose("export", "systemd", file, "-o", tmp_path / "units")
+    assert done.returncode == 0, done.stderr
+    with ExitStack() as stack:
+        unit = tmp_path / "units" / "robot-ears.service"
+        ears = stack.enter_context(started(unit, tmp_path))
+        ears.wait_for("READY=1")
+        assert not is_ready("/fleet/robot/ears")  # nothing has brought its nodes up
+        robot = stack.enter_context(started(tmp_path / "units" / "robot.service", tmp_path))
+        robot.wait_for("READY=1")
+        assert is_ready("/fleet/robot")
+        assert is_ready("/fleet/robot/ears")  # although one of its nodes is to be inactive
+        robot.wait_for("WATCHDOG=1")
+        assert robot.stop() == 0
+        until_s = time.monotonic() + PATIENCE_S
+        while is_ready("/fleet/robot/ears"):
+            assert time.monotonic() < until_s
+        assert ears.stop() == 0

@@ -1,0 +1,141 @@
+"""Callbacks of hosted classes: they block, await, run in threads and in callback groups."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+
+from tests.ros.support.in_process import Peer, end_limit_s, running, wait_until
+
+CLASSES = "tests.ros.support.callback_classes"
+OTHERS = "tests.ros.support.node_classes"
+
+
+@pytest.mark.parametrize("executor", [None, "events", "multi_threaded"])
+def test_a_callback_may_block_until_another_node_responds(
+    tmp_path: Path, executor: str | None
+) -> None:
+    kind = "" if executor is None else f"executors: {{own: {{kind: {executor}}}}}"
+    chosen = "" if executor is None else "executor: own"
+    text = f"""
+    system: blocking
+    {kind}
+    nodes:
+      listener: {{class: "{OTHERS}:Listener"}}
+      caller:
+        class: {CLASSES}:BlockingCaller
+        {chosen}
+    """
+    with running(text, tmp_path) as system:
+        caller = system.node("caller").instance
+        wait_until(lambda: len(caller.responses) >= 6)
+        assert all(response.success for response in caller.responses)
+        assert caller.overlaps == 0
+        counted = system.summary("/caller")
+    assert counted.errors == 0
+
+
+def test_a_callback_that_waits_for_a_response_is_released_when_its_node_is_deactivated(
+    tmp_path: Path,
+) -> None:
+    text = f'system: alone\nnodes: {{caller: {{class: "{CLASSES}:BlockingCaller"}}}}'
+    with running(text, tmp_path) as system:
+        caller = system.node("caller").instance
+        wait_until(lambda: caller.busy)
+        system.change("caller", "deactivate")
+        wait_until(lambda: not system.node("caller").loop.busy_threads())
+        system.change("caller", "activate")
+        wait_until(lambda: caller.busy)
+        began_s = time.monotonic()
+        outcome = system.stop()
+        assert time.monotonic() - began_s < end_limit_s()
+    assert outcome.nodes[0].errors == 0
+    assert outcome.exit_code == 0
+
+
+def test_coroutines_await_clients(tmp_path: Path, peer: Peer) -> None:
+    text = f"""
+    system: awaiting
+    nodes:
+      listener: {{class: "{OTHERS}:Listener"}}
+      caller: {{class: "{CLASSES}:AsyncCaller"}}
+    """
+    with running(text, tmp_path):
+        response = peer.call(Trigger, "/relay")
+    assert (response.success, response.message) == (True, "0")
+
+
+def test_callback_groups_exclude_each_other_on_several_threads(tmp_path: Path, peer: Peer) -> None:
+    text = f"""
+    system: groups
+    executors: {{pool: {{kind: multi_threaded, threads: 3}}}}
+    nodes:
+      groups: {{class: "{CLASSES}:Groups", executor: pool}}
+    """
+    with running(text, tmp_path) as system:
+        peer.publisher(String, "/wait").publish(String())
+        peer.publisher(String, "/finish").publish(String())
+        wait_until(lambda: system.node("groups").instance.together == 1)
+
+
+@pytest.mark.parametrize("name", ["Spinner", "Poller"])
+def test_a_thread_of_the_class_that_follows_rclpy_ends_with_the_instance(
+    tmp_path: Path, name: str
+) -> None:
+    text = f'system: spins\nnodes: {{spinner: {{class: "{OTHERS}:{name}"}}}}'
+    with running(text, tmp_path) as system:
+        spinner = system.node("spinner").instance
+        wait_until(lambda: system.node("spinner").statistics.sent >= 3)
+        assert spinner.thread.is_alive()
+        system.change("spinner", "deactivate", "cleanup")
+        wait_until(lambda: not spinner.thread.is_alive())
+        counted = system.summary("/spinner")
+    assert counted.errors == 0
+
+
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
+def test_a_callback_group_of_the_class_decides_when_its_callbacks_run(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    text = f"""
+    system: throttled
+    executors: {{own: {{kind: {kind}}}}}
+    nodes: {{throttled: {{class: "{CLASSES}:Throttled", executor: own}}}}
+    """
+    with running(text, tmp_path) as system:
+        node = system.node("throttled").instance
+        numbers = peer.publisher(Int64, "/numbers")
+        for number in range(5):
+            numbers.publish(Int64(data=number))
+        wait_until(lambda: node.group.tokens == 0 and len(node.group.ended) == 3)
+        ticks = node.ticks
+        wait_until(lambda: node.ticks > ticks + 10)  # another group
+        expected = [f"number {number}" for number in range(5)]
+        assert node.calls == expected[:3]
+        node.group.tokens = 3
+        assert not peer.call(Trigger, "/count").success
+        wait_until(lambda: len(node.group.ended) == 6)
+        assert sorted(node.calls) == ["count", *expected]
+        assert [item for item in node.calls if item != "count"] == expected
+        assert set(node.group.ended) == {node.numbers, node.service}
+        counted = system.summary("/throttled")
+    assert counted.errors == 0
+
+
+def test_a_callback_that_awaits_keeps_its_callback_group(tmp_path: Path) -> None:
+    text = f"""
+    system: awaiting
+    nodes:
+      listener: {{class: "{OTHERS}:Listener"}}
+      timers: {{class: "{CLASSES}:AsyncTimers"}}
+    """
+    with running(text, tmp_path) as system:
+        timers = system.node("timers").instance
+        wait_until(lambda: timers.rounds >= 6)
+        assert timers.overlaps == 0
+        system.change("timers", "deactivate", "activate")
+        wait_until(lambda: timers.rounds >= 10)

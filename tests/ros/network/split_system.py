@@ -1,0 +1,155 @@
+"""A system whose processes run on other computers of a network, and the commands that start it."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.ros.network.namespaces import Computer
+from tests.ros.network.ssh_servers import SshKeys
+
+COMPOSE = (sys.executable, "-P", "-m", "composer")
+PATIENCE_S = 40.0
+#: On each computer, below what is private to it.
+WORKSPACE = "/run/robot"
+_DETECTOR = """
+from composer.behavior import Behavior
+
+class Detector(Behavior):
+    def on_activate(self):
+        self.log.info("looking")
+
+    def on_image(self, message):
+        found = self.publishers.found
+        found.publish(found.message_type(data=f"found {message.data}"))
+"""
+_SYSTEM = """
+system: robot
+lifecycle: {on_failure: restart, restart: {backoff_ms: 300}}
+hosts:
+HOSTS
+processes:
+  sensing: {nodes: [camera], host: robot}
+  acting: {nodes: [detector], host: ACTING}
+nodes:
+  camera:
+    publishers: {image: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 200, publish: {image: {data: picture}}}}
+  detector:
+    behavior: detector:Detector
+    subscriptions: {image: {type: std_msgs/msg/String, qos: command}}
+    publishers: {found: {type: std_msgs/msg/String, qos: command}}
+    lifecycle: {depends_on: [camera]}
+  logger:
+    subscriptions: {found: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+    lifecycle: {depends_on: [detector]}
+"""
+
+
+class SplitSystem:
+    """A project on the first computer, whose processes belong to the others."""
+
+    def __init__(self, folder: Path, computers: Sequence[Computer], keys: SshKeys) -> None:
+        self.console, *others = computers
+        self.others = others
+        lines = [
+            f"  {item.name}: {{address: {item.address}, user: root, workspace: {WORKSPACE},"
+            f" python: {sys.executable}, identity_file: {keys.login_key},"
+            f" known_hosts: {keys.known_hosts}}}"
+            for item in others
+        ]
+        text = _SYSTEM.replace("HOSTS", "\n".join(lines)).replace("ACTING", others[-1].name)
+        folder.mkdir()
+        self.path = folder / "robot.yaml"
+        self.path.write_text(text, encoding="utf-8")
+        folder.joinpath("detector.py").write_text(_DETECTOR, encoding="utf-8")
+        folder.joinpath("composer.yaml").touch()
+
+    def compose(self, *words: str) -> subprocess.CompletedProcess[str]:
+        """Run a command on the first computer."""
+        return self.console.run(*COMPOSE, *words, timeout_s=PATIENCE_S)
+
+    def up(self, *options: str) -> UpOnHosts:
+        """Start ``compose up --hosts`` there."""
+        return UpOnHosts(self, *options)
+
+    def members(self) -> list[tuple[str, int]]:
+        """Return the processes of the system on the other computers, but not their guards."""
+        return [
+            (item.name, pid)
+            for item in self.others
+            for pid, words in item.processes("--process").items()
+            if "guard" not in words
+        ]
+
+    def all_processes(self) -> list[str]:
+        """Return all processes of the composer on all computers."""
+        found = (item.processes("-m composer").values() for item in (self.console, *self.others))
+        return [words for each in found for words in each if not words.startswith("nsenter")]
+
+
+class UpOnHosts:
+    """A running ``compose up --hosts``, with its output."""
+
+    def __init__(self, system: SplitSystem, *options: str) -> None:
+        self._system = system
+        self.lines: list[str] = []
+        command = (*COMPOSE, "up", str(system.path), "--hosts", *options)
+        self.process = system.console.start(
+            *command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> UpOnHosts:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        if self.process.poll() is None:
+            self.signal(signal.SIGKILL)
+            self.process.wait(PATIENCE_S)
+        if error is not None:
+            error.add_note("compose up printed:\n" + "\n".join(self.lines))
+
+    def wait_for(self, part: str, after: int = 0) -> int:
+        """Wait for a line that contains ``part`` after so many lines; return how many there are."""
+        end_s = time.monotonic() + PATIENCE_S
+        while True:
+            has_ended = self.process.poll() is not None and not self._reader.is_alive()
+            if any(part in line for line in self.lines[after:]):
+                return len(self.lines)
+            assert not has_ended, f"ended without '{part}'"
+            assert time.monotonic() < end_s, f"no '{part}'"
+            time.sleep(0.05)  # poll: lines are few
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to the command, not to its children."""
+        found = self._system.console.processes("--hosts")
+        (pid,) = (pid for pid, words in found.items() if "nsenter" not in words)
+        self._system.console.check("kill", f"-{number.value}", str(pid))
+
+    def stop(self) -> int:
+        """End it as Ctrl-C does; return the exit code."""
+        self.signal(signal.SIGINT)
+        code = self.process.wait(PATIENCE_S)
+        self._reader.join(PATIENCE_S)
+        return code
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+
+def wait_until(condition: object, what: str) -> None:
+    """Wait until ``condition()`` is true."""
+    assert callable(condition)
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, what
+        time.sleep(0.1)  # poll: each look is a process

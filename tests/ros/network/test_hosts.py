@@ -1,0 +1,197 @@
+"""Systems over several computers, each with its own network and ssh server."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.ros.network.namespaces import PERFECT, Quality, network
+from tests.ros.network.split_system import WORKSPACE, SplitSystem, wait_until
+from tests.ros.network.ssh_servers import SshKeys
+
+pytest.importorskip("asyncssh", reason="asyncssh is not installed")
+
+
+@contextmanager
+def split(
+    folder: Path, *others: str, quality: Quality = PERFECT, trusted: bool = True
+) -> Iterator[tuple[SplitSystem, SshKeys]]:
+    """Make computers, with ssh servers on all but the first one, and a project on that."""
+    with network(["base", *others], quality) as computers:
+        keys_folder = folder / "keys"
+        keys_folder.mkdir()
+        keys = SshKeys(keys_folder)
+        for computer in computers[1:]:
+            keys.serve(computer)
+        if trusted:
+            keys.trust(*computers[1:])
+        system = SplitSystem(folder / "project", computers, keys)
+        if trusted:
+            done = system.compose("sync", str(system.path))
+            assert done.returncode == 0, done.stderr
+        yield system, keys
+
+
+@pytest.mark.timeout(120)
+def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
+    with split(tmp_path, "robot", trusted=False) as (system, keys):
+        (robot,) = system.others
+        path = str(system.path)
+
+        refused = system.compose("up", path, "--hosts")
+        assert refused.returncode == 1
+        assert "robot (root@10.77.0.2): its host key is unknown" in refused.stderr
+        assert "compare the fingerprint: ssh -o" in refused.stderr
+        keys.trust(robot)
+
+        robot.check("mkdir", WORKSPACE)
+        robot.check("touch", f"{WORKSPACE}/precious")
+        refused = system.compose("sync", path, "--delete")
+        assert refused.returncode == 1
+        assert "holds other files, which were not copied by 'compose sync'" in refused.stderr
+        assert robot.check("ls", "-A", WORKSPACE) == "precious\n"
+        robot.check("rm", f"{WORKSPACE}/precious")
+
+        system.path.with_name("build").mkdir()
+        system.path.with_name("build").joinpath("made").touch()
+        listed = system.compose("sync", path, "--dry-run")
+        assert "robot: copy detector.py\n" in listed.stdout
+        assert "robot: 3 files would be copied\n" in listed.stdout
+        assert robot.check("ls", "-A", WORKSPACE) == ""
+        assert system.compose("sync", path).stdout == "robot: 3 files copied\n"
+
+        robot.check("touch", f"{WORKSPACE}/old.py", f"{WORKSPACE}/.venv")
+        robot.check("sh", "-c", f"echo >> {WORKSPACE}/detector.py")
+        refused = system.compose("up", path, "--hosts")
+        assert refused.returncode == 1
+        assert "robot (root@10.77.0.2): detector.py differs" in refused.stderr
+        assert "copy the project with 'compose sync'" in refused.stderr
+        done = system.compose("sync", path, "--delete")
+        assert done.stdout == "robot: 1 file copied, 1 file deleted\n"
+        names = ".compose-sync\n.venv\ncomposer.yaml\ndetector.py\nrobot.yaml\n"
+        assert robot.check("ls", "-A", WORKSPACE) == names
+
+        with system.up() as up:
+            up.wait_for("3 of 3 nodes active")
+            up.wait_for("] found picture")
+            assert len(system.members()) == 2
+            assert up.stop() == 0
+            assert "/camera finalized" in "\n".join(up.lines)
+        for nodes in (("detector",), ()):  # it has run on the other computer
+            logged = system.compose("logs", *nodes).stdout
+            assert logged.count("[detector] looking") == 1
+        assert "/camera finalized" in logged
+        assert not system.all_processes()
+
+        options = ("--namespace", "/lab", "--log-level", "warn")
+        with system.up(*options) as up:  # whatever ends it, nothing is left
+            up.wait_for("/lab/camera active")
+            up.wait_for("3 of 3 nodes active")
+            commands = [words for words in system.all_processes() if "--process" in words]
+            assert all(" ".join(options) in words for words in commands)
+            up.signal(signal.SIGKILL)
+            wait_until(lambda: not system.all_processes(), "processes are left")
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(120)
+def test_the_doctor_checks_discovery_from_each_computer(tmp_path: Path) -> None:
+    with split(tmp_path, "robot") as (system, _):
+        server = f"discovery: {{kind: server, address: {system.console.address}, start: true}}\n"
+        system.path.write_text(system.path.read_text() + server)
+        assert system.compose("sync", str(system.path)).returncode == 0
+        done = system.compose("doctor", str(system.path), "--hosts")
+        assert done.returncode == 0, done.stdout + done.stderr
+        through = f"through the discovery server {system.console.address}:11811"
+        local, remote = (line for line in done.stdout.splitlines() if through in line)
+        assert "robot: two participants discovered each other" in remote
+        assert "robot: " not in local
+
+        system.path.write_text(system.path.read_text().replace("start: true", "start: false"))
+        assert system.compose("sync", str(system.path)).returncode == 0
+        done = system.compose("doctor", str(system.path), "--hosts")
+        assert done.returncode == 1
+        assert "robot: discovery server 10.77.0.1:11811 does not run: nothing" in done.stdout
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("others", [("robot",), ("robot", "arm")])
+def test_a_cut_of_five_seconds_restarts_nothing(tmp_path: Path, others: tuple[str, ...]) -> None:
+    with split(tmp_path, *others) as (system, _), system.up() as up:
+        up.wait_for("] found picture")
+        members = system.members()
+        system.others[0].cut()
+        cut_until_s = time.monotonic() + 5.0
+        while time.monotonic() < cut_until_s:
+            time.sleep(0.1)  # the length of the cut is what is tested
+        system.others[0].join()
+        up.wait_for("] found picture", len(up.lines) + 1)
+        wait_until(lambda: states(system) == {"active"}, "the states do not converge")
+        assert system.members() == members
+        assert "connection lost" not in "\n".join(up.lines)
+        assert up.stop() == 0
+        assert not system.all_processes()
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+def test_a_process_and_a_host_that_are_gone_and_return(tmp_path: Path) -> None:
+    with split(tmp_path, "robot", "arm") as (system, keys), system.up() as up:
+        robot, arm = system.others
+        up.wait_for("] found picture")
+        seen = len(up.lines)
+        (killed,) = (pid for name, pid in system.members() if name == arm.name)
+        arm.check("kill", "-KILL", str(killed))
+        up.wait_for("acting@arm | ended with exit code 137; starting again in 1 s", seen)
+        seen = up.wait_for("/logger active", seen)
+        on_arm = [found for found in system.members() if found[0] == arm.name]
+        robot.cut()
+        robot.kill_all()
+        seen = up.wait_for("/detector inactive", seen)  # the dependents are paused
+        keys.serve(robot)
+        robot.join()
+        up.wait_for("robot: connected again")
+        up.wait_for("] found picture", seen)
+        wait_until(lambda: states(system) == {"active"}, "the states do not converge")
+        assert [found for found in system.members() if found[0] == arm.name] == on_arm
+        assert len(system.members()) == 2
+        assert up.stop() == 0
+        assert not system.all_processes()
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+def test_slow_links_that_lose_packets(tmp_path: Path) -> None:
+    quality = Quality(delay_ms=50.0, loss_percent=1.0)
+    with split(tmp_path, "robot", "arm", quality=quality) as (system, _), system.up() as up:
+        seen = up.wait_for("3 of 3 nodes active")
+        for _ in range(20):
+            seen = up.wait_for("] found picture", seen)
+        assert len(system.members()) == 2
+        assert up.stop() == 0
+        assert not system.all_processes()
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+def test_processes_end_when_the_link_stays_cut(tmp_path: Path) -> None:
+    with split(tmp_path, "robot") as (system, _), system.up() as up:
+        up.wait_for("3 of 3 nodes active")
+        system.others[0].cut()
+        cut_s = time.monotonic()
+        wait_until(lambda: not system.members(), "processes are left")
+        assert time.monotonic() - cut_s > 25.0
+        code = up.stop()
+        assert code in (0, 1)
+
+
+def states(system: SplitSystem) -> set[str]:
+    """Return the states of all nodes, as a command on the first computer sees them."""
+    found = system.compose("ps", "--json")
+    return {word for word in ("active", "inactive", "unconfigured") if f'"{word}"' in found.stdout}

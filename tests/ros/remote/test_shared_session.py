@@ -1,0 +1,89 @@
+"""A session of several threads: what it notices of the graph, and its subscriptions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import pytest
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+
+from composer.remote.shared_session import SharedSession
+from tests.ros.support.in_process import Peer, wait_until
+
+QOS = QoSProfile(depth=10)
+TEXTS = ["one", "two", "three"]
+
+
+@pytest.fixture
+def session(peer: Peer) -> Iterator[SharedSession]:
+    with SharedSession() as session:
+        name = (peer.node.get_name(), "/")
+        wait_until(lambda: name in session.graph.nodes(), "the peer is discovered")
+        yield session
+
+
+class Observer:
+    """Queries a topic only after changes of the graph, so that it depends on each of them."""
+
+    def __init__(self, session: SharedSession) -> None:
+        self._session = session
+        self._number = 0
+        self._count = 0
+
+    def sees(self, count: int) -> bool:
+        """Return whether the topic has this number of subscriptions."""
+        number = self._session.changes.number()
+        if number != self._number:
+            self._number = number
+            self._count = len(self._session.graph.topic("/text", ()).subscriptions)
+        return self._count == count
+
+
+def test_each_change_of_the_graph_is_noticed(session: SharedSession, peer: Peer) -> None:
+    """Also one that changes no name: another endpoint of a topic that the node has already."""
+    observer = Observer(session)
+    node = peer.node
+    for _ in range(10):
+        for count in (1, 2):
+            node.create_subscription(String, "/text", print, QOS)
+            wait_until(partial(observer.sees, count), f"{count} subscriptions")
+        for count in (1, 0):
+            node.destroy_subscription(next(node.subscriptions))
+            wait_until(partial(observer.sees, count), f"{count} subscriptions")
+
+
+def test_a_subscription_gets_messages_in_order_until_it_ends(
+    session: SharedSession, peer: Peer
+) -> None:
+    publisher = peer.node.create_publisher(String, "/text", QOS)
+    received: list[str] = []
+    subscription = session.subscribe(
+        String, "/text", lambda message: received.append(message.data), QOS
+    )
+    wait_until(lambda: publisher.get_subscription_count() == 1, "the subscription")
+    for text in TEXTS:
+        publisher.publish(String(data=text))
+    wait_until(lambda: len(received) == len(TEXTS), "the messages")
+    session.unsubscribe(subscription)
+    wait_until(lambda: publisher.get_subscription_count() == 0, "the end of the subscription")
+    assert received == TEXTS
+
+
+def test_a_callback_that_raises_is_logged_and_ends_nothing(
+    session: SharedSession, peer: Peer, caplog: pytest.LogCaptureFixture
+) -> None:
+    publisher = peer.node.create_publisher(String, "/text", QOS)
+    received: list[str] = []
+
+    def on_message(message: String) -> None:
+        received.append(message.data)
+        raise ValueError("not this one")
+
+    session.subscribe(String, "/text", on_message, QOS)
+    wait_until(lambda: publisher.get_subscription_count() == 1, "the subscription")
+    for text in TEXTS:
+        publisher.publish(String(data=text))
+    wait_until(lambda: len(received) == len(TEXTS), "the messages")
+    wait_until(lambda: caplog.text.count("ValueError: not this one") == len(TEXTS), "the log")

@@ -1,0 +1,314 @@
+"""The pipeline over three processes: the same graph and behavior, and every process may die."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.qos import QoSPresetProfiles
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from composer.remote.systems.local_queries import local_report
+from composer.runtime.process.instance_lock import local_systems
+from tests.ros.support.commands import COMPOSE, compose, output_of
+from tests.ros.support.in_process import wait_until
+from tests.ros.support.pipeline import (
+    NODES,
+    check_a_deactivated_planner,
+    check_the_drive,
+    check_the_navigation,
+    check_the_planner,
+)
+from tests.ros.support.system_process import REPOSITORY, ExternalNode, RunningSystem
+
+PROCESSES = """
+processes:
+  sensing: {nodes: [sensor_simulator]}
+  planning: {nodes: [planner]}
+lifecycle: {on_failure: restart, restart: {backoff_ms: 100, max_attempts: 3, window_ms: 1000}}
+"""
+CONTROLLER = "{type: motor_controller, "
+#: The robot waits for goals.
+WAITING = "{type: motor_controller, parameters: {waypoints: []}, "
+ROUNDS = 50
+
+Graph = frozenset[tuple[str, ...]]
+
+
+def split_file(folder: Path) -> Path:
+    path = folder / "pipeline.yaml"
+    text = (REPOSITORY / "systems" / "pipeline.yaml").read_text(encoding="utf-8")
+    assert CONTROLLER in text
+    path.write_text(text.replace(CONTROLLER, WAITING) + PROCESSES, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return split_file(tmp_path_factory.mktemp("split"))
+
+
+@pytest.fixture(scope="module")
+def one_process(external_context: object, shared_domain_id: int) -> Graph:
+    """What the pipeline in one process adds to the ROS graph."""
+    observer = ExternalNode(external_context)  # type: ignore[arg-type]
+    with RunningSystem("systems/pipeline.yaml") as system:
+        system.wait_for("3 of 3 nodes active")
+        graph = stable_graph(observer)
+    observer.spin_until(lambda: not graph_of(observer.node))
+    observer.close()
+    return graph
+
+
+@pytest.fixture(scope="module")
+def split(path: Path, one_process: Graph, shared_domain_id: int) -> Iterator[RunningSystem]:
+    with RunningSystem(str(path)) as system:
+        system.wait_for("3 of 3 nodes active")
+        yield system
+        assert system.stop()[0] == 0
+    wait_until(lambda: not processes_of(path), "the end of all processes")
+
+
+def graph_of(node: Node) -> Graph:
+    """Return the endpoints of the pipeline's nodes: kind, node, name, type, QoS."""
+    found: set[tuple[str, ...]] = set()
+    for topic, _ in node.get_topic_names_and_types():
+        for endpoint in node.get_publishers_info_by_topic(topic):
+            found.add(("publisher", *_endpoint(topic, endpoint)))
+        for endpoint in node.get_subscriptions_info_by_topic(topic):
+            found.add(("subscription", *_endpoint(topic, endpoint)))
+    for full_name in NODES:
+        namespace, _, name = full_name.rpartition("/")
+        with suppress(NodeNameNonExistentError):
+            for service, types in node.get_service_names_and_types_by_node(name, namespace):
+                found.add(("service", full_name, service, *types))
+            for service, types in node.get_client_names_and_types_by_node(name, namespace):
+                found.add(("client", full_name, service, *types))
+    return frozenset(entry for entry in found if entry[1] in NODES)
+
+
+def _endpoint(topic: str, endpoint: TopicEndpointInfo) -> tuple[str, ...]:
+    qos = endpoint.qos_profile
+    name = f"{endpoint.node_namespace}/{endpoint.node_name}"
+    policies = (qos.reliability, qos.durability, qos.deadline, qos.lifespan, qos.liveliness)
+    return (name, topic, endpoint.topic_type, *map(str, policies))
+
+
+def stable_graph(observer: ExternalNode) -> Graph:
+    """Return the graph once it has stopped to change."""
+    seen: list[Graph] = []
+
+    def is_stable() -> bool:
+        seen.append(graph_of(observer.node))
+        return len(seen) > 10 and len(set(seen[-10:])) == 1 and bool(seen[-1])
+
+    observer.spin_until(is_stable)
+    return seen[-1]
+
+
+def processes_of(path: Path) -> list[int]:
+    """Return the processes that run a part of the system in a file."""
+    found: list[int] = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            words = (process / "cmdline").read_bytes().split(b"\0")
+            if str(path).encode() in words and b"--process" in words:
+                found.append(int(process.name))
+    return found
+
+
+def is_up(path: Path) -> bool:
+    """Return whether every node is active, and each process runs once."""
+    report = local_report("/pipeline", 1.0)
+    pids = local_systems()
+    return (
+        report is not None
+        and report.activity == "running"
+        and all(node.state == node.desired == "active" for node in report.nodes)
+        and pids.keys() == {"/pipeline", "/pipeline/sensing", "/pipeline/planning"}
+        and str(os.getpid()) not in pids.values()
+        and len(processes_of(path)) == 2
+    )
+
+
+def test_the_ros_graph_is_that_of_one_process(
+    split: RunningSystem, one_process: Graph, external: ExternalNode
+) -> None:
+    external.spin_until(lambda: graph_of(external.node) >= one_process)
+    assert stable_graph(external) == one_process
+    for full_name in NODES:
+        assert names_of(external).count(full_name) == 1
+
+
+def names_of(external: ExternalNode) -> list[str]:
+    found = external.node.get_node_names_and_namespaces()
+    return [f"{namespace}/{name}" for name, namespace in found]
+
+
+def test_it_behaves_as_in_one_process(split: RunningSystem, external: ExternalNode) -> None:
+    check_the_navigation(external)
+    check_the_planner(external)
+    check_a_deactivated_planner(external)
+    check_a_drive(external)
+
+
+def check_a_drive(external: ExternalNode) -> None:
+    odometry = external.listen(Odometry, "/sensor_data", QoSPresetProfiles.SENSOR_DATA.value)
+    external.spin_until(lambda: bool(odometry))
+    start = odometry[-1].pose.pose.position
+    commands = external.listen(Twist, "/motor_commands")
+    external.spin_until(lambda: bool(commands))
+    odometry.clear()
+    commands.clear()
+    waypoints = f"[{start.x + 2.0}, {start.y}]"
+    assert compose("param", "set", "motor_controller", "waypoints", waypoints).returncode == 0
+    external.spin_until(
+        lambda: bool(odometry) and odometry[-1].pose.pose.position.x > start.x + 1.9
+    )
+    assert compose("param", "set", "motor_controller", "waypoints", "[]").returncode == 0
+    check_the_drive(commands, odometry, line_m=start.y)
+
+
+def check_the_drawn_processes() -> None:
+    names = ("/pipeline/sensing", "/pipeline/planning", "/pipeline")
+    owners = dict(zip(NODES, names, strict=True)) | {f"{name}/manager": name for name in names}
+    found: dict[str, Any] = {}
+
+    def is_whole() -> bool:  # a command that has just started may not know all nodes yet
+        drawn = output_of("graph", "--live", "--view", "deployment", "-f", "json", "--measure", "0")
+        found.update(json.loads(drawn))
+        vertices = {each["key"].removeprefix("node:"): each for each in found["vertices"]}
+        return owners.keys() <= vertices.keys() and all(
+            vertices[node]["label"] == [node, "active"] for node in NODES
+        )
+
+    wait_until(is_whole, "all nodes in the picture")
+    clusters = {each["key"].removeprefix("node:"): each["cluster"] for each in found["vertices"]}
+    assert {node: clusters[node] for node in owners} == {
+        node: f"process:{name}" for node, name in owners.items()
+    }
+    pids = {f"process:{name}": str(pid) for name, pid in local_systems().items()}
+    labels = {frame["key"]: frame["label"] for frame in found["clusters"]}
+    assert all(labels[key].endswith(f": process {pid}") for key, pid in pids.items())
+    assert f"host:{socket.gethostname()}" in labels
+
+
+def test_commands_for_the_system_include_all_processes(split: RunningSystem, path: Path) -> None:
+    for command, state in (("pause", "inactive"), ("resume", "active"), ("reset", "unconfigured")):
+        assert compose(command, "pipeline").returncode == 0
+        assert states_of_all() == {state}
+    assert compose("up", "pipeline").returncode == 0
+    callbacks = json.loads(output_of("top", "pipeline", "--json", "--once"))["callbacks"]
+    assert {callback["node"] for callback in callbacks} == set(NODES)
+    rates = {callback["name"]: callback["calls_hz"] for callback in callbacks}
+    assert rates["step"] > 5.0  # of another process
+    (listed,) = (
+        system["nodes"]
+        for system in json.loads(output_of("ps", "--json"))["systems"]
+        if system["name"] == "/pipeline"
+    )
+    assert all(node["callbacks"] for node in listed)
+    listed = json.loads(output_of("ps", "pipeline", "--json"))["systems"][0]["nodes"]
+    assert {node["node"]: node["process"] for node in listed} == dict(
+        zip(NODES, ("sensing", "planning", ""), strict=True)
+    )
+    assert all(node["callbacks"] for node in listed)
+    check_the_drawn_processes()
+    assert compose("diff", path).stderr == "pipeline: runs as declared\n"
+    assert "/planning/planner active" in output_of("logs", "--system", "pipeline", "planner")
+    assert "subgraph" in output_of("graph", path, "--view", "deployment", "--format", "mermaid")
+    for command in (("restart", "planner"), ("up", "pipeline")):
+        check_that_a_node_comes_back(path, command)
+
+
+def check_that_a_node_comes_back(path: Path, command: Sequence[str]) -> None:
+    """Shut a node of another process down by hand, and let a command bring it up again."""
+    pids = local_systems()
+    shut_down = ("lifecycle", "set", "planner", "--to", "finalized")
+    wait_until(lambda: compose(*shut_down).returncode == 0, "a command that discovers the node")
+    wait_until(lambda: "finalized" in states_of_all(), "the report of its state")
+    run = compose(*command)
+    assert run.returncode == 0, run.stderr
+    wait_until(lambda: is_up(path), "all nodes")
+    assert local_systems() == pids
+
+
+def states_of_all() -> set[str]:
+    report = local_report("/pipeline", 5.0)
+    assert report is not None
+    return {node.state for node in report.nodes}
+
+
+def test_killed_processes_are_replaced(split: RunningSystem, path: Path) -> None:
+    for process in ("sensing", "planning"):
+        killed = int(local_systems()[f"/pipeline/{process}"])
+        os.kill(killed, signal.SIGKILL)
+        wait_until(lambda pid=killed: pid not in processes_of(path), "the end")
+        wait_until(lambda: is_up(path), "all nodes")
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("is_alone", [False, True])
+def test_any_process_is_killed_fifty_times(
+    is_alone: bool, tmp_path: Path, external: ExternalNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Recovery by policy; no process is left, and none runs twice.
+
+    A service manager runs each process if it ``is_alone``. Otherwise, the coordinating one starts
+    the others.
+    """
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # as in COMPOSE
+    path = split_file(tmp_path)
+    options = {name: ("--process", name) for name in ("sensing", "planning")} if is_alone else {}
+    options[""] = ("--await-processes",) if is_alone else ()
+    chance = random.Random(22)
+    with ExitStack() as stack:
+
+        def start(name: str) -> RunningSystem:
+            run = RunningSystem(str(path), *options[name], program=COMPOSE)
+            return stack.enter_context(run)
+
+        runs = {name: start(name) for name in options}
+        for round_ in range(ROUNDS):
+            wait_until(lambda: is_up(path), f"all nodes in round {round_}")
+            until_s = time.monotonic() + chance.uniform(0.0, 1.0)
+            external.spin_until(lambda end_s=until_s: time.monotonic() > end_s)
+            name = chance.choice(("", "sensing", "planning"))
+            if name in runs:
+                runs[name].process.kill()
+                runs[name].process.wait()
+                runs[name] = start(name)
+            else:
+                os.kill(int(local_systems()[f"/pipeline/{name}"]), signal.SIGKILL)
+        wait_until(lambda: is_up(path), "all nodes")
+        # Killed processes remain in the ROS graph for 20 s.
+        external.spin_until(lambda: sorted(set(NODES) & set(names_of(external))) == sorted(NODES))
+        external.spin_until(lambda: all(names_of(external).count(n) == 1 for n in NODES), 60.0)
+        for name in sorted(runs):  # the coordinating one first
+            assert runs[name].stop()[0] == 0
+    wait_until(lambda: not processes_of(path), "the end of all processes")
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(600)
+def test_every_example_behaves_as_in_one_process() -> None:
+    plugin = ("-p", "tests.ros.support.split_examples")
+    folder = Path(__file__).parent
+    command = (sys.executable, "-m", "pytest", "-q", *plugin, folder, "--ignore", __file__)
+    tests = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert tests.returncode == 0, tests.stdout
