@@ -17,8 +17,10 @@ from benchmarks import (
     large_systems,
     live_commands,
     others,
+    page,
     pipeline,
     plot,
+    several_processes,
     soak,
     start_up,
     systems,
@@ -47,6 +49,11 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
         others.measure,
     ),
     "dashboard": ("cost of the dashboard for a running system", dashboard.measure),
+    "processes": ("systems split over several processes", several_processes.measure),
+    "page": (
+        "the page of the dashboard with a hundred nodes, in a headless Chromium",
+        page.measure,
+    ),
     "soak": ("memory usage under a long load", soak.measure),
     "tracing": ("cost of recording callback timings", systems.tracing),
 }

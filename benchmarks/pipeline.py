@@ -78,7 +78,7 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
         process.send_signal(signal.SIGINT)
         lived_s = time.perf_counter() - up_s
         process.wait(_TIMEOUT_S)
-        text = _read(output)
+        text = read(output)
     sent_hz = sum(int(count) for count in side.sent.findall(text)) / lived_s
     if "driving to" not in text or sent_hz < _ENOUGH * EXPECTED_HZ:
         raise ProgramFailed(f"{side.command}: {sent_hz:.0f} messages/s, {EXPECTED_HZ:g} expected")
@@ -87,11 +87,11 @@ def cpu_ms_per_s(side: Side, seconds: float) -> float:
 
 @contextmanager
 def running(
-    side: Side, variables: Mapping[str, str]
+    side: Side, variables: Mapping[str, str], timeout_s: float = _TIMEOUT_S
 ) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
     """Context manager: run a program; the block is entered once the program is up.
 
-    ``variables`` is its environment. Raises ProgramFailed if it does not come up.
+    ``variables`` is its environment. Raises ProgramFailed if it does not come up in time.
     """
     command: Sequence[str] = (sys.executable, *side.command)
     with tempfile.TemporaryFile() as output:
@@ -99,22 +99,25 @@ def running(
             command, cwd=ROOT, env=variables, stdout=output, stderr=subprocess.STDOUT
         )
         try:
-            _wait_until_up(process, output, side.ready)
+            _wait_until_up(process, output, side.ready, timeout_s)
             yield process, output
         finally:
             process.kill()
             process.wait()
 
 
-def _wait_until_up(process: subprocess.Popen[bytes], output: IO[bytes], ready: str) -> None:
-    until_s = time.monotonic() + _TIMEOUT_S
-    while ready not in _read(output):
+def _wait_until_up(
+    process: subprocess.Popen[bytes], output: IO[bytes], ready: str, timeout_s: float
+) -> None:
+    until_s = time.monotonic() + timeout_s
+    while ready not in read(output):
         if process.poll() is not None or time.monotonic() > until_s:
-            raise ProgramFailed(f"did not come up: {_read(output)[-500:]}")
+            raise ProgramFailed(f"did not come up: {read(output)[-500:]}")
         time.sleep(0.05)
 
 
-def _read(output: IO[bytes]) -> str:
+def read(output: IO[bytes]) -> str:
+    """Return the output so far."""
     # Do not seek: the process shares the file position.
     size = os.fstat(output.fileno()).st_size
     return os.pread(output.fileno(), size, 0).decode(errors="replace")

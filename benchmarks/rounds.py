@@ -40,6 +40,7 @@ class Case:
     rate_hz: float = 100.0
     message: str = "String"
     apart: bool = False  # one process per node
+    is_one_system: bool = False  # these are the processes of one system of the composer
 
     @property
     def arguments(self) -> tuple[str, ...]:
@@ -138,6 +139,8 @@ def _parts(variant: str, case: Case) -> Sequence[Sequence[str]]:
         BARE: ("bare_external" if case.apart else "bare", "none"),
     }.get(variant, ("hand_written", variant))
     command = (program, executor, *case.arguments, *more)
+    if case.is_one_system and variant == COMPOSED:
+        return [(*command, "--split")]
     if not case.apart:
         return [command]
     return [(*command, "--part", str(part)) for part in range(case.nodes)]

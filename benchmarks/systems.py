@@ -161,7 +161,7 @@ def external(*, long: bool) -> list[Row]:
     measured += rows("external process, all processors", CPU, far, cpu_us)
     images = Case("ring", 2, seconds, rounds, message="Image", apart=True)
     turns = run_rounds((COMPOSED, EVENTS), images)
-    return measured + rows("external process, Image", "us/message", turns, _interval_us)
+    return measured + rows("external process, Image", "us/message", turns, interval_us)
 
 
 def tracing(*, long: bool) -> list[Row]:
@@ -176,7 +176,7 @@ def cpu_us(result: Mapping[str, Any]) -> float | None:
     return 1e6 * result["cpu_s"] / result["delivered"] if result["delivered"] else None
 
 
-def _interval_us(result: Mapping[str, Any]) -> float | None:
+def interval_us(result: Mapping[str, Any]) -> float | None:
     """Return the time per message of the process; None if none was delivered."""
     return 1e6 * result["wall_s"] / result["delivered"] if result["delivered"] else None
 

@@ -18,7 +18,8 @@ from benchmarks.programs.task import Place, Task, places, task_from_arguments, t
 from benchmarks.programs.work import KICK_PERIOD_S, measure, print_result
 from composer.loading import load
 from composer.plan import bring_up, tear_down
-from composer.runtime.host import Host, HostOptions
+from composer.runtime.host import Host
+from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import BroughtUp, Event
 
 _KICK = {"kick": {"period_ms": KICK_PERIOD_S * 1000.0}}
@@ -30,11 +31,17 @@ def system_tree(task: Task) -> dict[str, Any]:
     """Return the content of the system file."""
     if task.shape == "pair":
         return _pair(task)
-    return {
+    tree: dict[str, Any] = {
         "system": "measured" if task.part is None else f"measured_{task.part}",
         "executors": {"chosen": {"kind": task.executor}},
         "nodes": {f"node_{place.index}": _node(task, place) for place in places(task)},
     }
+    if task.split:
+        _, *others = tree["nodes"]
+        tree["processes"] = {f"of_{name}": {"nodes": [name]} for name in others}
+        for node in tree["nodes"].values():
+            del node["executor"]
+    return tree
 
 
 def main() -> None:
@@ -56,7 +63,8 @@ def main() -> None:
         if loading.system is None or not loading.is_runnable:
             sys.exit("; ".join(str(item) for item in loading.diagnostics))
         system = loading.system
-        options = HostOptions(tracing=task.tracing)
+        member = (sys.executable, "-m", "composer", "run", str(path))
+        options = HostOptions(tracing=task.tracing, member_command=member if task.split else ())
         host = Host(system, bring_up(system), tear_down(system), options, report=on_event)
         threading.Thread(target=host.run, daemon=True).start()
         if not up.wait(120.0):

@@ -13,7 +13,8 @@ from benchmarks.programs.phases import Phases, size_from_arguments
 from benchmarks.programs.work import print_result
 from composer.loading import load
 from composer.plan import bring_up, tear_down
-from composer.runtime.host import Host, HostOptions
+from composer.runtime.host import Host
+from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import BroughtUp, Event, Stopping
 
 LEAN = dict.fromkeys(("parameters", "rosout", "type_description", "lifecycle_services"), False)

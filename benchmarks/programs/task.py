@@ -17,9 +17,10 @@ class Task:
     publishes at ``rate_hz`` and the others forward or receive the messages; in a *hop*, only the
     second node receives them; with *timer*, the first node has a timer; with *service* and
     *action*, the first node calls the second; a *pair* is a talker and a listener of ordinary rclpy
-    node classes. All other nodes are idle. ``part`` is the index of
-    the node of a ring that this process runs, if each node has a process. ``seconds`` is ignored
-    with ``until_stopped``: the task then runs until a line arrives on standard input.
+    node classes. All other nodes are idle. ``part`` is the index of the node of a ring that this
+    process runs, if each node has a process. With ``split``, the processes belong to one system,
+    and this one starts the others. ``seconds`` is ignored with ``until_stopped``: the task then
+    runs until a line arrives on standard input.
     """
 
     executor: str
@@ -31,6 +32,7 @@ class Task:
     part: int | None
     tracing: bool
     until_stopped: bool = False
+    split: bool = False
 
     @property
     def is_timed(self) -> bool:
@@ -86,5 +88,6 @@ def task_from_arguments() -> Task:
     parser.add_argument("--part", type=int)
     parser.add_argument("--no-tracing", dest="tracing", action="store_false")
     parser.add_argument("--until-stopped", action="store_true")
+    parser.add_argument("--split", action="store_true")
     given = vars(parser.parse_args())
     return Task(**{field.name: given[field.name] for field in fields(Task)})
