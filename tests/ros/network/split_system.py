@@ -111,8 +111,7 @@ class UpOnHosts:
 
     def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         if self.process.poll() is None:
-            self.signal(signal.SIGKILL)
-            self.process.wait(PATIENCE_S)
+            self.kill()
         if error is not None:
             error.add_note("compose up printed:\n" + "\n".join(self.lines))
 
@@ -132,6 +131,11 @@ class UpOnHosts:
         found = self._system.console.processes("--hosts")
         (pid,) = (pid for pid, words in found.items() if "nsenter" not in words)
         self._system.console.check("kill", f"-{number.value}", str(pid))
+
+    def kill(self) -> None:
+        """Kill the command, not its children; wait until it has ended."""
+        self.signal(signal.SIGKILL)
+        self.process.wait(PATIENCE_S)
 
     def stop(self) -> int:
         """End it as Ctrl-C does; return the exit code."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -94,7 +93,7 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
             up.wait_for("3 of 3 nodes active")
             commands = [words for words in system.all_processes() if "--process" in words]
             assert all(" ".join(options) in words for words in commands)
-            up.signal(signal.SIGKILL)
+            up.kill()
             wait_until(lambda: not system.all_processes(), "processes are left")
 
 
