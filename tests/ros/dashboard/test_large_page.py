@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.page import ALL_SHOWN, NODES
 from tests.ros.support.dashboard import Dashboard, dashboard
+from tests.ros.support.in_process import wait_until
 from tests.ros.support.pages import opened
 from tests.ros.support.system_process import RunningSystem
 from tests.unit.support.fleets import fleet_text
@@ -43,10 +44,12 @@ def test_what_is_searched_for_is_brought_near(page: Page) -> None:
     page.keyboard.press("Enter")
     node = page.locator('.world [data-key="node:/area14/act/controller_14"]')
     page.wait_for_url("**/area14/act/controller_14")
-    box = node.bounding_box()
-    assert box is not None
-    assert box["width"] > 60
-    assert box["x"] + box["width"] < 1280
+
+    def is_near() -> bool:
+        box = node.bounding_box()
+        return box is not None and box["width"] > 60 and box["x"] + box["width"] < 1280
+
+    wait_until(is_near, "the node is near")
 
 
 #: Names of nodes whose text is shown, and the least height of their letters in pixels.

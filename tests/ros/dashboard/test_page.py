@@ -138,7 +138,7 @@ def test_a_parameter_is_changed_and_refused(view: Page) -> None:
     view.keyboard.press("Enter")
     expect_text(line.locator(".outcome"), "a number is expected")
     view.keyboard.press("Escape")
-    assert line.locator("input[type=text]").input_value() == "1.5"
+    wait_until(lambda: line.locator("input[type=text]").input_value() == "1.5", "the value")
     line.locator("input[type=range]").fill("1")
     expect_text(line.locator(".outcome"), "Set")
 

@@ -169,6 +169,7 @@ def test_a_failed_call_that_is_not_awaited_is_logged(tmp_path: Path, delivery: s
     text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
     with running(text, tmp_path, asking=MODULE) as system:
         client = system.node("client")
+        wait_until(client._behavior.clients.ask._has_server, "the server, which DDS discovers")
         client.loop.run(client._behavior.ask_and_go)
         line = system.wait_for_log("did not answer")
         counted = system.summary("/client").errors

@@ -85,13 +85,13 @@ def test_a_transition_that_waits_for_a_busy_executor_is_not_stuck(tmp_path: Path
     """Each takes a part of its time limit; the last one waits longer than its limit."""
     path = tmp_path / "slow.yaml"
     nodes = "".join(f"  n{number}: {{behavior: slow:Slow}}\n" for number in range(12))
-    path.write_text(f"system: slow\nlifecycle: {{timeout_ms: 1000}}\nnodes:\n{nodes}", "utf-8")
+    path.write_text(f"system: slow\nlifecycle: {{timeout_ms: 3000}}\nnodes:\n{nodes}", "utf-8")
     slow = """
     import time
 
     class Slow:
         def on_configure(self):
-            time.sleep(0.2)  # a fifth of its limit
+            time.sleep(0.3)  # a tenth of its limit
     """
     path.with_suffix(".py").write_text(dedent(slow), encoding="utf-8")
     with RunningSystem(str(path)) as system:

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rclpy.action import ActionClient
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -41,6 +43,8 @@ MODULE = """
 from composer.behavior import Behavior
 
 class Power(Behavior):
+    is_last_received = False
+
     async def on_ask(self, request, response):
         self.log.info("asked")
         await self.clock.sleep(self.parameters.pause_s)
@@ -51,8 +55,10 @@ class Power(Behavior):
         response.success = True
         return response
 
-    def on_cleanup(self):
+    async def on_cleanup(self):
         self.publishers.voltage.publish(self.publishers.voltage.message_type(data="last"))
+        while not self.is_last_received:  # its publisher is destroyed afterwards
+            await self.clock.sleep(0.01)
 """
 
 
@@ -86,8 +92,11 @@ def test_always_on_ports_work_while_their_node_is_inactive(
         wait_until(is_the_only_one, "the messages in transit arrive, and then no more")
         assert peer.call(Trigger, "/ask").success
 
-        assert peer.change("/power", "cleanup")
-        wait_until(lambda: voltage[-1].data == "last", "a last message")
+        request = ChangeState.Request(transition=Transition(label="cleanup"))
+        cleanup = peer.client(ChangeState, "/power/change_state").call_async(request)
+        wait_until(lambda: "last" in [message.data for message in voltage], "a last message")
+        system.behavior("power").is_last_received = True
+        assert finished(cleanup).success
 
 
 def test_calls_of_always_on_ports_end_with_the_cleanup(tmp_path: Path, peer: Peer) -> None:
@@ -98,6 +107,7 @@ def test_calls_of_always_on_ports_end_with_the_cleanup(tmp_path: Path, peer: Pee
         assert peer.change("/power", "activate")
         assert peer.change("/power", "deactivate")
         assert not answer.done()
+        system.behavior("power").is_last_received = True
         assert peer.change("/power", "cleanup")
         refusal = finished(answer)
         assert not refusal.success

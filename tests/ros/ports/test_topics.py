@@ -105,8 +105,8 @@ def test_a_node_publishes_in_transitions_but_not_while_inactive(tmp_path: Path, 
         system.wait_for_listener("talkative", "output")
         assert peer.change("/talkative", "activate")
         assert peer.change("/talkative", "deactivate")
+        wait_until(lambda: len(received) == 4)  # before the publisher is destroyed
         assert peer.change("/talkative", "cleanup")
-        wait_until(lambda: len(received) == 4)
         counted = system.summary("/talkative")
     texts = [message.data for message in received]
     assert texts == ["activate", "activate", "deactivate", "deactivate"]

@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
-PATIENCE_S = 15.0
+PATIENCE_S = 60.0
 
 
 def finished(node: Node, future: Any) -> Any:

@@ -16,7 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.ros.support.forked import ForkedCommand
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 Message = dict[str, Any]
 
 

@@ -24,7 +24,7 @@ from composer.source import Located, SourceFile, Span
 from tests.ros.support.leaving import leave
 
 PEER = Path(__file__).parents[1] / "programs" / "loop_peer.py"
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 KINDS = list(ExecutorKind)
 
 
