@@ -6,7 +6,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:  # this module and its tests need no ROS
 _STUCK_AFTER_S = 1.0
 #: How long an interrupted callback may take to return.
 _INTERRUPTED_WITHIN_S = 0.4
+#: A wait in slices shows in which of them this process did not run.
+_SLICE_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +127,14 @@ class _Phase:
         """Whether a failure ends the phase."""
         return bool(self.failures) and not self.options.best_effort
 
+    def postpone(self, lost_s: float) -> None:
+        """Move all time limits: the process did not run for ``lost_s``, and no step could."""
+        self.options = replace(self.options, end_s=self.options.end_s + lost_s)
+        self.check_s += lost_s
+        for item in self.running.values():
+            item.limit_s += lost_s
+            item.end_s += lost_s
+
     def take_ready(self) -> list[tuple[Step, tuple[Step, ...]]]:
         """Remove and return the steps that can start now, each with those that it waits for.
 
@@ -181,6 +191,7 @@ class PlanExecutor:
         for steps in plan.phases:
             phase = _Phase(deque(steps), options, self._node_set.process_of)
             self._execute(phase)
+            options = phase.options  # the time limit may have moved
             failures += phase.failures
             if phase.has_failed or self._is_stopped(options):
                 break
@@ -193,9 +204,7 @@ class PlanExecutor:
                     self._start(step, after, phase)
             if not phase.running:
                 continue
-            self._main_queue.wait(
-                lambda: bool(phase.ended), phase.check_s, stoppable=phase.options.stoppable
-            )
+            wait_for_step(phase, self._main_queue)
             if self._is_stopped(phase.options):
                 break
             while phase.ended:
@@ -315,3 +324,21 @@ class PlanExecutor:
             until_s = time.monotonic() + _INTERRUPTED_WITHIN_S
             self._main_queue.wait(item.future.done, until_s, stoppable=False)
         return stack
+
+
+def wait_for_step(phase: _Phase, main_queue: MainQueue[Item]) -> None:
+    """Wait until a step has ended or has no time left, or a request to stop ends the plan.
+
+    On a busy machine, or if it is suspended, this process does not run for a while.
+    """
+    while True:
+        until_s = min(phase.check_s, time.monotonic() + _SLICE_S)
+        ended = main_queue.wait(
+            lambda: bool(phase.ended), until_s, stoppable=phase.options.stoppable
+        )
+        lost_s = time.monotonic() - until_s
+        if lost_s > _SLICE_S:
+            phase.postpone(lost_s)
+        is_stopped = main_queue.urgent or (main_queue.stopping and phase.options.stoppable)
+        if ended or is_stopped or time.monotonic() >= phase.check_s:
+            return

@@ -5,8 +5,18 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 
+import pytest
+
 from composer.plan import Step
-from composer.runtime.supervision.plan_executor import ExecutionOptions, _Phase, _RunningStep
+from composer.runtime.executors.futures import Future
+from composer.runtime.supervision import plan_executor
+from composer.runtime.supervision.main_queue import Item, MainQueue
+from composer.runtime.supervision.plan_executor import (
+    ExecutionOptions,
+    _Phase,
+    _RunningStep,
+    wait_for_step,
+)
 
 
 def steps(*after: tuple[int, ...]) -> deque[Step]:
@@ -63,3 +73,40 @@ def test_nodes_of_this_process_wait_here() -> None:
 def test_all_or_nothing_plans_wait_here_for_each_success() -> None:
     phase = phase_of(steps((), (1,)), {"n1": "other", "n2": "other"}, down=False)
     assert started(phase) == [(1, ())]
+
+
+class Clock:
+    """A clock that only ``wait`` advances, which suspends the process once."""
+
+    def __init__(self, suspended_s: float) -> None:
+        self.now_s = 100.0
+        self._suspended_s = suspended_s
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def wait(self, _: object, until_s: float, *, stoppable: bool) -> bool:
+        self.now_s = max(self.now_s, until_s) + self._suspended_s
+        self._suspended_s = 0.0
+        return False
+
+
+@pytest.mark.parametrize("suspended_s", [0.0, 0.05, 3.0])
+def test_a_suspended_process_has_as_much_time_as_any(
+    suspended_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock(suspended_s)
+    monkeypatch.setattr(plan_executor, "time", clock)
+    main_queue: MainQueue[Item] = MainQueue()
+    monkeypatch.setattr(main_queue, "wait", clock.wait)
+    (step,) = steps(())
+    options = ExecutionOptions(best_effort=True, stoppable=False, end_s=101.7)
+    phase = _Phase(deque(), options, {})
+    item = _RunningStep(step, "", Future(), 100.0, 1.0, options.end_s)
+    phase.running[1] = item
+    phase.check_s = item.until_s
+    wait_for_step(phase, main_queue)
+    lost_s = suspended_s if suspended_s > 0.1 else 0.0
+    assert clock.now_s == pytest.approx(101.0 + lost_s)
+    assert item.until_s == phase.check_s == pytest.approx(101.0 + lost_s)
+    assert phase.options.end_s == item.end_s == pytest.approx(101.7 + lost_s)
