@@ -110,6 +110,8 @@ class QuerySocket:
             answer = self._answers[name]
         except (ValueError, TypeError, KeyError):  # of a command of another version
             return
+        if _has_given_up(connection):
+            return  # an answer may take half a second, for which the next commands would wait
         document = {"environment": _environment(), "answer": answer(argument)}
         connection.sendall(json.dumps(document).encode())
 
@@ -152,6 +154,17 @@ def _read_line(connection: socket.socket) -> bytes:
             break
         line += received
     return line
+
+
+def _has_given_up(connection: socket.socket) -> bool:
+    """Return whether the command has closed its side: it has waited for long enough."""
+    connection.setblocking(False)
+    try:
+        return not connection.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return False
+    finally:
+        connection.settimeout(_TRANSFER_WITHIN_S)
 
 
 def _listen(path: Path) -> socket.socket | None:

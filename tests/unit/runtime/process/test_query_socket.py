@@ -4,6 +4,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -120,6 +121,29 @@ def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
     assert read_graph("/robot", 0.02) is None
     assert time.monotonic() - began_s < LIMIT_S / 2
     released.set()
+
+
+def test_a_query_whose_command_has_given_up_is_skipped(
+    serve: Callable[..., list[Exception]],
+) -> None:
+    released, answered = threading.Event(), threading.Semaphore(0)
+
+    def view() -> GraphView:
+        answered.release()
+        released.wait(LIMIT_S)
+        return VIEW
+
+    serve(view)
+    with ThreadPoolExecutor() as pool:
+        first = pool.submit(read_graph, "/robot", LIMIT_S)
+        assert answered.acquire(timeout=LIMIT_S)
+        for _ in range(2):
+            assert read_graph("/robot", 0.02) is None
+        released.set()
+        assert first.result(LIMIT_S) == VIEW
+    assert read_graph("/robot", LIMIT_S) == VIEW
+    assert answered.acquire(blocking=False)
+    assert not answered.acquire(blocking=False)
 
 
 def test_the_socket_of_a_killed_process_is_replaced(
