@@ -23,7 +23,7 @@ _STATUS = {
     GoalStatus.STATUS_CANCELED: "canceled",
     GoalStatus.STATUS_ABORTED: "aborted",
 }
-_CANCEL_WITHIN_S = 2.0
+_CANCEL_WITHIN_S = 5.0
 #: How long to wait for a result that a server sent before it went away.
 _LAST_RESULT_S = 0.5
 
