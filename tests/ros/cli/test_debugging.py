@@ -20,13 +20,14 @@ from std_msgs.msg import Int32
 
 from tests.ros.support.commands import (
     PATIENCE_S,
-    compose,
     error,
-    errors,
+    expect_error,
+    expect_errors,
     finished,
     listed,
     measured,
-    output_of,
+    repeated,
+    repeated_until,
     start,
 )
 
@@ -64,7 +65,12 @@ def test_topics() -> None:
 
 
 def test_topic_info() -> None:
-    found = json.loads(listed(("/lab/talker",), "topic", "info", "/lab/text", "--json"))
+    described = ("topic", "info", "/lab/text", "--json")
+    # A command of another test may still be there.
+    text = repeated_until(
+        lambda text: "/lab/talker" in text and not json.loads(text)["subscriptions"], *described
+    )
+    found = json.loads(text)
     assert found["types"] == ["std_msgs/msg/String"]
     assert found["subscriptions"] == []
     (publisher,) = found["publishers"]
@@ -87,39 +93,42 @@ def test_topic_info() -> None:
 
 
 def test_echo_receives_from_a_best_effort_publisher() -> None:
-    lines = output_of("topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
+    lines = listed(("data",), "topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
     values = [json.loads(line)["data"] for line in lines]
     assert values == list(range(values[0], values[0] + 5))
 
 
 def test_echo_receives_earlier_messages_and_truncates_them() -> None:
-    text = yaml.safe_load(output_of("topic", "echo", "/lab/text", "--once").removesuffix("---\n"))
+    echo = ("topic", "echo", "/lab/text", "--once")
+    text = yaml.safe_load(listed(("data",), *echo).removesuffix("---\n"))
     assert text == {"data": "x" * 128 + "..."}
-    full = output_of("topic", "echo", "/lab/text", "--once", "--full-length", "--field", "data")
+    full = listed(("x",), *echo, "--full-length", "--field", "data")
     assert full == "x" * 200 + "\n---\n"
 
 
 def test_echo_filters_by_an_expression() -> None:
     condition = "message.data > 20 and message.data < 1000000"
-    value = output_of(
-        "topic", "echo", "/lab/count", "--once", "--filter", condition, "--field", "data"
-    )
+    echo = ("topic", "echo", "/lab/count", "--once", "--field", "data")
+    value = listed(("---\n",), *echo, "--filter", condition)
     assert int(value.removesuffix("---\n")) > 20
-    assert "has no field 'x'" in error("topic", "echo", "/lab/count", "--filter", "message.x > 1")
-    done = compose("topic", "echo", "/lab/count", "--filter", "message.data >")
+    unknown = ("topic", "echo", "/lab/count", "--filter", "message.x > 1")
+    expect_error("has no field 'x'", *unknown)
+    wrong = ("topic", "echo", "/lab/count", "--filter", "message.data >")
+    done = repeated(lambda done: done.returncode == 2, *wrong)
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("compose: --filter: ")
 
 
 def test_echo_reports_unknown_names_and_fields() -> None:
-    assert "did you mean '/lab/count'?" in error("topic", "echo", "/lab/cuont", "--once")
-    assert "valid here: data" in error("topic", "echo", "/lab/count", "--once", "--field", "odd")
+    expect_error("did you mean '/lab/count'?", "topic", "echo", "/lab/cuont", "--once")
+    odd = ("topic", "echo", "/lab/count", "--once", "--field", "odd")
+    expect_error("valid here: data", *odd)
     silent = ("topic", "echo", "/lab/in", "std_msgs/msg/String", "--timeout", "0.3")
     assert "no message received on '/lab/in' for 0.3 s" in error(*silent)
 
 
 def test_echo_ends_quietly_at_ctrl_c() -> None:
-    process = start("topic", "echo", "/lab/count")
+    process = start("topic", "echo", "/lab/count", "std_msgs/msg/Int32")
     assert process.stdout is not None
     assert any(line.startswith("data: ") for line in process.stdout)
     process.send_signal(signal.SIGINT)
@@ -201,7 +210,8 @@ def plain_subscription() -> Iterator[list[tuple[float, int]]]:
 
 
 def test_hz_prints_text() -> None:
-    assert "average rate: " in output_of("topic", "hz", "/lab/count", "--count", "10")
+    rate = "average rate: "
+    assert rate in listed((rate,), "topic", "hz", "/lab/count", "--count", "10")
 
 
 def test_bw_counts_serialized_bytes() -> None:
@@ -223,20 +233,22 @@ def test_measurements_can_be_filtered_and_time_out() -> None:
     silent = ("topic", "bw", "/lab/count", "--qos-reliability", "reliable", "--timeout", "5")
     # Latched messages from before are not measured; a report would be printed after a second.
     latched = ("topic", "bw", "/lab/text", "--timeout", "5")
-    for name, text in zip(("count", "text"), errors(silent, latched), strict=True):
-        assert f"no message received on '/lab/{name}' for 5 s" in text
+    none = "no message received on '/lab/{}' for 5 s"
+    expect_errors((none.format("count"), *silent), (none.format("text"), *latched))
 
 
 def test_published_messages_arrive() -> None:
     arguments = ("/lab/in", "std_msgs/msg/String", '{data: "number {count}"}')
-    done = compose("topic", "pub", "-r", "20", "--times", "2", "--print", "2", *arguments)
-    assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "published #2: std_msgs.msg.String(data='number 1')\n"
+    twice = ("topic", "pub", "-r", "20", "--times", "2", "--print", "2", *arguments)
+    expected = "published #2: std_msgs.msg.String(data='number 1')\n"
+    # There is a warning if the talker does not acknowledge the messages within a second.
+    done = repeated(lambda done: done.stderr == expected, *twice)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", expected)
     last = "number 1\n---\n"  # the talker may still publish the one before
     echo = ("topic", "echo", "/lab/received", "--once", "--field", "data")
     assert listed((last,), *echo) == last
     once = ("topic", "pub", "--once", "--json", "--qos-history", "keep_all", *arguments)
-    assert json.loads(output_of(*once)) == {"data": "number 0"}
+    assert json.loads(listed(("number 0",), *once)) == {"data": "number 0"}
 
 
 def test_publishing_reports_errors() -> None:

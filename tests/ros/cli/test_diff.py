@@ -11,7 +11,15 @@ from typing import TextIO
 
 import pytest
 
-from tests.ros.support.commands import PATIENCE_S, Running, compose, hand_written, running, start
+from tests.ros.support.commands import (
+    PATIENCE_S,
+    Running,
+    hand_written,
+    listed,
+    repeated,
+    running,
+    start,
+)
 
 INTRUDER = "hand_written_intruder.py"
 PLANNER = "/planning/planner"
@@ -30,36 +38,50 @@ def differences(done: subprocess.CompletedProcess[str]) -> list[str]:
     return [line for line in done.stdout.splitlines() if not line.startswith(" ")]
 
 
+def compared(expected: list[str], *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Compare until these are the differences; a process may be discovered or respond late."""
+    code = 1 if expected else 0
+    done = repeated(
+        lambda done: (done.returncode, differences(done)) == (code, expected), "diff", *arguments
+    )
+    assert (done.returncode, differences(done)) == (code, expected), done.stderr
+    return done
+
+
+def set_velocity(value: float) -> None:
+    assert listed((str(value),), "param", "set", PLANNER, "max_velocity", str(value))
+
+
+def go_to(state: str) -> None:
+    done = repeated(lambda done: done.returncode == 0, "lifecycle", "set", PLANNER, "--to", state)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_system_without_differences(pipeline: Running) -> None:
-    done = compose("diff", "systems/pipeline.yaml")
-    assert (done.returncode, done.stdout) == (0, "")
+    done = compared([], "systems/pipeline.yaml")
     assert done.stderr == "pipeline: runs as declared\n"
 
 
 def test_a_changed_parameter_is_reported_with_its_declaration(pipeline: Running) -> None:
-    assert compose("param", "set", PLANNER, "max_velocity", "0.5").returncode == 0
-    done = compose("diff", "systems/pipeline.yaml")
-    assert done.returncode == 1
-    assert differences(done) == [f"{PLANNER}: parameter max_velocity is 0.5, declared 1.0"]
+    set_velocity(0.5)
+    message = f"{PLANNER}: parameter max_velocity is 0.5, declared 1.0"
+    done = compared([message], "systems/pipeline.yaml")
     assert "declared at " in done.stdout
     assert "planner.yaml:" in done.stdout
-    assert compose("param", "set", PLANNER, "max_velocity", "1.0").returncode == 0
+    set_velocity(1.0)
 
 
 def test_a_cleaned_up_node_is_reported_with_its_missing_endpoints(
     pipeline: Running,
 ) -> None:
-    for transition in ("deactivate", "cleanup"):
-        assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
-    done = compose("diff", "systems/pipeline.yaml")
-    assert done.returncode == 1
-    assert differences(done) == [
+    go_to("unconfigured")
+    missing = [
         f"{PLANNER}: lifecycle state is unconfigured, declared active",
         f"{PLANNER}: subscription /sensor_data is missing",
         f"{PLANNER}: service /plan_trajectory is missing",
     ]
-    for transition in ("configure", "activate"):
-        assert compose("lifecycle", "set", PLANNER, transition).returncode == 0
+    compared(missing, "systems/pipeline.yaml")
+    go_to("active")
 
 
 def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) -> None:
@@ -67,29 +89,34 @@ def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) ->
         "/intruder: type of its publisher /sensor_data is std_msgs/msg/String,"
         " declared nav_msgs/msg/Odometry"
     )
+    extra = "/intruder: the node exists, but is not declared"
+
+    def messages(done: subprocess.CompletedProcess[str]) -> list[str]:
+        found = json.loads(done.stdout or '{"drift": []}')
+        return [item["message"] for item in found["drift"]]
+
     with hand_written(INTRUDER):
-        done = compose("diff", "systems/pipeline.yaml", "--json")
+        done = repeated(
+            lambda done: messages(done) == [conflict, extra],
+            *("diff", "systems/pipeline.yaml", "--json"),
+        )
         assert done.returncode == 1
         data = json.loads(done.stdout)
         assert (data["system"], data["clean"]) == ("pipeline", False)
-        assert [item["message"] for item in data["drift"]] == [
-            conflict,
-            "/intruder: the node exists, but is not declared",
-        ]
+        assert messages(done) == [conflict, extra]
         assert [item["kind"] for item in data["drift"]] == ["wrong type", "extra node"]
-        ignoring = compose("diff", "systems/pipeline.yaml", "--ignore", "/intr*")
-        assert (ignoring.returncode, differences(ignoring)) == (1, [conflict])
+        compared([conflict], "systems/pipeline.yaml", "--ignore", "/intr*")
 
 
 def test_watch_prints_new_and_resolved_differences(pipeline: Running) -> None:
     watch = start("diff", "systems/pipeline.yaml", "--watch", "--grace", "1.5")
     try:
         assert watch.stdout is not None
-        assert compose("param", "set", PLANNER, "max_velocity", "0.7").returncode == 0
+        set_velocity(0.7)
         # On a busy machine, what is not discovered within the grace time is reported before.
         line = read_until(watch.stdout, f"drift: {PLANNER}: parameter")
         assert line == f"drift: {PLANNER}: parameter max_velocity is 0.7, declared 1.0"
-        assert compose("param", "set", PLANNER, "max_velocity", "1.0").returncode == 0
+        set_velocity(1.0)
         read_until(watch.stdout, f"resolved: {PLANNER}: parameter")
         watch.send_signal(signal.SIGINT)
         assert watch.communicate(timeout=PATIENCE_S)[1] == ""
@@ -107,17 +134,12 @@ def test_a_starting_system_is_not_reported(tmp_path: Path) -> None:
     with running(tmp_path / "log.txt", "talker_listener"):
         # On a busy machine, a start may take longer than the default grace time.
         limits = ("--grace", "15", "--timeout", "25")
-        done = compose("diff", "systems/talker_listener.yaml", "--ignore", "/*/*", *limits)
-        assert (done.returncode, done.stdout) == (0, "")
+        compared([], "systems/talker_listener.yaml", "--ignore", "/*/*", *limits)
 
 
 def test_an_empty_graph_is_reported_in_time() -> None:
-    done = compose("diff", "systems/talker_listener.yaml", "--timeout", "4", "--ignore", "*")
-    assert done.returncode == 1
-    assert differences(done) == [
-        "/talker: the node does not exist",
-        "/listener: the node does not exist",
-    ]
+    missing = ["/talker: the node does not exist", "/listener: the node does not exist"]
+    compared(missing, "systems/talker_listener.yaml", "--timeout", "4", "--ignore", "*")
 
 
 DECLARED = """
@@ -135,15 +157,14 @@ def test_different_qos_and_similar_names_are_reported(tmp_path: Path) -> None:
     declared.write_text(DECLARED)
     changed = DECLARED.replace("command", "sensor_data").replace("  listener:", "  listner:")
     other.write_text(changed)
-    with running(tmp_path / "log.txt", str(other), "--namespace", "/twin") as run:
-        run.wait_for("2 of 2 nodes active")
-        done = compose("diff", str(declared), "--namespace", "/twin", "--ignore", "/[!t]*")
-    assert done.returncode == 1
-    assert differences(done) == [
+    messages = [
         "/twin/talker: reliability of publisher /twin/chatter is best_effort, declared reliable",
         "/twin/listener: the node does not exist",
         "/twin/listner: the node exists, but is not declared",
     ]
+    with running(tmp_path / "log.txt", str(other), "--namespace", "/twin") as run:
+        run.wait_for("2 of 2 nodes active")
+        done = compared(messages, declared, "--namespace", "/twin", "--ignore", "/[!t]*")
     assert "'/twin/listner' exists: did you mean that?" in done.stdout
 
 
@@ -151,5 +172,4 @@ def test_start_options_apply_to_the_comparison(tmp_path: Path) -> None:
     arguments = ("talker_listener", "--namespace", "/robot1", "--autostart", "inactive")
     with running(tmp_path / "log.txt", *arguments) as run:
         run.wait_for("0 of 2 nodes active")
-        done = compose("diff", *arguments, "--ignore", "/[!r]*")
-        assert (done.returncode, done.stdout) == (0, "")
+        compared([], *arguments, "--ignore", "/[!r]*")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.ros.support.commands import PATIENCE_S, compose, hand_written, running
+from tests.ros.support.commands import PATIENCE_S, compose, hand_written, repeated, running
 
 EXPECTED = (
     "node:/other/arm",
@@ -48,7 +48,10 @@ def all_drawn() -> dict[str, Any]:
 
 
 def drawn() -> dict[str, Any]:
-    done = compose("graph", "--live", "-f", "json", "--measure", "1.5")
+    done = repeated(
+        lambda done: (done.returncode, done.stderr) == (0, ""),
+        *("graph", "--live", "-f", "json", "--measure", "1.5"),
+    )
     assert (done.returncode, done.stderr) == (0, "")
     found: dict[str, Any] = json.loads(done.stdout)
     return found

@@ -7,12 +7,12 @@ import shlex
 import signal
 import socket
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tests.ros.support.commands import PATIENCE_S, compose
+from tests.ros.support.in_process import wait_until
 
 SYSTEM = """\
 system: robot
@@ -72,6 +72,10 @@ def is_ready(system: str) -> bool:
     return compose("ps", system, "--ready").returncode == 0
 
 
+def wait_until_ready(system: str) -> None:
+    wait_until(lambda: is_ready(system), f"{system} to be ready")
+
+
 def test_services_become_ready_and_stop_in_order(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     file.write_text(SYSTEM)
@@ -84,11 +88,9 @@ def test_services_become_ready_and_stop_in_order(tmp_path: Path) -> None:
         assert not is_ready("/fleet/robot/ears")  # nothing has brought its nodes up
         robot = stack.enter_context(started(tmp_path / "units" / "robot.service", tmp_path))
         robot.wait_for("READY=1")
-        assert is_ready("/fleet/robot")
-        assert is_ready("/fleet/robot/ears")  # although one of its nodes is to be inactive
+        wait_until_ready("/fleet/robot")
+        wait_until_ready("/fleet/robot/ears")  # although one of its nodes is to be inactive
         robot.wait_for("WATCHDOG=1")
         assert robot.stop() == 0
-        until_s = time.monotonic() + PATIENCE_S
-        while is_ready("/fleet/robot/ears"):
-            assert time.monotonic() < until_s
+        wait_until(lambda: not is_ready("/fleet/robot/ears"), "the nodes to be brought down")
         assert ears.stop() == 0

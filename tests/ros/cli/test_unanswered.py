@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.ros.support.commands import PATIENCE_S, errors, hand_written, output_of, start
+from tests.ros.support.commands import PATIENCE_S, errors, hand_written, listed, start
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def requests(process: subprocess.Popen[str]) -> Counter[str]:
 def test_reads_are_retried(
     forgetful: subprocess.Popen[str], command: str, expected: str, services: list[str]
 ) -> None:
-    assert output_of(*command.split(), "--timeout", "20") == expected
+    assert listed((expected,), *command.split(), "--timeout", "20") == expected
     received = requests(forgetful)
     assert all(received[service] >= 2 for service in services), received
 

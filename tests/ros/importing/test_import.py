@@ -9,32 +9,53 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.ros.support.commands import PROGRAMS, compose, errors, hand_written, output_of, running
+from tests.ros.support.commands import (
+    PROGRAMS,
+    compose,
+    errors,
+    expect_error,
+    hand_written,
+    listed,
+    output_of,
+    repeated,
+    repeated_until,
+    running,
+)
+from tests.ros.support.in_process import wait_until
 
 THREE = "hand_written_three.py"
 
 
 def test_live_nodes_are_described_so_that_nothing_differs(tmp_path: Path) -> None:
     written = tmp_path / "robot.yaml"
-    with hand_written(THREE):
+    known = ("navigate", "wheels.count", "rate_hz", "status", "plan", "path", "scan")
+
+    def is_imported() -> bool:
+        """Write the file; say whether all nodes were discovered and have responded."""
+        written.unlink(missing_ok=True)
         done = compose("import", "live", "--system", "robot", "-o", written)
         assert (done.returncode, done.stdout) == (0, ""), done.stderr
-        assert done.stderr == f"wrote {written}\n"
+        is_complete = all(name in written.read_text() for name in known)
+        return is_complete and done.stderr == f"wrote {written}\n"
+
+    same = "robot: runs as declared\n"
+    with hand_written(THREE):
+        wait_until(is_imported, "a description of all nodes")
         assert output_of("validate", written) == ""
-        assert compose("diff", written).stderr == "robot: runs as declared\n"
-        (text,) = errors(("import", "live", "-o", str(written)))
-        assert "exists already" in text
+        assert repeated(lambda done: done.stderr == same, "diff", written).stderr == same
+        expect_error("exists already", "import", "live", "-o", written)
         with running(tmp_path / "log.txt", str(written)) as run:
             run.wait_for("2 of 3 nodes active")
-            assert compose("diff", written).stderr == "robot: runs as declared\n"
+            assert repeated(lambda done: done.stderr == same, "diff", written).stderr == same
             # The other way around: what runs now is described by the same file.
-            assert output_of("import", "live", "--system", "robot") == written.read_text()
+            text = written.read_text()
+            live = ("import", "live", "--system", "robot")
+            assert repeated_until(lambda found: found == text, *live) == text
             assert run.stop()[0] == 0
-        only = output_of("import", "live", "--node", "/base/*")
+        only = listed(("/base",), "import", "live", "--node", "/base/*")
         assert "/base" in only
         assert "lidar" not in only
-        (text,) = errors(("import", "live", "--node", "nothing"))
-        assert "no node matches nothing" in text
+        expect_error("no node matches nothing", "import", "live", "--node", "nothing")
     lines = written.read_text().splitlines()
     assert "    lifecycle: {autostart: unconfigured}" in lines
     assert "      wheels.count: {type: integer, default: 4}" in lines

@@ -26,7 +26,7 @@ from composer.remote.lifecycle import LifecycleClient, TransitionError
 from composer.remote.parameters import ParameterClient, ParameterRejectedError, names_by_node
 from composer.remote.session import Deadline, Session
 from composer.remote.snapshot import GraphObserver
-from tests.ros.support.commands import output_of
+from tests.ros.support.commands import listed, output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 LEAN = """
@@ -150,18 +150,23 @@ def test_parameters_are_those_of_the_node(session: Session) -> None:
 
 
 def test_an_observer_reads_states_and_parameters(session: Session) -> None:
-    def observed(name: str) -> ObservedNode:
-        node = snapshot.node(name)
-        assert node is not None
-        return node
+    names = (TALKER, "/whole", "/lean/manager")
+
+    def responses() -> list[ObservedNode]:
+        """Return the nodes that have responded; those that take two seconds are unknown."""
+        snapshot = observer.snapshot(Deadline(20.0))
+        found = [node for name in names if (node := snapshot.node(name)) is not None]
+        return [node for node in found if node.state is not None and node.parameters]
 
     with GraphObserver(session) as observer:
-        snapshot = observer.snapshot(Deadline(20.0))
-    assert (observed(TALKER).state, observed("/whole").state) == ("active", "active")
+        talker, whole, manager = wait_until(
+            lambda: found if len(found := responses()) == len(names) else None, "all responses"
+        )
+    assert (talker.state, whole.state) == ("active", "active")
     speed = ParameterClient(session, Deadline(20.0), TALKER).values(["speed"])
-    assert (observed(TALKER).parameters or {})["speed"] == speed["speed"] > 1.0
-    assert (observed("/whole").parameters or {})["size"] == 3
-    assert not [name for name in observed("/lean/manager").parameters or {} if "speed" in name]
+    assert (talker.parameters or {})["speed"] == speed["speed"] > 1.0
+    assert (whole.parameters or {})["size"] == 3
+    assert not [name for name in manager.parameters or {} if "speed" in name]
 
 
 def test_a_node_with_all_endpoints_has_those_of_a_lifecycle_node(
@@ -200,13 +205,13 @@ def test_a_node_with_all_endpoints_has_those_of_a_lifecycle_node(
 
 
 def test_commands_work_the_same_with_proxy_services(system: RunningSystem) -> None:
-    assert (
-        output_of("lifecycle", "set", "talker", "deactivate") == f"{TALKER}: active -> inactive\n"
-    )
-    (listed,) = json.loads(output_of("ps", "--json"))["systems"]
-    states = {node["node"]: node["state"] for node in listed["nodes"]}
+    patiently = ("--timeout", "20")
+    text = output_of("lifecycle", "set", "talker", "deactivate", *patiently)
+    assert text == f"{TALKER}: active -> inactive\n"
+    (reported,) = json.loads(listed((TALKER,), "ps", "--json"))["systems"]
+    states = {node["node"]: node["state"] for node in reported["nodes"]}
     assert states == {TALKER: "inactive", "/whole": "active"}
-    output_of("lifecycle", "set", "--system", "lean", "--to", "active")
-    output_of("param", "set", "talker", "speed", "3.5")
-    assert "3.5" in output_of("param", "get", "talker", "speed")
+    output_of("lifecycle", "set", "--system", "lean", "--to", "active", *patiently)
+    assert listed(("3.5",), "param", "set", "talker", "speed", "3.5")
+    assert "3.5" in listed(("3.5",), "param", "get", "talker", "speed")
     assert system.node("talker").state == "active"

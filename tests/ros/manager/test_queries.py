@@ -38,9 +38,7 @@ def system(shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory) -> I
 
 
 def test_large_parameters_are_left_to_the_parameter_services() -> None:
-    wait_until(lambda: local_parameters("small", LIMIT_S), "an answer")
-    small = local_parameters("/small", LIMIT_S)
-    assert small is not None
+    small = wait_until(lambda: local_parameters("/small", LIMIT_S), "an answer")
     assert small.values(["numbers", "limit"]) == {"numbers": [1, 2], "limit": 1.5}
     assert [item.type for item in small.describe(["limit"])] == ["double"]
     assert local_parameters("/large", LIMIT_S) is None

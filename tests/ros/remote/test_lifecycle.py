@@ -11,6 +11,9 @@ from composer.remote.lifecycle import LifecycleClient, TransitionError
 from composer.remote.name_matching import NotFoundError
 from composer.remote.session import Deadline, NoResponseError, Session
 from tests.ros.support.commands import hand_written
+from tests.ros.support.in_process import wait_until
+
+NODES = ("/other/arm", "/other/planner", "/planning/planner")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -21,7 +24,10 @@ def peer(shared_domain_id: int) -> Iterator[subprocess.Popen[str]]:
 
 @pytest.fixture(scope="module")
 def session() -> Iterator[Session]:
+    """A session that has discovered all nodes, for the tests of errors."""
     with Session() as session:
+        client = LifecycleClient(session, Deadline(20.0))
+        wait_until(lambda: client.nodes() == NODES, "all nodes")
         yield session
 
 
@@ -37,10 +43,8 @@ def to_unconfigured(client: LifecycleClient, node: str) -> None:
 
 
 def test_all_nodes_are_listed_with_their_states(client: LifecycleClient) -> None:
-    expected = ("/other/arm", "/other/planner", "/planning/planner")
-    client.find("/planning/planner")
-    assert client.nodes() == expected
-    assert client.states(expected) == dict.fromkeys(expected, "unconfigured")
+    assert client.nodes() == NODES
+    assert client.states(NODES) == dict.fromkeys(NODES, "unconfigured")
 
 
 def test_a_node_is_found_by_its_full_name_or_last_part(

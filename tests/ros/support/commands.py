@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -114,13 +115,26 @@ def measured(fits: Callable[[dict[str, Any]], bool], *arguments: str) -> dict[st
     return found
 
 
-def repeated_until(fits: Callable[[str], bool], *arguments: str) -> str:
-    """Repeat a command; return the first output that fits, or the last one before the limit."""
+def repeated_until(fits: Callable[[str], object], *arguments: object) -> str:
+    """Repeat a command until it succeeds and its output fits; return the output."""
+    done = repeated(lambda done: done.returncode == 0 and fits(done.stdout), *arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def repeated(
+    fits: Callable[[subprocess.CompletedProcess[str]], object], *arguments: object
+) -> subprocess.CompletedProcess[str]:
+    """Repeat a command until its result fits; return it, or the last one before the limit.
+
+    For commands that have the same effect each time: a process that is not scheduled for a moment
+    exceeds the time limits of a command, and is discovered late.
+    """
     until_s = time.monotonic() + PATIENCE_S
     while True:
-        text = output_of(*arguments)
-        if fits(text) or time.monotonic() > until_s:
-            return text
+        done = compose(*arguments)
+        if fits(done) or time.monotonic() > until_s:
+            return done
 
 
 def errors(*commands: tuple[object, ...]) -> list[str]:
@@ -133,9 +147,22 @@ def errors(*commands: tuple[object, ...]) -> list[str]:
     return [text for _, text in results]
 
 
-def error(*arguments: str) -> str:
-    """Run a command that must fail with an empty stdout; return its stderr."""
-    done = compose(*arguments)
+def expect_error(part: str, *arguments: object) -> str:
+    """Repeat a command that must fail, until its stderr contains ``part``; return its stderr."""
+    done = repeated(lambda done: done.returncode == 1 and part in done.stderr, *arguments)
     assert done.returncode == 1, done.stderr
     assert done.stdout == ""
+    assert part in done.stderr
     return done.stderr
+
+
+def expect_errors(*commands: tuple[object, ...]) -> list[str]:
+    """Do so in parallel, because the commands mostly wait; return the stderr of each."""
+    with ThreadPoolExecutor(len(commands)) as pool:
+        return list(pool.map(lambda words: expect_error(*map(str, words)), commands))
+
+
+def error(*arguments: object) -> str:
+    """Run a command that must fail with an empty stdout; return its stderr."""
+    (text,) = errors(arguments)
+    return text

@@ -55,16 +55,16 @@ _GOALS = {
     "cleanup": "unconfigured",
 }
 E = TypeVar("E", bound=Event)
+T = TypeVar("T")
 
 
-def wait_until(
-    condition: Callable[[], object], what: str = "", limit_s: float = PATIENCE_S
-) -> None:
-    """Wait until ``condition()`` is true; fail after ``limit_s``."""
+def wait_until(condition: Callable[[], T | None], what: str = "", limit_s: float = PATIENCE_S) -> T:
+    """Wait until ``condition()`` is true, and return it; fail after ``limit_s``."""
     until_s = time.monotonic() + limit_s
-    while not condition():
+    while not (found := condition()):
         assert time.monotonic() < until_s, f"timed out: {what or condition}"
         time.sleep(0.002)
+    return found
 
 
 def end_limit_s() -> float:

@@ -75,8 +75,8 @@ def check_the_navigation(external: ExternalNode) -> None:
     goal = Navigate.Goal(target=Point(x=0.0, y=1.0), max_velocity=1.0)
     outcome = external.result(external.result(client.send_goal_async(goal)).get_result_async())
     assert outcome.status == GoalStatus.STATUS_SUCCEEDED
-    # The robot overshoots if its controller is delayed on a busy machine.
-    assert 0.9 < outcome.result.distance_traveled < 1.5
+    # The robot overshoots and returns if its controller is delayed: it brakes after half a second.
+    assert 0.9 < outcome.result.distance_traveled < 3.0
     feedback: list[float] = []
     handle = external.result(
         client.send_goal_async(
