@@ -6,7 +6,7 @@ import ast
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -257,8 +257,11 @@ def _names_in(path: Path) -> frozenset[str] | None:
         module = read_module(path, shown_path(path))
     except Unreadable:
         return None
-    if module.dynamic:
-        return None
+    return None if module.dynamic else _defined_names(module)
+
+
+@lru_cache(maxsize=128)  # as many as there are modules in memory; those of rclpy are large
+def _defined_names(module: Module) -> frozenset[str]:
     functions = (
         item.name
         for item in walk(module.tree.body)
