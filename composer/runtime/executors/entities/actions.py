@@ -83,8 +83,10 @@ _PENDING = {
     "cancel": "_pending_cancel_requests",
     "result": "_pending_result_requests",
 }
-_RETRIES = 20
+#: An early response is tried again after a millisecond, then after twice as long each time: on a
+#: busy machine, the thread that registers its request may not run for a while.
 _RETRY_AFTER_S = 0.001
+_LAST_RETRY_AFTER_S = 2.0
 
 
 class ActionSource:
@@ -128,12 +130,12 @@ class ActionSource:
 
     def call(self, taken: Any) -> None:
         """Pass the item to rclpy."""
-        self._execute(taken, _RETRIES)
+        self._execute(taken, _RETRY_AFTER_S)
 
-    def _execute(self, taken: Any, retries: int) -> None:
-        if retries and self._is_early(taken):
-            later = partial(self._execute, taken, retries - 1)
-            self._loop.call_later(_RETRY_AFTER_S, later)
+    def _execute(self, taken: Any, retry_after_s: float) -> None:
+        if retry_after_s < _LAST_RETRY_AFTER_S and self._is_early(taken):
+            later = partial(self._execute, taken, 2 * retry_after_s)
+            self._loop.call_later(retry_after_s, later)
             return
         for future in self._waitable._futures:
             future._set_executor(self._executor)
