@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from composer.analysis.context import Context, location
 from composer.diagnostics import Diagnostic
-from composer.model import ChannelKind, Connection, Node, Port, PortKind
+from composer.model import ChannelKind, Connection, Endpoint, Node, Port, PortKind
 from composer.names import join
 from composer.source import Span
 
@@ -30,7 +30,11 @@ _OF_CONNECTIONS = frozenset(
     }
 )
 #: Errors in the ports of a connection.
-_WRONG_ENDS = frozenset({"unknown-node", "unknown-port", "wrong-port-kind", "port-connected-twice"})
+_WRONG_ENDS = frozenset(
+    {"unknown-node", "unknown-port", "wrong-port-kind", "port-connected-twice", "type-mismatch"}
+)
+#: What may only be reported because a folder of the project is missing.
+_OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-import"})
 #: Rules, and others whose reports may follow from theirs. A warning does not hide errors: they may
 #: have another cause, and the system would run with them.
 _FOLLOWING = {
@@ -40,11 +44,21 @@ _FOLLOWING = {
         | {"unknown-attribute", "unused-remapping"}
     ),
     "outside-qos": frozenset({"reliable-sensor-stream", "unreliable-command"}),
-    "parameter-range": frozenset({"executor-busy", "executor-overloaded", "unusual-rate"}),
+    "parameter-file": frozenset({"missing-parameter"}),
+    "parameter-range": frozenset(
+        {"executor-busy", "executor-overloaded", "timer-period", "unusual-rate"}
+    ),
     "parameter-type": frozenset({"index-out-of-range", "unusual-rate"}),
+    "type-mismatch": frozenset({"port-connected-twice"}),
+    "unknown-key": frozenset({"transform-source", "unused-restart"}),
     "unknown-process": frozenset({"conflicting-process", "split-executor", "unmeasured-chain"}),
+    "yaml-syntax": frozenset({"missing-parameter"}),
 }
+#: Mistakes that may be the reason for all reports of the other rules: the name of what an
+#: unreadable file would set is not known.
+_WITHOUT_NAMES = frozenset({"parameter-file", "yaml-syntax"})
 
+_Errors: TypeAlias = Mapping[tuple[str, int], list[Diagnostic]]
 _Ports: TypeAlias = dict[tuple[ChannelKind, str], list[tuple[Node, Port]]]
 
 
@@ -53,17 +67,24 @@ class Consequences:
 
     def __init__(self, found: Iterable[Diagnostic], context: Context) -> None:
         self._names: dict[str, set[str]] = {}  # by rules: a report that mentions one is left out
+        self._all: set[str] = set()  # rules whose reports are all left out
         wrong: dict[tuple[str, int], list[Diagnostic]] = {}
         for item in found:
             rules = _FOLLOWING.get(item.rule.name)
-            if rules is not None:
+            if "is not a folder" in item.message:
+                self._all |= _OF_FOLDERS
+            elif rules is not None and item.rule.name in _WITHOUT_NAMES:
+                self._all |= rules
+            elif rules is not None:
                 self._add(rules, _names(item, context))
             if item.rule.name in _WRONG_ENDS or item.rule.name == "invalid-ros-name":
                 wrong.setdefault(_line(item.primary), []).append(item)
         ports: _Ports = _ports(context) if wrong else {}
         for connection in context.system.connections if wrong else ():
-            if _is_wrong(connection, wrong):
-                self._add(_OF_CONNECTIONS, _names_of_connection(connection, context, ports))
+            ends = _wrong_ends(connection, wrong)
+            if ends or _has_wrong_name(connection, wrong):
+                names = _names_of_connection(connection, ends, context, ports)
+                self._add(_OF_CONNECTIONS, names)
 
     def _add(self, rules: frozenset[str], names: Iterable[str]) -> None:
         known = set(names)
@@ -72,6 +93,8 @@ class Consequences:
 
     def include(self, item: Diagnostic) -> bool:
         """Return whether a diagnostic may follow from a mistake."""
+        if item.rule.name in self._all:
+            return True
         names = self._names.get(item.rule.name)
         return names is not None and not names.isdisjoint(_mentioned(item))
 
@@ -98,6 +121,8 @@ def _names(item: Diagnostic, context: Context) -> Iterator[str]:
             namespace = quoted(item.message)[0]
             inside = [node for node in nodes if _is_inside(node.namespace.value, namespace)]
             yield from _names_around(inside, context)
+        case "unknown-key" if "lifecycle" in item.message:
+            yield item.primary.file.path
         case "node-as-behavior":
             yield from (label.span.file.path for label in item.related)
             for node in nodes:
@@ -132,15 +157,19 @@ def _line(span: Span) -> tuple[str, int]:
     return span.file.path, span.line
 
 
-def _is_wrong(
-    connection: Connection, wrong: Mapping[tuple[str, int], Iterable[Diagnostic]]
-) -> bool:
-    """Return whether an error is in the name or the ports of a connection."""
-    for end in (*connection.sources, *connection.sinks):
-        span = end.text.span
-        near = (item for item in wrong.get(_line(span), ()) if item.rule.name in _WRONG_ENDS)
-        if any(_covers(span, item.primary) for item in near):
-            return True
+def _wrong_ends(connection: Connection, wrong: _Errors) -> list[Endpoint]:
+    """Return the ports of a connection that an error points at."""
+    return [
+        end
+        for end in (*connection.sources, *connection.sinks)
+        if any(
+            item.rule.name in _WRONG_ENDS and _covers(end.text.span, item.primary)
+            for item in wrong.get(_line(end.text.span), ())
+        )
+    ]
+
+
+def _has_wrong_name(connection: Connection, wrong: _Errors) -> bool:
     name = connection.name.span
     near = (item for item in wrong.get(_line(name), ()) if item.rule.name not in _WRONG_ENDS)
     return any(location(item.primary) == location(name) for item in near)
@@ -161,7 +190,9 @@ def _ports(context: Context) -> _Ports:
     return found
 
 
-def _names_of_connection(connection: Connection, context: Context, ports: _Ports) -> Iterator[str]:
+def _names_of_connection(
+    connection: Connection, wrong: list[Endpoint], context: Context, ports: _Ports
+) -> Iterator[str]:
     """Yield the names of the channel, of the ports, and of those that may be meant instead."""
     yield join(context.system.namespace, connection.name.value)
     meant: set[str] = set()
@@ -169,7 +200,7 @@ def _names_of_connection(connection: Connection, context: Context, ports: _Ports
         node, port = context.system.node(end.node), context.system.port(end)
         is_source = end in connection.sources
         is_right = port is not None and (port.kind in _SOURCES) is is_source
-        if node is not None and port is not None and is_right:
+        if node is not None and port is not None and is_right and end not in wrong:
             yield from _names_of_port(node, port)
         else:
             meant.update((end.port, f"{end.node}."))

@@ -11,6 +11,9 @@ from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Label, Severity
 
 _MAX_PLACES = 3  # in the labels of one diagnostic
+_MANY = 3  # different unknown names: a file or a section is probably missing
+_MAX_UNKNOWN = 20  # further unknown names in the labels of one diagnostic
+_NODE = "a node of this system"
 _PORT = re.compile(r"'(?:[^'.]*\.)?(?:on_|accept_)?([^'.]+)'")
 _INTERFACE = re.compile(r"^([a-z][a-z0-9_]*)/\w+/\w+ has no ")
 
@@ -26,8 +29,6 @@ _OF_WRONG_KIND = frozenset(
         "unknown-key",
     }
 )
-#: What may only be reported because a folder of the project is missing.
-_OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-import"})
 #: Infos about what nothing uses; a mistake elsewhere in the file may be the reason.
 _UNUSED = frozenset({"unused-variable", "unused-executor", "unused-qos-profile"})
 
@@ -39,11 +40,7 @@ def without_follow_ups(
 
     Settings of the project may be the cause, too.
     """
-    consequences = Consequences(found, context)
-    is_folder_missing = any("is not a folder" in item.message for item in of_project)
-    skipped = _OF_FOLDERS if is_folder_missing else frozenset()
-    if any(item.rule.name in ("parameter-file", "yaml-syntax") for item in found):
-        skipped |= {"missing-parameter"}  # the file may set it
+    consequences = Consequences((*found, *of_project), context)
     wrong_ports = _ports_of_wrong_kind(found)
     wrong_files = {
         item.primary.file.path for item in found if item.severity is Severity.ERROR
@@ -51,8 +48,7 @@ def without_follow_ups(
     kept = [
         item
         for item in found
-        if item.rule.name not in skipped
-        and not consequences.include(item)
+        if not consequences.include(item)
         and not (item.rule.name in _OF_WRONG_KIND and _mentions(item, wrong_ports))
         and not (item.rule.name in _UNUSED and item.primary.file.path in wrong_files)
     ]
@@ -91,29 +87,70 @@ def _files_of_infos(found: Iterable[Diagnostic]) -> set[str]:
 
 
 def _joined(found: list[Diagnostic], context: Context) -> list[Diagnostic]:
-    """Report what was probably renamed in one place once, with all places that use it."""
+    """Report what was probably renamed or removed in one place once, with all uses of it."""
     groups: dict[tuple[str, ...], list[Diagnostic]] = {}
     for item in found:
         name = _renamed(item, context)
         if name is not None:
-            groups.setdefault((item.rule.code, *name), []).append(item)
+            groups.setdefault(name, []).append(item)
     repeated = {id(item): items for items in groups.values() if len(items) > 1 for item in items}
-    return list(_with_groups(found, repeated)) if repeated else found
+    found = list(_with_groups(found, repeated)) if repeated else found
+    return _with_one_of_many(found)
 
 
 def _renamed(item: Diagnostic, context: Context) -> tuple[str, ...] | None:
-    """Return what a diagnostic is about: a field of the project, a variable or a node; or None."""
+    """Return what a diagnostic is about: a field of the project, a variable, a name; or None."""
     match item.rule.name:
         case "unknown-field":
             interface = _INTERFACE.match(item.message)
             is_own = interface is not None and context.interfaces.source_folder(f"{interface[1]}/")
-            return (item.message,) if is_own else None
+            return ("field", item.message) if is_own else None
         case "unknown-variable":
-            return (item.primary.file.path, item.message)
+            return ("variable", item.primary.file.path, item.message)
+        case "unknown-port" if item.hint is not None:  # the ports that the node has instead
+            port = next((name for name in _named(item) if name == item.primary.text), None)
+            return ("port", port or _named(item)[-1], item.hint)
+        case _:
+            kind = _unknown_kind(item)
+            return None if kind is None else (kind, _named(item)[-1])
+
+
+def _unknown_kind(item: Diagnostic) -> str | None:
+    """Return of what kind the name is that a diagnostic reports as unknown, or None."""
+    match item.rule.name:
         case "unknown-node":
-            return (_named(item)[-1],)
+            return _NODE
+        case "unknown-process":
+            return _NODE if item.message.endswith(_NODE) else "a process of this system"
+        case "unknown-executor":
+            return "an executor of this system"
+        case "unknown-qos-profile":
+            return "a QoS profile"
         case _:
             return None
+
+
+def _with_one_of_many(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Report several unknown names of one kind once, unless they resemble others.
+
+    One missing file or section is the reason for all of them, most likely.
+    """
+    unknown: dict[str, list[Diagnostic]] = {}
+    for item in found:
+        kind = _unknown_kind(item)
+        if kind is not None and "did you mean" not in (item.hint or ""):
+            unknown.setdefault(kind, []).append(item)
+    left_out: set[int] = set()
+    first: dict[int, Diagnostic] = {}
+    for kind, (item, *others) in unknown.items():
+        if len(others) + 1 >= _MANY:
+            left_out.update(map(id, others))
+            labels = (
+                Label(other.primary, f"'{_named(other)[-1]}' is not {kind} either")
+                for other in others[:_MAX_UNKNOWN]
+            )
+            first[id(item)] = replace(item, related=(*item.related, *labels))
+    return [first.get(id(item), item) for item in found if id(item) not in left_out]
 
 
 def _with_groups(

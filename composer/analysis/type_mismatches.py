@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from composer.analysis.context import Context
 from composer.analysis.fields import field_problems
 from composer.fast_dataclass import dataclass
 from composer.field_types import Problem
-from composer.model import Channel, PortOfNode
+from composer.model import Channel, Connection, Endpoint, PortOfNode
+from composer.names import join
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,57 @@ def certain_field_problems(context: Context) -> Iterator[Problem]:
     for found in context.once(field_problems):
         if found.port not in doubtful:
             yield found.problem
+
+
+def wrong_connection(
+    context: Context, endpoint: PortOfNode, mismatch: TypeMismatch
+) -> Endpoint | None:
+    """Return where a port is connected, if the connection is probably wrong and not its type.
+
+    That is so if another connection of the port fits its type, or if what the node does with the
+    port fits its type and not that of the channel.
+    """
+    channel = mismatch.channel
+    here: list[Endpoint] = []
+    elsewhere: list[Connection] = []
+    for connection in context.system.connections:
+        ends = (*connection.sources, *connection.sinks)
+        own = [end for end in ends if (end.node, end.port) == _key(endpoint)]
+        if connection.kind is not channel.kind or not own:
+            continue
+        if join(context.system.namespace, connection.name.value) == channel.name:
+            here.extend(own)
+        else:
+            elsewhere.append(connection)
+    if here and (
+        any(_has_type(context, connection, endpoint) for connection in elsewhere)
+        or _fits_only_own(context, endpoint, mismatch.usual.port.interface.value)
+    ):
+        return here[0]
+    return None
+
+
+def _has_type(context: Context, connection: Connection, endpoint: PortOfNode) -> bool:
+    """Return whether another port of a connection has the type of a port."""
+    ports = (
+        context.system.port(end)
+        for end in (*connection.sources, *connection.sinks)
+        if (end.node, end.port) != _key(endpoint)
+    )
+    own = endpoint.port.interface.value
+    return any(port is not None and port.interface.value == own for port in ports)
+
+
+def _fits_only_own(context: Context, endpoint: PortOfNode, other: str) -> bool:
+    """Return whether what a node does with a port fits its type, and not another one."""
+    key, node, port = _key(endpoint), endpoint.node, endpoint.port
+    if any(found.port == key for found in context.once(field_problems)):
+        return False
+    changed = replace(port, interface=port.interface.map(lambda _: other))
+    ports = tuple(changed if item is port else item for item in node.ports)
+    system = replace(context.system, nodes=(replace(node, ports=ports),))
+    supposed = Context(system, context.interfaces, context.node_types)
+    return any(found.port == key for found in field_problems(supposed))
 
 
 def _mismatches(context: Context) -> Iterator[TypeMismatch]:

@@ -132,10 +132,15 @@ class Qos:
     explicit: bool = True
     policy_spans: tuple[tuple[str, Span], ...] = field(default=(), compare=False)
     known: bool = True  # False: based on an unknown profile, so the values are a guess
+    inline: frozenset[str] = field(default=frozenset(), compare=False)  # policies set at the port
 
     def policy_span(self, policy: str) -> Span:
         """Return where ``policy`` was set, or the span of the whole profile."""
         return dict(self.policy_spans).get(policy, self.span)
+
+    def own_span(self, policy: str) -> Span:
+        """Return where the port itself sets ``policy``, or names the profile that does."""
+        return self.policy_span(policy) if policy in self.inline else self.span
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,6 +119,7 @@ class Node:
     type_name: Located[str] | None = None
     type_found: bool = True
     type_files: tuple[Path, ...] = field(default=(), compare=False)  # its own and its base types'
+    own_type_name: Located[str] | None = None  # as the file of its type names it
     description: str = ""
     behavior: BehaviorReference | None = None
     hosted_class: HostedClass | None = None

@@ -73,6 +73,7 @@ class _Declared:
     type_found: bool = True
     complete: bool = True
     type_files: tuple[Path, ...] = ()
+    own_type_name: Located[str] | None = None
 
 
 _NOTHING = Declaration("", Implementation(), (), (), (), (), ())
@@ -117,6 +118,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
         type_found=made.type_found,
         type_files=made.type_files,
+        own_type_name=made.own_type_name,
         description=plain_text(tree.get("description")) or declared.description,
         behavior=declared.implementation.behavior,
         hosted_class=declared.implementation.hosted_class,
@@ -240,7 +242,13 @@ def _typed(type_entry: Entry, tree: Mapping, context: SystemContext) -> _Declare
         # Compiling the type's expressions again only repeats diagnostics, which are deduplicated.
         merged = refined(made.tree, tree)
         declaration = declare(merged, made.folders, context.qos, context.diagnostics)
-    return _Declared(declaration, unknown, complete=made.complete, type_files=made.files)
+    return _Declared(
+        declaration,
+        unknown,
+        complete=made.complete,
+        type_files=made.files,
+        own_type_name=text(made.tree.get("node")),
+    )
 
 
 def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:

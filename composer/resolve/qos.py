@@ -37,7 +37,8 @@ class QosTable:
         """
         if isinstance(tree, Mapping):
             base = self._base(tree, default)
-            return _overlaid(tree, base, tree.span)
+            inline = frozenset(entry.name for entry in entries(tree))
+            return replace(_overlaid(tree, base, tree.span), inline=inline)
         name = text(tree)
         if name is None:
             return default if tree is None else _as_unknown(default)

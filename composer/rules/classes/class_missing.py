@@ -55,6 +55,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
             yield from _unnamed(node.hosted_class.reference)
     for found in context.once(hosted_classes):
         source, reference = found.source, found.hosted.reference
+        if source.problem_span is not None:
+            continue  # another rule reports it in the module
         if source.problem is not None:
             message = f"module '{reference.module}' {source.problem}"
             yield Diagnostic(RULE, message, found.span)

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import port_name
-from composer.analysis.type_mismatches import TypeMismatch, type_mismatches
+from composer.analysis.type_mismatches import TypeMismatch, type_mismatches, wrong_connection
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.model import PortOfNode
 
 RULE = register(
     Rule(
@@ -45,28 +46,32 @@ _SHOWN = 3
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the types on every channel; report each type other than the most common one."""
     for mismatch in context.once(type_mismatches):
-        yield from _diagnostics(mismatch)
+        for name, endpoints in mismatch.others.items():
+            yield _diagnostic(context, mismatch, name, endpoints)
 
 
-def _diagnostics(mismatch: TypeMismatch) -> Iterator[Diagnostic]:
-    channel, usual = mismatch.channel, mismatch.usual
+def _diagnostic(
+    context: Context, mismatch: TypeMismatch, name: str, endpoints: list[PortOfNode]
+) -> Diagnostic:
+    channel, usual, different = mismatch.channel, mismatch.usual, endpoints[0]
     common = usual.port.interface.value
-    for name, endpoints in mismatch.others.items():
-        different = endpoints[0]
-        labels = [
-            Label(usual.port.interface.span, f"{usual.port.kind} '{port_name(usual)}': {common}")
-        ]
-        labels += [
-            Label(
-                endpoint.port.interface.span,
-                f"{endpoint.port.kind} '{port_name(endpoint)}' too: {name}",
-            )
-            for endpoint in endpoints[1 : 1 + _SHOWN]
-        ]
-        yield Diagnostic(
-            RULE,
-            f"{different.port.kind} '{port_name(different)}' has type '{name}', "
-            f"but {channel.kind} '{channel.name}' has '{common}'",
-            different.port.interface.span,
-            tuple(labels),
+    labels = [Label(usual.port.interface.span, f"{usual.port.kind} '{port_name(usual)}': {common}")]
+    labels += [
+        Label(
+            endpoint.port.interface.span,
+            f"{endpoint.port.kind} '{port_name(endpoint)}' too: {name}",
         )
+        for endpoint in endpoints[1 : 1 + _SHOWN]
+    ]
+    primary = different.port.interface.span
+    connected = wrong_connection(context, different, mismatch)
+    if connected is not None:
+        labels.append(Label(primary, f"its type, which fits its node: {name}"))
+        primary = connected.text.span
+    return Diagnostic(
+        RULE,
+        f"{different.port.kind} '{port_name(different)}' has type '{name}', "
+        f"but {channel.kind} '{channel.name}' has '{common}'",
+        primary,
+        tuple(labels),
+    )

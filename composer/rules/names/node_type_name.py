@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import PurePath
 
-from composer.analysis.context import Context, is_unresolved
+from composer.analysis.context import Context, is_unresolved, location
 from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.source import Located
 
 RULE = register(
     Rule(
@@ -38,15 +39,22 @@ _SUFFIXES = frozenset({".yaml", ".yml"})
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Compare the name of a node type with that of its file."""
+    """Compare the names of a node type, and of those of nodes, with the names of their files."""
     system = context.system
-    file = PurePath(system.source.path)
-    if not system.node_type or file.suffix not in _SUFFIXES or is_unresolved(system.name.value):
-        return
-    if system.name.value != file.stem:
+    if system.node_type:
+        yield from _named(system.name)
+    names = (node.own_type_name for node in system.nodes)
+    places = {location(name.span): name for name in names if name is not None}
+    for name in places.values():
+        yield from _named(name)
+
+
+def _named(name: Located[str]) -> Iterator[Diagnostic]:
+    file = PurePath(name.span.file.path)
+    if file.suffix in _SUFFIXES and file.stem != name.value and not is_unresolved(name.value):
         yield Diagnostic(
             RULE,
-            f"node type '{system.name}' is in a file named '{file.name}'",
-            system.name.span,
-            hint=f"write 'node: {file.stem}', or rename the file to '{system.name}{file.suffix}'",
+            f"node type '{name}' is in a file named '{file.name}'",
+            name.span,
+            hint=f"write 'node: {file.stem}', or rename the file to '{name}{file.suffix}'",
         )

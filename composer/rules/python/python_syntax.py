@@ -1,4 +1,4 @@
-"""A behavior whose module is not valid Python."""
+"""A behavior or class whose module is not valid Python."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context
+from composer.analysis.hosted_classes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 
 RULE = register(
@@ -13,7 +14,7 @@ RULE = register(
         code="RC441",
         name="python-syntax",
         severity=Severity.ERROR,
-        summary="The module of a behavior is not valid Python.",
+        summary="The module of a behavior or class is not valid Python.",
         why=(
             "The node cannot be created. The module is compiled and not executed, so that all "
             "errors of Python's compiler are found, such as 'await' outside an async function."
@@ -48,9 +49,11 @@ class Counter:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Report the first error of each module."""
-    for _, source in context.once(behaviors):
+    behaviors_of_nodes = ((source, "behavior") for _, source in context.once(behaviors))
+    classes = ((found.source, "class") for found in context.once(hosted_classes))
+    for source, what in (*behaviors_of_nodes, *classes):
         if source.problem is not None and source.problem_span is not None:
-            label = Label(source.reference.text.span, "the behavior of this node")
+            label = Label(source.reference.text.span, f"the {what} of this node")
             yield Diagnostic(
                 RULE,
                 f"module '{source.reference.module}' {source.problem}",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 
-from composer.analysis.context import Context
+from composer.analysis.context import Context, location
 from composer.analysis.formatting import port_name
+from composer.analysis.qos_conflicts import QosConflict, qos_conflicts
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import Channel, ChannelKind, PortOfNode
-from composer.qos import Incompatibility, QosProfile, incompatibilities
+from composer.model import Channel
 
 RULE = register(
     Rule(
@@ -46,71 +45,47 @@ nodes:
 #: Maximum number of further endpoints to show for one problem.
 _SHOWN = 3
 
-Groups = Mapping[QosProfile, list[PortOfNode]]
-
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Compare the profiles on every channel, each pair of profiles once."""
+    """Compare the profiles on every channel, and report each cause once."""
     for channel in context.all_channels:
-        if channel.sources and channel.sinks and _one_type(channel):
-            sources, sinks = _by_profile(channel.sources), _by_profile(channel.sinks)
-            yield from _direction(channel, sources, sinks)
-            if channel.kind is not ChannelKind.TOPIC:
-                yield from _direction(channel, sinks, sources)
+        for conflicts in qos_conflicts(context, channel):
+            yield _diagnostic(channel, conflicts)
 
 
-def _one_type(channel: Channel) -> bool:
-    """Return whether all endpoints have one type; another rule reports different types."""
-    return len({endpoint.port.interface.value for endpoint in channel.ends}) == 1
-
-
-def _by_profile(endpoints: Iterable[PortOfNode]) -> Groups:
-    groups: dict[QosProfile, list[PortOfNode]] = defaultdict(list)
-    for endpoint in endpoints:
-        if endpoint.port.qos.known:
-            groups[endpoint.port.qos.profile].append(endpoint)
-    return groups
-
-
-def _direction(channel: Channel, offering: Groups, requesting: Groups) -> Iterator[Diagnostic]:
-    for offered, offers in offering.items():
-        for requested, requests in requesting.items():
-            problems = list(incompatibilities(offered, requested))
-            if problems:
-                yield _diagnostic(channel, problems, offers, requests)
-
-
-def _diagnostic(
-    channel: Channel,
-    problems: list[Incompatibility],
-    offers: list[PortOfNode],
-    requests: list[PortOfNode],
-) -> Diagnostic:
-    request, offer = requests[0], offers[0]
-    problem = problems[0]
-    policy = problem.policy
-    requested = " and ".join(f"{item.policy} {item.requested}" for item in problems)
-    offered = " and ".join(item.offered for item in problems)
-    hints = (f"offer {item.requested}, or request {item.offered}" for item in problems)
-    labels = [
-        Label(
-            endpoint.port.qos.policy_span(policy),
-            f"{endpoint.port.kind} '{port_name(endpoint)}' offers {problem.offered}",
-        )
-        for endpoint in offers[: 1 + _SHOWN]
-    ]
-    labels += [
-        Label(
-            endpoint.port.qos.policy_span(policy),
-            f"{endpoint.port.kind} '{port_name(endpoint)}' requests {problem.requested} too",
-        )
-        for endpoint in requests[1 : 1 + _SHOWN]
-    ]
-    return Diagnostic(
-        RULE,
-        f"{request.port.kind} '{port_name(request)}' requests {requested} on "
-        f"'{channel.name}', but {offer.port.kind} '{port_name(offer)}' offers {offered}",
-        request.port.qos.policy_span(policy),
-        tuple(labels),
-        "; ".join(hints),
+def _diagnostic(channel: Channel, conflicts: list[QosConflict]) -> Diagnostic:
+    first = conflicts[0]
+    offer, request = first.offers[0], first.requests[0]
+    wrong, other = (offer, request) if first.is_offer_wrong else (request, offer)
+    verbs = ("offers", "requests") if first.is_offer_wrong else ("requests", "offers")
+    pairs = [(item.policy, item.offered, item.requested) for item in first.problems]
+    if not first.is_offer_wrong:
+        pairs = [(policy, requested, offered) for policy, offered, requested in pairs]
+    message = (
+        f"{wrong.port.kind} '{port_name(wrong)}' {verbs[0]} "
+        f"{' and '.join(f'{policy} {value}' for policy, value, _ in pairs)} "
+        f"on '{channel.name}', but {other.port.kind} '{port_name(other)}' {verbs[1]} "
+        f"{' and '.join(value for _, _, value in pairs)}"
     )
+    hints = (f"offer {item.requested}, or request {item.offered}" for item in first.problems)
+    labels = [label for conflict in conflicts for label in _labels(conflict)]
+    return Diagnostic(RULE, message, first.place, tuple(labels), "; ".join(hints))
+
+
+def _labels(conflict: QosConflict) -> Iterator[Label]:
+    """Yield the other endpoints of a conflict, and where a shared profile sets the policy."""
+    policy, problem = conflict.policy, conflict.problems[0]
+    wrong = (conflict.offers if conflict.is_offer_wrong else conflict.requests)[0]
+    for verb, value, endpoints in (
+        ("offers", problem.offered, conflict.offers),
+        ("requests", problem.requested, conflict.requests),
+    ):
+        is_wrong = wrong is endpoints[0]
+        shown = endpoints[1 : 1 + _SHOWN] if is_wrong else endpoints[: 1 + _SHOWN]
+        for endpoint in shown:
+            text = f"{endpoint.port.kind} '{port_name(endpoint)}' {verb} {value}"
+            too = " too" if is_wrong else ""
+            yield Label(endpoint.port.qos.own_span(policy), f"{text}{too}")
+    shared = wrong.port.qos.policy_span(policy)
+    if location(shared) != location(wrong.port.qos.own_span(policy)):
+        yield Label(shared, f"{policy} is set here")

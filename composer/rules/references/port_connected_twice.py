@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
+from composer.analysis.context import Context, is_unresolved, location
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Connection, Endpoint
 
@@ -50,13 +50,16 @@ connections:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare each later connection of a port with its first one."""
     first: dict[str, tuple[Connection, Endpoint]] = {}
+    reported: set[tuple[str, int, int]] = set()  # a pattern stands for several ports
     for connection in context.system.connections:
         for endpoint in (*connection.sources, *connection.sinks):
             if context.system.port(endpoint) is None or is_unresolved(connection.name.value):
                 continue
             earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
             difference = _difference(earlier, connection)
-            if difference is not None:
+            later = location(endpoint.text.span)
+            if difference is not None and later not in reported:
+                reported.add(later)
                 yield Diagnostic(
                     RULE,
                     f"port '{endpoint.text}' is connected twice, with {difference}",

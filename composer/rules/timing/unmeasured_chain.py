@@ -52,8 +52,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Check the publishers of the chains."""
     for chain in context.system.chains:
         ports = map(context.system.port, chain.through)
-        if any(port is not None and port.kind is not PortKind.PUBLISHER for port in ports):
-            continue
+        if any(port is None or port.kind is not PortKind.PUBLISHER for port in ports):
+            continue  # other rules report these
         nodes = ((endpoint, context.system.node(endpoint.node)) for endpoint in chain.through)
         known = [(endpoint, node) for endpoint, node in nodes if node is not None]
         for endpoint, node in known:
