@@ -48,11 +48,21 @@ function main() {
     if (!load) {
       leave();
       place.replaceChildren(h("p", { class: "empty" }, `There is no view '${route.view}'.`));
+      place.removeAttribute("aria-busy");
       return;
     }
     frame.showView(route.view === "actions" ? "services" : route.view, route.name);
-    const module = await load();
-    if (route !== wanted) return;
+    // The view before stays until the module of the next one is loaded.
+    place.setAttribute("aria-busy", "true");
+    try {
+      const module = await load();
+      if (route === wanted) display(module, route);
+    } finally {
+      if (route === wanted) place.removeAttribute("aria-busy");
+    }
+  }
+
+  function display(module, route) {
     if (!made.has(module)) made.set(module, module.createView(app));
     const view = made.get(module);
     if (view !== shown) {

@@ -6,7 +6,6 @@ import csv
 import io
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,33 +13,20 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int32
 
-from tests.programs import require_package
 from tests.ros.dashboard.conftest import FILE
 from tests.ros.support.commands import hand_written, output_of
 from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.in_process import Peer, wait_until
-from tests.ros.support.pages import opened
+from tests.ros.support.pages import VIEWS, opened
 from tests.ros.support.system_process import REPOSITORY
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from playwright.sync_api import Browser, Locator, Page
 
 pytestmark = pytest.mark.browser
 PLANNER = "/planning/planner"
-VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
-DETAILS = (
-    f"nodes{PLANNER}",
-    f"graph{PLANNER}",
-    "topics/sensor_data",
-    "topics/lab/in?tab=publish",
-    f"parameters{PLANNER}",
-    "services/plan_trajectory",
-    "actions/lab/navigate",
-)
-#: What a view shows once its data has arrived.
-READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
-PACKAGES = Path(__file__).parents[2] / "browser"
-AXE = PACKAGES / "node_modules" / "axe-core" / "axe.min.js"
 
 
 @pytest.fixture
@@ -205,32 +191,6 @@ def test_fields_are_added_to_a_plot_with_the_keyboard(view: Page) -> None:
     assert plotted.count() == 1
 
 
-#: Marks the control with the focus; returns it if the focus cannot be seen there.
-FOCUS = """() => {
-    const one = document.activeElement;
-    one.dataset.reached = "true";
-    const isSeen = getComputedStyle(one).outlineStyle !== "none" || one.matches("body, .world *");
-    return isSeen ? "" : one.outerHTML.slice(0, 120);
-}"""
-#: Visible controls that the focus has not reached. In the diagram, the arrow keys move it.
-UNREACHED = """() => [...document.querySelectorAll("a[href], button, input, select, summary")]
-    .filter(one => one.checkVisibility() && !one.disabled && one.tabIndex >= 0)
-    .filter(one => !one.dataset.reached)
-    .map(one => one.outerHTML.slice(0, 120))"""
-MAX_TABS = 200
-
-
-def test_tab_reaches_every_control_and_the_focus_is_seen(view: Page) -> None:
-    for path in (*DETAILS, "topics/sensor_data?tab=info", "nodes?show=plan", "timing"):
-        visit(view, f"/{path}")
-        for _ in range(MAX_TABS):
-            view.keyboard.press("Tab")
-            assert view.evaluate(FOCUS) == "", path
-            if view.evaluate(UNREACHED) == []:
-                break
-        assert view.evaluate(UNREACHED) == [], path
-
-
 def test_images_are_shown(view: Page) -> None:
     with hand_written("hand_written_camera.py"):
         view.goto("/topics/camera?tab=image")
@@ -325,46 +285,6 @@ def test_the_log_is_filtered_and_leads_to_nodes(view: Page) -> None:
     expect_text(view.locator(".log li"), "driving to")
     view.click(".log li a >> nth=0")
     view.wait_for_url("**/nodes/control/motor_controller")
-
-
-def visit(page: Page, path: str) -> None:
-    """Go to a view as a link does, without loading the page again, and wait for its data."""
-    page.evaluate("path => history.pushState(null, '', path)", path)
-    page.evaluate("dispatchEvent(new PopStateEvent('popstate'))")
-    page.locator(READY).first.wait_for()
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_no_view_has_a_serious_accessibility_violation(
-    scheme: str, browser: Browser, server: Dashboard
-) -> None:
-    require_package(PACKAGES, "axe-core")
-    with opened(browser, server.address, color_scheme=scheme) as page:
-        page.evaluate(AXE.read_text(encoding="utf-8"))
-        for path in (*VIEWS, *DETAILS):
-            visit(page, f"/{path}")
-            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
-            serious = [
-                (path, violation["id"], [item["html"] for item in violation["nodes"]][:3])
-                for violation in found["violations"]
-                if violation["impact"] in ("serious", "critical")
-            ]
-            assert serious == []
-
-
-@pytest.mark.parametrize("width", [360, 768])
-def test_no_view_is_wider_than_the_screen(width: int, browser: Browser, server: Dashboard) -> None:
-    with opened(browser, server.address, viewport={"width": width, "height": 800}) as page:
-        for path in (*VIEWS, *DETAILS):
-            visit(page, f"/{path}")
-            assert page.evaluate("document.scrollingElement.scrollWidth") <= width
-            cut = page.evaluate(
-                """() => [...document.querySelectorAll("#bar *, #rail a, .view-head *, .toolbar *")]
-                .filter(element => element.checkVisibility({contentVisibilityAuto: true}))
-                .filter(element => element.getBoundingClientRect().right > innerWidth + 1)
-                .map(element => element.outerHTML.slice(0, 80))"""
-            )
-            assert cut == [], path
 
 
 def test_a_lost_connection_is_made_again_and_read_only_has_no_buttons(

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 PATIENCE_MS = 60_000
+VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
+#: What a view shows once its data has arrived.
+_READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
 
 
 @contextmanager
@@ -38,3 +41,11 @@ def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]
         assert [url for url in requests if not url.startswith(own)] == []
     finally:
         context.close()
+
+
+def visit(page: Page, path: str) -> None:
+    """Go to a view as a link does, without loading the page again, and wait for its data."""
+    page.evaluate("path => history.pushState(null, '', path)", path)
+    page.evaluate("dispatchEvent(new PopStateEvent('popstate'))")
+    page.locator("#main:not([aria-busy])").wait_for()
+    page.locator(_READY).first.wait_for()
