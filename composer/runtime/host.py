@@ -45,6 +45,7 @@ from composer.runtime.executors.process_limits import (
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
+from composer.runtime.metrics.figures import merged_chains
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
@@ -75,7 +76,7 @@ _URGENT_S = 0.2
 _FEW_NODES = 20
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
 _SHORTEST_START_LIMIT_S = 5.0
-_GOALS_ARRIVE_WITHIN_S = 0.2
+_MESSAGES_ARRIVE_WITHIN_S = 0.2
 
 
 class Host:
@@ -318,12 +319,13 @@ class Host:
         stop_within_s = self._options.stop_within_s
         self._tear_down_end_s = time.monotonic() + stop_within_s
         self._node_set.limit_end(self._tear_down_end_s)
-        self._node_set.other_processes.drop_goals()
+        self._node_set.other_processes.on_stop()
         if self._is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._tear_down_end_s, limit_s):
                 self._failed = True
-        self._node_set.other_processes.wait_for_goals(time.monotonic() + _GOALS_ARRIVE_WITHIN_S)
+        end_s = time.monotonic() + _MESSAGES_ARRIVE_WITHIN_S
+        self._node_set.other_processes.wait_for_messages(end_s)
         self._summary = self._node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
             self._failed = True
@@ -355,14 +357,15 @@ class Host:
             manager.destroy()
 
     def _outcome(self) -> Outcome:
+        others = self._node_set.other_processes
         return Outcome(
             exit_code=1 if self._failed else 0,
             reason=self._stop_reason,
             elapsed_s=self._reporter.elapsed_s,
             nodes=self._summary,
             hung=self._is_left_to_exit,
-            callbacks=self._node_set.callbacks(),
-            chains=self._node_set.chains(),
+            callbacks=(*self._node_set.callbacks(), *others.callbacks()),
+            chains=merged_chains(self._node_set.chains(), others.chains()),
         )
 
     @property

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
 from composer.report.display import visible
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, merged_chains
 from composer.runtime.metrics.numbers import finite
 from composer.runtime.ros.diagnostic_arrays import read_array
 
@@ -165,15 +165,11 @@ def partial_report(name: str, content: bytes) -> PartialReport | None:
 def with_processes(report: SystemReport, others: Mapping[str, SystemReport]) -> SystemReport:
     """Return a report with the callbacks and chains of other processes, by their names."""
     of_others = (callback for other in others.values() for callback in other.callbacks)
-    chains = {chain.chain: chain for chain in report.chains}
-    for other in others.values():
-        for chain in other.chains:  # the process with all nodes of a chain measures it
-            if chain.chain in chains and chain.count > chains[chain.chain].count:
-                chains[chain.chain] = chain
+    chains = (chain for other in others.values() for chain in other.chains)
     return replace(
         report,
         callbacks=(*report.callbacks, *of_others),
-        chains=tuple(chains.values()),
+        chains=merged_chains(report.chains, chains),
         processes_at_s={name: other.callbacks_at_s for name, other in others.items()},
     )
 

@@ -135,7 +135,10 @@ class MemberNode(OutsideNode):
         try:
             result = self._process.request(self.full_name, transition, self._after)
             self._after = ()
-            await self._finish(result, reported)
+            try:
+                await self._finish(result, reported)
+            finally:
+                result.cancel()  # nothing waits for it any more
         finally:
             self._awaited = None
         self._reported, self._is_moving = goal, False

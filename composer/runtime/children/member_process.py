@@ -37,6 +37,8 @@ from composer.runtime.children.remote_lifecycle import PRIMARY_STATES
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.metrics.diagnostics import from_text
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.process.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import ALREADY_RUNS, STARTED_BY_VARIABLE, is_held
@@ -99,7 +101,11 @@ class MemberProcess:
         self._starting: Future[None] | None = None
         self._is_ending = False
         manager = f"{self._name}/{NAME}"
-        self.requests = MemberRequests(context.manager, context.loop, f"{manager}/{CHANGE_STATES}")
+        service = f"{manager}/{CHANGE_STATES}"
+        self.requests = MemberRequests(context.manager, context.loop, service, self._on_figures)
+        #: The timings of its callbacks and chains, once it was asked for them.
+        self.callbacks: tuple[CallbackFigures, ...] = ()
+        self.chains: tuple[ChainFigures, ...] = ()
         self._reports = context.manager.create_subscription(
             DiagnosticArray, f"{manager}/{STATE_TOPIC}", lambda _: None, STATE_QOS, raw=True
         )
@@ -138,6 +144,11 @@ class MemberProcess:
         """Let the process keep the goals of the system."""
         if self._life is not None and self._life.is_up:
             self.requests.keep(goals)
+
+    def ask_for_figures(self) -> None:
+        """Ask for the timings of callbacks and chains."""
+        if self._life is not None and self._life.is_up:
+            self.requests.ask_for_figures()
 
     def figures(self, node: str) -> NodeFigures:
         """Return the rates and counters of a node."""
@@ -307,10 +318,17 @@ class MemberProcess:
 
     def _on_response(self, life: _Life, node: str, done: Future[SetParametersResult]) -> None:
         """Ignore the reports of a node from before the end of its transition."""
+        if done.cancelled():
+            return
         self.moved_s = monotonic()
         if done.exception() is None and done.result().successful:
             with suppress(ValueError):  # of another version
                 life.answered[node] = int(done.result().reason)
+
+    def _on_figures(self, text: str) -> None:
+        with suppress(ValueError):  # of another version
+            callbacks, self.chains = from_text(text)
+            self.callbacks = tuple(item for item in callbacks if item.node in self._members)
 
     def _life_of(self, report: MemberReport) -> _Life | None:
         """Return the life that a report belongs to; None if it is to be ignored."""

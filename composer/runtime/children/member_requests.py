@@ -6,7 +6,7 @@ most of them would be lost: a service keeps the last 10 that it has not taken ye
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -17,11 +17,14 @@ from rclpy.node import Node as RosNode
 
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.ros.manager_protocol import GOALS, LAST_STEPS, STEPS
+from composer.runtime.ros.manager_protocol import FIGURES, GOALS, LAST_STEPS, STEPS
 
 _MAX_STEPS = 500  # per request; a service takes up to 1000
 _MAX_REQUESTS = 8
 _POLL_S = 0.01
+#: A request without steps is answered at once, unless it or its response is lost: rmw drops a
+#: response if it has not discovered the client yet.
+_ANSWERED_WITHIN_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,17 +33,36 @@ class _Wanted:
     result: Future[SetParametersResult] = field(default_factory=Future)
 
 
+@dataclass(frozen=True, slots=True)
+class _Sent:
+    """A request on its way: steps, or goals of the system and whether it asks for figures."""
+
+    batch: Sequence[_Wanted]
+    goals: str = ""
+    figures: bool = False
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether a result of a step is still waited for."""
+        return any(not wanted.result.done() for wanted in self.batch)
+
+
 class MemberRequests:
     """The client of the service ``change_states`` of a process. Use it on ``loop``."""
 
-    def __init__(self, ros: RosNode, loop: Loop, service: str) -> None:
+    def __init__(
+        self, ros: RosNode, loop: Loop, service: str, on_figures: Callable[[str], None]
+    ) -> None:
+        """``on_figures(text)`` receives the timings that were requested."""
         self._ros = ros
         self._loop = loop
         self._client = ros.create_client(SetParameters, service)
+        self._on_figures = on_figures
         self._holds = 0
         self._unsent: list[_Wanted] = []
         self._unsent_goals = ""
-        self._sent: dict[Any, tuple[Sequence[_Wanted], str]] = {}  # with the goals of the system
+        self._wants_figures = False
+        self._sent: dict[Any, _Sent] = {}
         #: Whether the process ends after the next requests.
         self.are_last = False
         loop.add_client(self._client)
@@ -48,11 +70,12 @@ class MemberRequests:
     def request(
         self, node: str, transition: str, after: Sequence[str] = ()
     ) -> Future[SetParametersResult]:
-        """Request a transition; return the future of its result.
+        """Request a transition; return the future of its result, which may be canceled.
 
         It begins after the transitions of the nodes ``after`` that were requested before.
         """
         wanted = _Wanted(" ".join((transition, node, *after)))
+        wanted.result.add_done_callback(self._on_result)
         self._unsent.append(wanted)
         if len(self._unsent) == 1:  # otherwise, sending is due already
             self._loop.call_soon(self._send)
@@ -63,18 +86,21 @@ class MemberRequests:
 
         It may be lost: reports say which goals the process keeps.
         """
-        if goals not in self._goals_on_their_way:
+        on_their_way = (self._unsent_goals, *(sent.goals for sent in self._sent.values()))
+        if goals not in on_their_way:
             self._unsent_goals = goals
             self._loop.call_soon(self._send)
 
-    @property
-    def has_goals(self) -> bool:
-        """Whether goals of the system are on their way."""
-        return any(self._goals_on_their_way)
+    def ask_for_figures(self) -> None:
+        """Request the timings of the callbacks and chains of the process."""
+        self._wants_figures = True
+        self._loop.call_soon(self._send)
 
     @property
-    def _goals_on_their_way(self) -> Sequence[str]:
-        return self._unsent_goals, *(goals for _, goals in tuple(self._sent.values()))
+    def has_messages(self) -> bool:
+        """Whether goals of the system, or a request for timings, are on their way. Thread-safe."""
+        is_unsent = bool(self._unsent_goals) or self._wants_figures
+        return is_unsent or any(sent.goals or sent.figures for sent in tuple(self._sent.values()))
 
     def hold(self) -> None:
         """Collect requests until :meth:`release`. Thread-safe."""
@@ -86,12 +112,12 @@ class MemberRequests:
 
     def fail(self, error: Exception) -> None:
         """End all requests with an exception: the process has ended."""
-        open_ = [*self._unsent, *(wanted for batch, _ in self._sent.values() for wanted in batch)]
+        open_ = [*self._unsent, *(wanted for sent in self._sent.values() for wanted in sent.batch)]
         for pending in self._sent:
             self._client.remove_pending_request(pending)
         self._unsent.clear()
         self._sent.clear()
-        self._unsent_goals = ""
+        self._unsent_goals, self._wants_figures = "", False
         for wanted in open_:
             wanted.result.set_exception(error)
 
@@ -106,7 +132,7 @@ class MemberRequests:
 
     def _send(self) -> None:
         while (
-            (self._unsent or self._unsent_goals)
+            (self._unsent or self._unsent_goals or self._wants_figures)
             and not self._holds
             and len(self._sent) < _MAX_REQUESTS
         ):
@@ -114,29 +140,63 @@ class MemberRequests:
                 if self._unsent:
                     self._loop.call_later(_POLL_S, self._send)
                 return
-            batch, self._unsent = self._unsent[:_MAX_STEPS], self._unsent[_MAX_STEPS:]
-            goals, self._unsent_goals = self._unsent_goals, ""
-            pending = self._client.call_async(self._message(batch, goals))
-            self._sent[pending] = batch, goals
-            pending.add_done_callback(partial(self._on_response, batch))
+            sent = self._next()
+            pending = self._client.call_async(self._message(sent))
+            self._sent[pending] = sent
+            pending.add_done_callback(self._on_response)
+            if not sent.batch:
+                self._loop.call_later(_ANSWERED_WITHIN_S, partial(self._forget, pending))
 
-    def _message(self, batch: Sequence[_Wanted], goals: str) -> SetParameters.Request:
+    def _next(self) -> _Sent:
+        """Return the next request: a message, which is answered at once, or steps."""
+        if self._unsent_goals or self._wants_figures:
+            sent = _Sent((), self._unsent_goals, self._wants_figures)
+            self._unsent_goals, self._wants_figures = "", False
+            return sent
+        batch, self._unsent = self._unsent[:_MAX_STEPS], self._unsent[_MAX_STEPS:]
+        return _Sent(batch)
+
+    def _forget(self, pending: Any) -> None:
+        """Wait no longer for the response to a request."""
+        if self._sent.pop(pending, None) is not None:
+            self._client.remove_pending_request(pending)
+            self._send()
+
+    def _on_result(self, result: Future[SetParametersResult]) -> None:
+        if result.cancelled():
+            self._loop.call_soon(self._forget_canceled)
+
+    def _forget_canceled(self) -> None:
+        """Forget steps that nothing waits for any more: their responses may have been lost."""
+        self._unsent = [wanted for wanted in self._unsent if not wanted.result.done()]
+        for pending, sent in tuple(self._sent.items()):
+            if sent.batch and not sent.is_awaited:
+                self._forget(pending)
+
+    def _message(self, sent: _Sent) -> SetParameters.Request:
         value = ParameterValue(
             type=ParameterType.PARAMETER_STRING_ARRAY,
-            string_array_value=[wanted.step for wanted in batch],
+            string_array_value=[wanted.step for wanted in sent.batch],
         )
         name = LAST_STEPS if self.are_last else STEPS
         parameters = [Parameter(name=name, value=value)]
-        if goals:
-            text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=goals)
+        if sent.goals:
+            text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=sent.goals)
             parameters.append(Parameter(name=GOALS, value=text))
+        if sent.figures:
+            yes = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True)
+            parameters.append(Parameter(name=FIGURES, value=yes))
         return SetParameters.Request(parameters=parameters)
 
-    def _on_response(self, batch: Sequence[_Wanted], pending: Any) -> None:
-        if self._sent.pop(pending, None) is None:
+    def _on_response(self, pending: Any) -> None:
+        sent = self._sent.pop(pending, None)
+        if sent is None:
             return
-        for wanted, result in zip(batch, pending.result().results, strict=False):
+        results = pending.result().results
+        for wanted, result in zip(sent.batch, results, strict=False):
             wanted.result.set_result(result)
-        for wanted in batch:  # without a result, the request was refused as a whole
+        for wanted in sent.batch:  # without a result, the request was refused as a whole
             wanted.result.set_result(SetParametersResult(successful=False, reason="refused"))
+        if sent.figures and results:
+            self._on_figures(results[-1].reason)
         self._send()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 
 from composer.model import PrimaryState, System
@@ -15,6 +15,7 @@ from composer.runtime.children.kept_goals import KeptGoals
 from composer.runtime.children.member_context import MemberContext
 from composer.runtime.children.member_process import MemberProcess
 from composer.runtime.executors.loop import Loop
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.addresses import is_this_computer
 
@@ -106,16 +107,29 @@ class OtherProcesses:
         if self._processes:
             self._send(self._goals.change(goals, activity))
 
-    def drop_goals(self) -> None:
-        """Let the next coordinating process start the system as the first one did."""
+    def on_stop(self) -> None:
+        """Ask for timings; let the next coordinating process start the system as the first one."""
+        for process in self._all:
+            self._loop.call_soon(process.ask_for_figures)
         self._send(self._goals.stop())
 
-    def wait_for_goals(self, end_s: float) -> None:
-        """Wait until the processes have received their goals, or until ``end_s`` (monotonic)."""
-        while any(process.requests.has_goals for process in self._all):
+    def wait_for_messages(self, end_s: float) -> None:
+        """Wait until the messages of :meth:`on_stop` are answered, or ``end_s`` (monotonic)."""
+        if self._processes:
+            with suppress(TimeoutError, RuntimeError):  # until the loop has prepared the messages
+                self._loop.run(lambda: None, max(0.0, end_s - time.monotonic()))
+        while any(process.requests.has_messages for process in self._all):
             if time.monotonic() > end_s:
                 return
             time.sleep(_POLL_S)
+
+    def callbacks(self) -> tuple[CallbackFigures, ...]:
+        """Return the timings of callbacks that the processes have sent."""
+        return tuple(item for process in self._all for item in process.callbacks)
+
+    def chains(self) -> tuple[ChainFigures, ...]:
+        """Return the latencies of chains that the processes have sent."""
+        return tuple(item for process in self._all for item in process.chains)
 
     def _send(self, goals: str | None) -> None:
         if goals is not None:

@@ -19,7 +19,7 @@ from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
-from composer.runtime.ros.manager_protocol import CHANGE_STATES, GOALS, LAST_STEPS
+from composer.runtime.ros.manager_protocol import CHANGE_STATES, FIGURES, GOALS, LAST_STEPS
 
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
@@ -33,7 +33,8 @@ class MemberCallbacks:
     None. ``report_number()`` returns the number of the last report of the states.
     ``publish_states()`` is called once nodes are shut down: the coordinating process waits for
     their last counters. ``expect_end()`` is called if the process ends after the steps of a
-    request. ``keep_goals(text)`` receives the goals of the whole system.
+    request. ``keep_goals(text)`` receives the goals of the whole system. ``figures()`` returns the
+    timings of callbacks and chains as text.
     """
 
     nodes: Nodes
@@ -42,6 +43,7 @@ class MemberCallbacks:
     publish_states: Callable[[], None]
     expect_end: Callable[[], None]
     keep_goals: Callable[[str], None]
+    figures: Callable[[], str]
 
 
 class MemberService:
@@ -76,6 +78,9 @@ class MemberService:
             for change in changes:
                 outcome = None if change is None else await change
                 response.results.append(self._result(outcome))
+            if any(parameter.name == FIGURES for parameter in request.parameters):
+                text = self._callbacks.figures()
+                response.results.append(SetParametersResult(successful=True, reason=text))
         finally:
             reply(response)
         if any(step[:1] == [_SHUTDOWN] for step in steps):

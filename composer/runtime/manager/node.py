@@ -45,7 +45,7 @@ from composer.runtime.manager.other_instances import Instance, OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.manager.status_messages import status_message
-from composer.runtime.metrics.diagnostics import Figures, to_statuses
+from composer.runtime.metrics.diagnostics import Figures, to_statuses, to_text
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
@@ -183,6 +183,7 @@ class ManagerNode:
                 self._publish,
                 host.expect_end,
                 status.keep_goals,
+                self._figures_text,
             )
             MemberService(self._node, self._loop, callbacks)
         if any(node.left_to_manager for node in status.snapshot().nodes):
@@ -280,6 +281,10 @@ class ManagerNode:
 
     def _on_query_error(self, error: Exception) -> None:
         self._node.get_logger().error(f"cannot answer a query of a command: {error!r}")
+
+    def _figures_text(self) -> str:
+        called = (item for item in self._host.callbacks() if item.count or item.dropped)
+        return to_text((*self._host.chains(), *called))
 
     def _publish_callbacks(self) -> None:
         figures: tuple[Figures, ...] = (

@@ -1,8 +1,9 @@
-"""Converts figures of callbacks and chains to and from diagnostic statuses."""
+"""Converts figures of callbacks and chains to and from diagnostic statuses, and text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import json
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -25,12 +26,32 @@ def from_statuses(
 
     Raises ValueError, KeyError or TypeError for any others.
     """
-    values = [
-        {key: _TYPES[key](value) for key, value in status.values.items()} for status in statuses
-    ]
+    return _from_values(status.values for status in statuses)
+
+
+def to_text(figures: Iterable[Figures]) -> str:
+    """Return callbacks and chains as text, without histograms."""
+    values = [status.values for status in to_statuses("", figures)]
+    for item in values:
+        item.pop("histogram", None)
+    return json.dumps(values)
+
+
+def from_text(text: str) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
+    """Return the callbacks and chains of a text of :func:`to_text`. Raises ValueError."""
+    try:
+        return _from_values(json.loads(text))
+    except (KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError("not the timings of this version") from error
+
+
+def _from_values(
+    values: Iterable[Mapping[str, str]],
+) -> tuple[tuple[CallbackFigures, ...], tuple[ChainFigures, ...]]:
+    typed = [{key: _TYPES[key](value) for key, value in item.items()} for item in values]
     return (
-        tuple(CallbackFigures(**item) for item in values if "chain" not in item),
-        tuple(ChainFigures(**item) for item in values if "chain" in item),
+        tuple(CallbackFigures(**item) for item in typed if "chain" not in item),
+        tuple(ChainFigures(**item) for item in typed if "chain" in item),
     )
 
 

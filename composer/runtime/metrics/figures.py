@@ -99,6 +99,17 @@ def chain_figures(statistics: ChainStatistics) -> ChainFigures:
     )
 
 
+def merged_chains(
+    chains: Iterable[ChainFigures], of_others: Iterable[ChainFigures]
+) -> tuple[ChainFigures, ...]:
+    """Return chains as other processes know them: the one with all nodes of a chain measures it."""
+    merged = {chain.chain: chain for chain in chains}
+    for chain in of_others:
+        if chain.chain in merged and chain.count > merged[chain.chain].count:
+            merged[chain.chain] = chain
+    return tuple(merged.values())
+
+
 @dataclass(frozen=True, slots=True)
 class CallbackRates:
     """A callback between two snapshots: calls per second, and the share of one thread in use."""

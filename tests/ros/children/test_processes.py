@@ -83,8 +83,13 @@ def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
         wait_until(lambda: system.node("detector").state == "inactive", "the state")
         assert peer.change("/lab/detector", "activate")
         wait_until(lambda: system.node("detector").state == "active", "the state")
-        assert system.stop().exit_code == 0
+        outcome = system.stop()
+        assert outcome.exit_code == 0
         assert not system.reported(NodeFailed)
+        called = {callback.node: callback for callback in outcome.callbacks if callback.count}
+        assert called.keys() == {"/lab/camera", "/lab/detector", "/lab/arm"}
+        assert called["/lab/camera"].callback == "timer 'tick'"
+        assert called["/lab/detector"].total_ms > 0.0
     wait_until(lambda: not all_alive(set(pids)), "the end of the processes")
 
 
