@@ -284,7 +284,10 @@ class Host:
             self._main_queue.put(command)
 
     def _recreate(self, node: ManagedNode) -> str | None:
-        return self._node_set.recreate(node.model.name.value, lambda: False)
+        name = node.model.name.value
+        problem = self._node_set.recreate(name, lambda: False)
+        self._status.update_states({name: self._node_set.nodes[name].state})
+        return problem
 
     def _on_older_instance(self, namespace: str, instance: Instance) -> None:
         if not self._main_queue.stopping:

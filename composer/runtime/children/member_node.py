@@ -27,6 +27,7 @@ from composer.runtime.children.remote_lifecycle import GOALS, PRIMARY_STATES
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import within
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.ros.manager_protocol import CREATE
 
 #: A report follows a successful response soon; each second there is one in any case.
 _REPORTED_WITHIN_S = 2.0
@@ -94,6 +95,31 @@ class MemberNode(OutsideNode):
         self._after = after
         return await self.run_step(transition, is_outdated)
 
+    async def create_again(self, is_outdated: Callable[[], bool]) -> str | None:
+        """Let its process create it again if it is finalized; return why that failed, or None.
+
+        Without its process, there is no node, and the next process creates it.
+        """
+        await self._lock.acquire()
+        try:
+            if self._state != FINALIZED or is_outdated():
+                return None
+            if self._reported == FINALIZED:
+                with suppress(ProcessUnavailable):
+                    result = self._process.request(self.full_name, CREATE)
+                    try:
+                        await self._wait_for(result)
+                    finally:
+                        result.cancel()
+                    response = result.result()
+                    if not response.successful:
+                        return f"cannot be created again: {response.reason}"
+            self._reported = self._state = UNCONFIGURED
+            self._is_moving = self._has_failed = False
+            return None
+        finally:
+            self._lock.release()
+
     async def _work(self, transition: str) -> None:
         try:
             if transition == "configure":
@@ -160,7 +186,7 @@ class MemberNode(OutsideNode):
             with suppress(TimeoutError):
                 await within(self.loop, reported, max(0.0, wait_s))
 
-    async def _wait_for(self, future: Future[None]) -> None:
+    async def _wait_for(self, future: Future[Any]) -> None:
         """Wait while nodes of the process move: this one may have to wait for others.
 
         Raises ProcessUnavailable.

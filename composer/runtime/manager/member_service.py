@@ -19,7 +19,7 @@ from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
-from composer.runtime.ros.manager_protocol import CHANGE_STATES, FIGURES, GOALS, LAST_STEPS
+from composer.runtime.ros.manager_protocol import CHANGE_STATES, CREATE, FIGURES, GOALS, LAST_STEPS
 
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
@@ -116,11 +116,13 @@ class MemberService:
 
         The coordinating process configures one only to restart it, or to bring the system up.
         """
-        if transition == _CONFIGURE and node.state == FINALIZED:
+        if transition in (_CONFIGURE, CREATE) and node.state == FINALIZED:
             problem = self._callbacks.recreate(node)
             if problem is not None:
                 return TransitionOutcome(transition, FINALIZED, success=False, reason=problem)
             node = self._callbacks.nodes()[node.full_name]
+        if transition == CREATE:
+            return TransitionOutcome(transition, node.state, success=True)
         return await node.lifecycle.change(transition)
 
     def _forget(self, name: str, change: Future[TransitionOutcome]) -> None:

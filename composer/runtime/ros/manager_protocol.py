@@ -18,10 +18,12 @@ CHANGE_STATE = "change_state"
 #: requested before. The only standard service with results for each: why it failed, or the number
 #: of the last report on ``state`` that may not include it. The parameter ``goals`` has what is
 #: requested of the whole system, which the process keeps and reports: see ``plan/system_goals.py``.
+#: The step ``create /arm`` creates a finalized node again, which is unconfigured then.
 #: With the parameter ``figures``, a last result has the timings of callbacks and chains as its
 #: reason, as JSON: see ``metrics/diagnostics.py``.
 CHANGE_STATES = "change_states"
 STEPS = "steps"
+CREATE = "create"
 LAST_STEPS = "last_steps"
 GOALS = "goals"
 FIGURES = "figures"

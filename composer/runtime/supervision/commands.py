@@ -175,6 +175,7 @@ class Commands:
             if names is not None and name not in names:
                 continue
             problem = self.node_set.recreate(name, partial(self.supervisor.has_moved, name, since))
+            self.status.update_states({name: self.node_set.nodes[name].state})
             if problem is not None:
                 return f"{node.full_name}: {problem}"
         return None

@@ -223,12 +223,20 @@ class NodeSet:
     def recreate(self, name: str, is_outdated: Callable[[], bool]) -> str | None:
         """Replace a finalized node by a new one: no transition leaves *finalized*.
 
+        A node of another process is created again there.
+
         If ``is_outdated()`` on the loop of the node, do nothing. Return why the node cannot be
         created, or None.
         """
         node = self.nodes[name]
         if node.state != FINALIZED:
             return None
+        if isinstance(node, MemberNode):
+            created = node.loop.run_task(node.create_again(is_outdated))
+            if not node.loop.wait_for(created, _RECREATED_WITHIN_S):
+                created.cancel()
+                return "cannot be created again: its process does not respond"
+            return created.result()
         try:
             node.loop.run(partial(self._replace, name, is_outdated), _RECREATED_WITHIN_S)
         except Exception as error:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from lifecycle_msgs.srv import GetState
+from std_srvs.srv import Trigger
 
 from composer.runtime.supervision.events import NodeFailed, Restarted, RollingBack
 from tests.ros.children.split_robot import TEXT, split, states
@@ -144,6 +145,23 @@ def test_a_process_with_a_blocked_node_is_started_again(tmp_path: Path, peer: Pe
         assert "on_image" in failed.reason
         assert pid_of(system, "detector") != process
         assert not alive(process)
+
+
+def test_a_reset_creates_a_node_that_was_shut_down_again(tmp_path: Path, peer: Peer) -> None:
+    """In its process, not only in the reports of the coordinating one."""
+    with split(tmp_path) as system:
+        process = pid_of(system, "detector")
+        assert peer.change("/lab/detector", "shutdown")
+        wait_until(lambda: system.node("detector").state == "finalized", "the state")
+        finalized = peer.servers("/lab/detector/get_state")
+        assert peer.call(Trigger, "/lab/robot/manager/reset").success
+        assert states(system) == {"unconfigured"}
+        wait_until(lambda: peer.servers("/lab/detector/get_state") - finalized, "the new node")
+        assert peer.state("/lab/detector") == "unconfigured"
+        assert peer.call(Trigger, "/lab/robot/manager/startup").success
+        assert states(system) == {"active"}
+        assert pid_of(system, "detector") == process
+        assert not system.reported(NodeFailed)
 
 
 def test_a_bring_up_over_processes_is_rolled_back(tmp_path: Path) -> None:
