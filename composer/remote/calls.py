@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -15,7 +14,7 @@ from rclpy.task import Future
 from composer.fast_dataclass import dataclass
 from composer.remote.graph_names import type_mismatch_hint
 from composer.remote.messages.values import build_message, class_of
-from composer.remote.requests import ServiceCaller
+from composer.remote.requests import ServiceCaller, wait_until_known
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
 
 _STATUS = {
@@ -64,11 +63,11 @@ def call_service(session: Session, deadline: Deadline, request: ServiceRequest) 
     """
     service = class_of(request.type_name, "service")
     message = build_message(request.request, service.Request, "the request")
-    with closing(ServiceCaller(session, retry_after_s=math.inf)) as caller:
+    with closing(ServiceCaller(session)) as caller:
         next_s = time.monotonic()
         while True:
             try:
-                yield caller.call(service, request.name, message, deadline)
+                yield caller.call_once(service, request.name, message, deadline)
             except NoResponseError as error:
                 hint = type_mismatch_hint(session, "service", request.name, request.type_name)
                 raise NoResponseError(str(error), hint) from error
@@ -159,6 +158,8 @@ def send_goal(session: Session, deadline: Deadline, request: GoalRequest) -> Ite
         is_ready = session.wait_for(
             lambda: client.server_is_ready() or request.should_stop() or None, deadline
         )
+        if client.server_is_ready():
+            wait_until_known(session, f"{name}/_action/send_goal", deadline)
         if request.should_stop():
             raise KeyboardInterrupt
         if not is_ready:

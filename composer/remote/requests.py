@@ -1,4 +1,10 @@
-"""Service calls of commands. Reads are retried every second; writes are sent once."""
+"""Service calls of commands. Reads are retried every second; writes are sent once.
+
+A server of rmw_fastrtps waits 0.1 s for a client that it has not discovered yet, and then drops the
+response without an error. It has discovered the client when a retry arrives. A request that is sent
+once waits for that before: a process announces its clients in order, so a server that responds to a
+later client of this process has discovered the earlier ones.
+"""
 
 from __future__ import annotations
 
@@ -8,29 +14,34 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from typing import Any, TypeAlias
 
+from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.task import Future
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from composer.names import join_node_name
 from composer.remote.session import Deadline, NoResponseError, Session
+from composer.runtime.ros.graph import participant
 
-#: A server of rmw_fastrtps waits 0.1 s for a client that it has not discovered yet, and then drops
-#: the response without an error. It has discovered the client when the retry arrives.
 _RETRY_AFTER_S = 1.0
+#: A process that does not respond for so long is busy, and has discovered the client long ago.
+_KNOWN_WITHIN_S = 2.0
+#: A service that most nodes have, and that changes nothing.
+_READ_SERVICE = "get_parameters"
+_READ_TYPE = "rcl_interfaces/srv/GetParameters"
 
 #: How to send a request: :func:`call_with_retries` or :func:`call_once`.
 Call: TypeAlias = Callable[[Session, Any, str, Any, Deadline], Any]
 
 
 class ServiceCaller:
-    """Calls services. Clients are slow to create, so they are kept until ``close``.
+    """Calls services. Clients are slow to create, so they are kept until ``close``."""
 
-    A request without a response is sent again every ``retry_after_s`` seconds.
-    """
-
-    def __init__(self, session: Session, retry_after_s: float = _RETRY_AFTER_S) -> None:
+    def __init__(self, session: Session) -> None:
         self._session = session
-        self._retry_after_s = retry_after_s
         self._clients: dict[str, Client] = {}
+        #: The processes with a service that have discovered its client.
+        self._knowing: dict[str, frozenset[bytes]] = {}
 
     def close(self) -> None:
         """Destroy all clients."""
@@ -41,9 +52,27 @@ class ServiceCaller:
     def call_all(
         self, service: Any, requests: Mapping[str, Any], deadline: Deadline
     ) -> dict[str, Any]:
-        """Return the response of each service, None for those that did not respond in time."""
+        """Return the response of each service, None for those that did not respond in time.
+
+        A request without a response is sent again every second.
+        """
+        return self._call(service, requests, deadline, _RETRY_AFTER_S)
+
+    def call_once(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
+        """Return the response to a request that is sent only once. Raises NoResponseError."""
+        client = self._client(service, name)
+        if self._session.wait_for(lambda: client.service_is_ready() or None, deadline):
+            servers = frozenset(map(participant, _servers(self._session, name)))
+            if servers != self._knowing.get(name):
+                wait_until_known(self._session, name, deadline)
+                self._knowing[name] = servers
+        return _required(self._call(service, {name: request}, deadline, math.inf), deadline)
+
+    def _call(
+        self, service: Any, requests: Mapping[str, Any], deadline: Deadline, retry_after_s: float
+    ) -> dict[str, Any]:
         calls = {
-            name: _PendingCall(self._client(service, name), request, self._retry_after_s)
+            name: _PendingCall(self._client(service, name), request, retry_after_s)
             for name, request in requests.items()
         }
         try:
@@ -58,19 +87,25 @@ class ServiceCaller:
             for call in calls.values():
                 call.cancel()
 
-    def call(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
-        """Return the response of one service. Raises NoResponseError."""
-        response = self.call_all(service, {name: request}, deadline)[name]
-        if response is None:
-            raise NoResponseError(
-                f"service '{name}' did not respond within {deadline.timeout_s:g} s"
-            )
-        return response
-
     def _client(self, service: Any, name: str) -> Client:
         if name not in self._clients:
             self._clients[name] = self._session.node.create_client(service, name)
         return self._clients[name]
+
+
+def wait_until_known(session: Session, service: str, deadline: Deadline) -> bool:
+    """Wait until the server of a service has discovered all clients that the session has created.
+
+    The server must be discovered. Return False if that is not certain: its process has no parameter
+    services, or does not respond for some seconds.
+    """
+    read_service = _read_service(session, service)
+    if read_service is None:
+        return False
+    limit = Deadline(min(_KNOWN_WITHIN_S, deadline.left_s))
+    request = GetParameters.Request()
+    responses = call_all_with_retries(session, GetParameters, [read_service], request, limit)
+    return responses[read_service] is not None
 
 
 def call_all_with_retries(
@@ -85,8 +120,8 @@ def call_with_retries(
     session: Session, service: Any, name: str, request: Any, deadline: Deadline
 ) -> Any:
     """Return the response to a request that changes nothing. Raises NoResponseError."""
-    with closing(ServiceCaller(session)) as caller:
-        return caller.call(service, name, request, deadline)
+    responses = call_all_with_retries(session, service, [name], request, deadline)
+    return _required(responses, deadline)
 
 
 def call_once(session: Session, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
@@ -94,8 +129,36 @@ def call_once(session: Session, service: Any, name: str, request: Any, deadline:
 
     Raises NoResponseError; the server may have handled the request nevertheless.
     """
-    with closing(ServiceCaller(session, retry_after_s=math.inf)) as caller:
-        return caller.call(service, name, request, deadline)
+    with closing(ServiceCaller(session)) as caller:
+        return caller.call_once(service, name, request, deadline)
+
+
+def _required(responses: Mapping[str, Any], deadline: Deadline) -> Any:
+    """Return the response of the only service. Raises NoResponseError."""
+    ((name, response),) = responses.items()
+    if response is None:
+        raise NoResponseError(f"service '{name}' did not respond within {deadline.timeout_s:g} s")
+    return response
+
+
+def _servers(session: Session, service: str) -> list[TopicEndpointInfo]:
+    """Return the endpoints that receive the requests to a service."""
+    return session.node.get_subscriptions_info_by_topic(f"rq{service}Request", no_mangle=True)
+
+
+def _read_service(session: Session, service: str) -> str | None:
+    """Return a service of the same process that changes nothing; of the same node if it has one."""
+    servers = _servers(session, service)
+    processes = set(map(participant, servers))
+    own = {
+        f"{join_node_name(server.node_namespace, server.node_name)}/{_READ_SERVICE}"
+        for server in servers
+    }
+    known = [name for name, types in session.graph.services() if _READ_TYPE in types]
+    for name in sorted(known, key=own.__contains__, reverse=True):
+        if not processes.isdisjoint(map(participant, _servers(session, name))):
+            return name
+    return None
 
 
 class _PendingCall:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import closing
 from typing import Any
 
@@ -44,9 +43,9 @@ def call_serialized(
     """Return the response of a service. Raises InvalidValueError, NoResponseError."""
     service_class = class_of(type_name, "service")
     message = _message(request, service_class.Request, f"{type_name}_Request")
-    with closing(ServiceCaller(session, retry_after_s=math.inf)) as caller:
+    with closing(ServiceCaller(session)) as caller:
         try:
-            response = caller.call(service_class, service, message, deadline)
+            response = caller.call_once(service_class, service, message, deadline)
         except NoResponseError as error:
             hint = type_mismatch_hint(session, "service", service, type_name)
             raise NoResponseError(str(error), hint) from error
