@@ -165,17 +165,9 @@ def is_held(name: str) -> bool:
         return False
     try:
         with _open_folder() as folder:
-            return _is_held_in(folder, _file_name(name, _SUFFIX))
+            return _holder_in(folder, _file_name(name, _SUFFIX)) is not None
     except (OSError, StartRefused):
         return False
-
-
-def _is_held_in(folder: int, file_name: str) -> bool:
-    descriptor = os.open(file_name, _OPEN_LOCK, dir_fd=folder)
-    try:
-        return not _is_locked(descriptor, fcntl.LOCK_SH)
-    finally:
-        os.close(descriptor)
 
 
 def socket_path(name: str) -> Path | None:
