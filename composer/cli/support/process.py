@@ -8,10 +8,11 @@ import select
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import BinaryIO, NoReturn, TextIO
+from typing import BinaryIO, NoReturn
 
 from composer.cli.support.errors import CommandError
 from composer.cli.support.output.c_streams import crash_fd
@@ -20,6 +21,7 @@ from composer.cli.support.output.line_format import CONSOLE_FORMAT_VARIABLE, fil
 #: Holds the file descriptor on which a background process reports that the system is up.
 READY_VARIABLE = "COMPOSE_READY_FD"
 _LOG_TAIL_LINES = 20
+_READ_BYTES = 4096
 _MIN_DELAY_S = 0.001
 _LAST_RESORT_S = 1.0
 
@@ -40,7 +42,7 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     log = _log_path(system)
     output = _new_file(log)
     reading, writing = os.pipe()
-    with os.fdopen(reading, encoding="utf-8") as pipe, output:
+    with os.fdopen(reading, "rb") as pipe, output:
         try:
             process = subprocess.Popen(  # noqa: S603 - this very program
                 [*compose_command(), "run", *arguments],
@@ -58,7 +60,7 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
         finally:
             os.close(writing)
         try:
-            report = _read_within(pipe, limit_s)
+            report = _read_within(pipe.fileno(), limit_s)
         except KeyboardInterrupt:
             process.terminate()
             process.wait()
@@ -114,10 +116,16 @@ def end_now(exit_code: int) -> NoReturn:
     os._exit(exit_code)
 
 
-def _read_within(pipe: TextIO, limit_s: float) -> str | None:
+def _read_within(pipe: int, limit_s: float) -> str | None:
     """Return what is written to a pipe until it is closed; None after ``limit_s`` seconds."""
-    ready, _, _ = select.select([pipe], [], [], limit_s)
-    return pipe.read() if ready else None
+    end_s = time.monotonic() + limit_s
+    received = b""
+    while select.select([pipe], [], [], max(0.0, end_s - time.monotonic()))[0]:
+        data = os.read(pipe, _READ_BYTES)
+        if not data:
+            return received.decode()
+        received += data
+    return None
 
 
 def _start_error(message: str, log: Path) -> CommandError:

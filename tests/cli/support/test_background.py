@@ -14,17 +14,26 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.process import run_in_background
 
 
+@pytest.mark.parametrize(
+    ("before", "limit_s"),
+    [
+        ("", 0.01),
+        ("os.write(int(os.environ['COMPOSE_READY_FD']), b'3 of')", 1.0),
+    ],
+    ids=["no report", "half a report"],
+)
 def test_a_process_that_does_not_report_is_killed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    before: str, limit_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     # Imported when Python starts, so the process always hangs.
-    (tmp_path / "sitecustomize.py").write_text("import time\ntime.sleep(60.0)\n")
+    hang = f"import os, time\n{before}\ntime.sleep(60.0)\n"
+    (tmp_path / "sitecustomize.py").write_text(hang)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(
-        CommandError, match=r"did not come up within 0\.01 s and was killed"
+        CommandError, match=rf"did not come up within {limit_s:g} s and was killed"
     ) as raised:
-        run_in_background("minimal", ["minimal"], 0.01)
+        run_in_background("minimal", ["minimal"], limit_s)
     (log,) = tmp_path.glob("minimal-*.log")
     assert f"full log: {log}" in raised.value.text()
     assert raised.value.exit_code == 1
