@@ -13,7 +13,7 @@ import typer
 
 from composer.cli.support.errors import CONFIG, FAILED, CommandError
 from composer.cli.support.output.terminal import say
-from composer.cli.support.system_arguments import load_system, system_file
+from composer.cli.support.system_arguments import runnable_system
 
 if TYPE_CHECKING:
     from composer.hosts.deployment import RemoteProcess
@@ -41,13 +41,13 @@ def load_for_hosts(
     use_sim_time: bool = False,
 ) -> tuple[LoadResult, System, Path]:
     """Return a system without errors, and its file relative to the project. Raises CommandError."""
-    path = system_file(text)
-    result = load_system(
-        path, shown=text, settings=settings, namespace=namespace, use_sim_time=use_sim_time
+    system, path, result = runnable_system(
+        text,
+        settings=settings,
+        namespace=namespace,
+        use_sim_time=use_sim_time,
+        exit_code=CONFIG,
     )
-    system = result.system
-    if system is None or not result.is_runnable:
-        raise typer.Exit(CONFIG)
     if not system.hosts:
         raise CommandError(
             f"system '{system.name}' has no 'hosts'", hint="see docs/guides/several-computers.md"

@@ -5,16 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from composer.cli.support.completion import complete_running_system
-from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.output.terminal import say, say_raw, use_color
 
 if TYPE_CHECKING:
     from composer.loading import LoadResult
+    from composer.model import System
 
 #: Suffixes of folders and files that are suggested for a mistyped path.
 _SUFFIXES = ("", ".yaml", ".yml")
@@ -190,6 +191,47 @@ def load_system(
     if reported:
         say_raw(render(reported, color=use_color(sys.stderr)))
     return result
+
+
+class RunnableSystem(NamedTuple):
+    """A system without errors, its file, and what else was read with it."""
+
+    system: System
+    path: Path
+    result: LoadResult
+
+
+def runnable_system(
+    text: str,
+    *,
+    settings: Iterable[str] = (),
+    namespace: str | None = None,
+    use_sim_time: bool = False,
+    only_errors: bool = False,
+    exit_code: int = FAILED,
+) -> RunnableSystem:
+    """Return the system of a SYSTEM argument; print its diagnostics as :func:`load_system` does.
+
+    Raises UsageError; CommandError or typer.Exit with ``exit_code`` if it is not runnable.
+    """
+    path = system_file(text)
+    result = load_system(
+        path,
+        shown=text,
+        settings=settings,
+        namespace=namespace,
+        use_sim_time=use_sim_time,
+        only_errors=only_errors,
+    )
+    if result.system is not None and result.system.node_type:
+        raise CommandError(
+            f"'{text}' is a node type, not a system",
+            hint="use it in a system under 'nodes:'; 'compose validate' checks it on its own",
+            exit_code=exit_code,
+        )
+    if result.system is None or not result.is_runnable:
+        raise typer.Exit(exit_code)
+    return RunnableSystem(result.system, path, result)
 
 
 def running_system_name(text: str) -> str:

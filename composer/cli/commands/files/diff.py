@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.errors import FAILED
 from composer.cli.support.options import (
     Autostart,
     AutostartOfRun,
@@ -22,7 +22,7 @@ from composer.cli.support.options import (
 from composer.cli.support.output.results import as_json
 from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.ros import ros_session
-from composer.cli.support.system_arguments import SystemName, load_system, system_file
+from composer.cli.support.system_arguments import SystemName, runnable_system
 
 if TYPE_CHECKING:
     from composer.drift import Drift, Snapshot
@@ -97,7 +97,7 @@ def diff(
 
     Exit code 1 if there are differences.
     """
-    declared = _load(system, settings or [], namespace)
+    declared = runnable_system(system, settings=settings or (), namespace=namespace).system
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
         from composer.remote.snapshot import GraphObserver
@@ -110,16 +110,6 @@ def diff(
                 _print(declared, remaining, json=json)
     if remaining:
         raise typer.Exit(FAILED)
-
-
-def _load(text: str, settings: list[str], namespace: str | None) -> System:
-    path = system_file(text)
-    result = load_system(path, shown=text, settings=settings, namespace=namespace)
-    if result.system is not None and result.system.node_type:
-        raise CommandError(f"'{text}' is a node type, not a system")
-    if result.system is None or not result.is_runnable:
-        raise CommandError(f"'{text}' has errors, so it cannot be compared")
-    return result.system
 
 
 def _comparison(system: System, autostart: Autostart | None, ignored: list[str]) -> Compare:

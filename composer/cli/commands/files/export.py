@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.errors import CommandError
 from composer.cli.support.options import Namespace, NewFile, examples
 from composer.cli.support.output.terminal import say, write_raw
-from composer.cli.support.system_arguments import SystemName, load_system, system_file
+from composer.cli.support.system_arguments import SystemName, runnable_system
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -87,8 +87,8 @@ def export_launch(system: SystemName, *, output: NewFile = None, force: Force = 
     """
     from composer.export.launch_file import launch_file
 
-    path = system_file(system)
-    _write(launch_file(_load(system, path)[0], path, output), output, replace=force)
+    declared, path, _ = runnable_system(system)
+    _write(launch_file(declared, path, output), output, replace=force)
 
 
 @app.command(
@@ -120,8 +120,7 @@ def export_systemd(
     from composer.export.systemd import Installation, units
     from composer.hosts.remote_command import python_words
 
-    path = system_file(system)
-    declared, result = _load(system, path)
+    declared, path, result = runnable_system(system)
     python = (sys.executable, "-P", "-m", "composer")
     file = os.path.relpath(path.resolve(), result.project.root)
 
@@ -161,8 +160,7 @@ def export_docker_compose(
 
     from composer.export.docker_compose import compose_file
 
-    path = system_file(system)
-    declared, result = _load(system, path)
+    declared, path, result = runnable_system(system)
     contents, name = _image(declared, result, path, image)
     build: dict[str, str] = {}
     if output is not None:
@@ -192,8 +190,7 @@ def export_kubernetes(
 
     from composer.export.kubernetes import manifests
 
-    path = system_file(system)
-    declared, result = _load(system, path)
+    declared, path, result = runnable_system(system)
     contents, name = _image(declared, result, path, image)
     text = manifests(declared, contents, name, os.environ)
     _write_image_and(output, "kubernetes.yaml", text, contents, replace=force)
@@ -229,7 +226,7 @@ def export_sros2(
     With --permissions, write what that command makes of the policy: FOLDER/robot1/pipeline/
     permissions.xml, for the ROS domain of ROS_DOMAIN_ID. These files have to be signed.
     """
-    declared, _ = _load(system, system_file(system), namespace)
+    declared = runnable_system(system, namespace=namespace).system
     if not permissions:
         from composer.export.sros2 import policy
 
@@ -258,16 +255,6 @@ def _domain_id() -> int:
     if not (text.isascii() and text.isdigit()):
         raise CommandError(f"ROS_DOMAIN_ID is '{text}', which is not a domain id")
     return int(text)
-
-
-def _load(text: str, path: Path, namespace: str | None = None) -> tuple[System, LoadResult]:
-    """Return a system without errors. Raises CommandError, typer.Exit."""
-    result = load_system(path, shown=text, namespace=namespace)
-    if result.system is not None and result.system.node_type:
-        raise CommandError(f"'{text}' is a node type, not a system")
-    if result.system is None or not result.is_runnable:
-        raise typer.Exit(FAILED)
-    return result.system, result
 
 
 def _image(

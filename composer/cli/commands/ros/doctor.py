@@ -24,7 +24,7 @@ from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examp
 from composer.cli.support.output.results import as_json
 from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.ros import ros_session
-from composer.cli.support.system_arguments import complete_system, load_system, system_file
+from composer.cli.support.system_arguments import complete_system, runnable_system
 
 if TYPE_CHECKING:
     from composer.doctor.result import CheckResult, Level
@@ -80,7 +80,7 @@ def doctor(
             raise UsageError("--hosts needs a system", hint="compose doctor robot.yaml --hosts")
         require_hosts("compose doctor --hosts")
     results = []
-    declared = None if system is None else _load(system)
+    declared = None if system is None else runnable_system(system, only_errors=True).system
     elsewhere = _check_hosts(system, timeout) if hosts and system is not None else ()
     for result in chain(_check_all(declared, timeout), elsewhere):
         results.append(result)
@@ -92,13 +92,6 @@ def doctor(
     say(f"{_counted(errors, 'error')}, {_counted(warnings, 'warning')}")
     if errors or (strict and warnings):
         raise typer.Exit(FAILED)
-
-
-def _load(text: str) -> System:
-    result = load_system(system_file(text), shown=text, only_errors=True)
-    if result.system is None or not result.is_runnable:
-        raise typer.Exit(FAILED)
-    return result.system
 
 
 def _check_hosts(text: str, timeout: float) -> Iterator[CheckResult]:

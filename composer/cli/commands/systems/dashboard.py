@@ -28,10 +28,9 @@ from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
     complete_system,
     example_systems,
-    load_system,
     path_exists,
     project_systems,
-    system_file,
+    runnable_system,
 )
 
 if TYPE_CHECKING:
@@ -151,11 +150,7 @@ def _declared(
     is_file = path_exists(Path(text)) or text.endswith((".yaml", ".yml"))
     if not is_file and text.rpartition("/")[2] not in {**project_systems(), **example_systems()}:
         return None
-    path = system_file(text if is_file else text.rpartition("/")[2])
-    result = load_system(path, shown=text, settings=settings, namespace=namespace)
-    if result.system is not None and result.system.node_type:
-        raise CommandError(f"'{text}' is a node type, not a system")
-    if result.system is None or not result.is_runnable:
-        raise CommandError(f"'{text}' has errors, so it cannot be shown")
+    name = text if is_file else text.rpartition("/")[2]
+    system, path, result = runnable_system(name, settings=settings, namespace=namespace)
     goal = PrimaryState(autostart.value) if autostart is not None else None
-    return Declared(result.system, str(path), tuple(result.diagnostics), goal)
+    return Declared(system, str(path), tuple(result.diagnostics), goal)

@@ -12,7 +12,7 @@ import typer
 from composer.cli.support.errors import CONFIG, FAILED, CommandError
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import say
-from composer.cli.support.system_arguments import SystemName, load_system, system_file
+from composer.cli.support.system_arguments import SystemName, runnable_system
 
 if TYPE_CHECKING:
     from composer.model import Discovery
@@ -54,13 +54,11 @@ def _discovery(text: str) -> Discovery:
     """Return the discovery of a system, with servers to be started. Raises CommandError."""
     from composer.model import DiscoveryKind
 
-    result = load_system(system_file(text), shown=text, only_errors=True)
-    if result.system is None or not result.is_runnable:
-        raise typer.Exit(CONFIG)
-    discovery = result.system.discovery
+    system = runnable_system(text, only_errors=True, exit_code=CONFIG).system
+    discovery = system.discovery
     if discovery is None or discovery.kind.value is not DiscoveryKind.SERVER:
         raise CommandError(
-            f"system '{result.system.name}' uses no discovery server",
+            f"system '{system.name}' uses no discovery server",
             hint="set 'discovery: {kind: server, address: ...}'",
             exit_code=CONFIG,
         )

@@ -7,6 +7,7 @@ import math
 import os
 import signal
 import sys
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -30,7 +31,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import announce_discovery, require_interfaces, require_ros
-from composer.cli.support.system_arguments import SystemName, load_system, system_file
+from composer.cli.support.system_arguments import SystemName, runnable_system
 
 if TYPE_CHECKING:
     from composer.model import Process, System
@@ -163,106 +164,59 @@ def run(
     lacks an interface package. Errors of handlers are reported in the summary; use --fail-on-error
     in tests.
     """
-    declared = _load(
+    if await_processes and process is not None:
+        raise UsageError("--await-processes cannot be used with --process, which starts no other")
+    declared = runnable_system(
         system,
-        settings or [],
-        namespace,
+        settings=settings or (),
+        namespace=namespace,
         use_sim_time=use_sim_time,
         only_errors=process is not None,  # the coordinating process prints the warnings
-    )
-    from composer.model import PrimaryState, member_system
-    from composer.plan import bring_up, start_goals, tear_down
-    from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
-
+        exit_code=CONFIG,
+    ).system
     member = None if process is None else _member(declared, process)
-    down = tear_down(declared, process)
-    started_by = os.environ.pop(STARTED_BY_VARIABLE, "")  # not for its own children
     if member is not None:
         os.environ.update({name.value: value for name, value in member.environment})
-        goals = start_goals(declared, PrimaryState.ACTIVE)
-        declared = member_system(declared, member.name.value, goals)
-        autostart = Autostart.UNCONFIGURED
-    plan = bring_up(declared, PrimaryState(autostart.value) if autostart is not None else None)
+    part, up, down = _planned(declared, member, autostart)
     if dry_run:
-        if plan.steps:
-            write(str(plan))
+        if up.steps:
+            write(str(up))
         return
     if not wait:
         # Let Ctrl-C end the process at once until the host handles it: while ROS is being imported,
         # a KeyboardInterrupt can be lost or become an ImportError.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    if await_processes and member is not None:
-        raise UsageError("--await-processes cannot be used with --process, which starts no other")
-    require_ros("compose run", declared)
-    require_interfaces(declared)
-    if process is None:
-        announce_discovery(declared)
-    switches = [] if tracing else ["--no-tracing"]
-    switches += ["--check-mutation"] if check_mutation else []
-    start = options_of_run(
-        settings or (), namespace, autostart, log_level, use_sim_time=use_sim_time
-    )
-    if dashboard:
-        require_dashboard("compose run --dashboard")
+    _require(part, dashboard=dashboard)
+    if member is None:
+        announce_discovery(part)
+    start = [
+        *options_of_run(settings or (), namespace, autostart, log_level, use_sim_time=use_sim_time),
+        *_words({"--no-tracing": not tracing, "--check-mutation": check_mutation}),
+    ]
+    from composer.cli.support.process import compose_command, run_in_background
+    from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
+
     if wait:
-        from composer.cli.support.process import run_in_background
-
         up_s = _WAIT_S if timeout is None else timeout
-        given = [system, *start, *switches]
-        given += ["--fail-on-error"] if fail_on_error else []
-        given += [] if process is None else ["--process", process]
-        given += ["--await-processes"] if await_processes else []
-        given += ["--dashboard"] if dashboard else []
-        limits = _numbers({"--for": run_for, "--timeout": up_s, "--grace": grace})
+        start += _words({"--process": process, "--await-processes": await_processes})
+        start += _words({"--fail-on-error": fail_on_error, "--dashboard": dashboard})
+        start += _words({"--for": run_for, "--timeout": up_s, "--grace": grace})
         limit_s = up_s + grace + _START_S
-        write(run_in_background(declared.name.value, [*given, *limits], limit_s))
+        write(run_in_background(part.name.value, [system, *start], limit_s))
         return
-    options = _options(run_for, timeout, grace, log_level)
-    from composer.cli.support.process import compose_command
-
     options = replace(
-        options,
+        _options(run_for, timeout, grace, log_level),
         tracing=tracing,
         check_mutation=check_mutation,
         fail_on_error=fail_on_error,
         process=member,
-        started_by=started_by,
-        member_command=()
-        if await_processes
-        else (*compose_command(), "run", system, *start, *switches),
+        started_by=os.environ.pop(STARTED_BY_VARIABLE, ""),  # not for its own children
+        member_command=() if await_processes else (*compose_command(), "run", system, *start),
     )
     shown = _dashboard_arguments(system, settings or [], namespace, autostart)
-    outcome = _run(declared, (plan, down), options, shown if dashboard else None)
+    outcome = _run(part, (up, down), options, shown if dashboard else None)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
-
-
-def _load(
-    text: str,
-    settings: list[str],
-    namespace: str | None,
-    *,
-    use_sim_time: bool,
-    only_errors: bool,
-) -> System:
-    path = system_file(text)
-    result = load_system(
-        path,
-        shown=text,
-        settings=settings,
-        namespace=namespace,
-        use_sim_time=use_sim_time,
-        only_errors=only_errors,
-    )
-    if result.system is not None and result.system.node_type:
-        raise CommandError(
-            f"'{text}' is a node type, not a system",
-            hint="use it in a system under 'nodes:'; 'compose validate' checks it on its own",
-            exit_code=CONFIG,
-        )
-    if result.system is None or not result.is_runnable:
-        raise typer.Exit(CONFIG)
-    return result.system
 
 
 def _member(system: System, name: str) -> Process:
@@ -276,6 +230,29 @@ def _member(system: System, name: str) -> Process:
     return found[name]
 
 
+def _planned(
+    declared: System, member: Process | None, autostart: Autostart | None
+) -> tuple[System, Plan, Plan]:
+    """Return what this process runs, and its plans for the bring-up and the tear-down."""
+    from composer.model import PrimaryState, member_system
+    from composer.plan import bring_up, start_goals, tear_down
+
+    goal = None if autostart is None else PrimaryState(autostart.value)
+    if member is None:
+        return declared, bring_up(declared, goal), tear_down(declared)
+    name = member.name.value
+    part = member_system(declared, name, start_goals(declared, PrimaryState.ACTIVE))
+    return part, bring_up(part, PrimaryState.UNCONFIGURED), tear_down(declared, name)
+
+
+def _require(system: System, *, dashboard: bool) -> None:
+    """Raise CommandError if something that the run needs is not installed."""
+    require_ros("compose run", system)
+    require_interfaces(system)
+    if dashboard:
+        require_dashboard("compose run --dashboard")
+
+
 def _dashboard_arguments(
     system: str, settings: list[str], namespace: str | None, autostart: Autostart | None
 ) -> list[str]:
@@ -284,9 +261,15 @@ def _dashboard_arguments(
     return [*given, "--", system]
 
 
-def _numbers(options: dict[str, float | None]) -> list[str]:
-    given = {name: value for name, value in options.items() if value is not None}
-    return [text for name, value in given.items() for text in (name, repr(value))]
+def _words(options: Mapping[str, str | float | bool | None]) -> list[str]:
+    """Return options as words of a command line; None and False leave one out."""
+    words: list[str] = []
+    for name, value in options.items():
+        if value is True:
+            words.append(name)
+        elif value is not None and value is not False:
+            words += [name, str(value)]
+    return words
 
 
 def _run(
