@@ -16,6 +16,7 @@ A mistake is found if it adds an error, a warning or an info. The files in ``mor
 from __future__ import annotations
 
 import gc
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +26,7 @@ import yaml
 
 from composer.diagnostics import Diagnostic, Severity
 from composer.interfaces import Interfaces
-from composer.loading import collect_diagnostics, load
+from composer.loading import LoadResult, collect_diagnostics, load
 from composer.node_types import interface_folders
 from composer.project import Project
 
@@ -127,7 +128,10 @@ class Checker:
         self.files = project.files
         for name, text in self.files.items():
             self._write(name, text)
-        known = self._diagnostics()
+        names = [name for name in self.files if name.startswith(("systems/", "nodes/"))]
+        self.loaded = [name for name in names if name.endswith(".yaml")]
+        self.results = self._load(self.loaded)
+        known = collect_diagnostics(list(self.results.values()))
         self.known = {_identity(item) for item in known}
         self.known_problems = [item for item in known if item.severity is not Severity.INFO]
 
@@ -136,20 +140,36 @@ class Checker:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
 
-    def _diagnostics(self) -> list[Diagnostic]:
+    def _load(self, names: list[str]) -> dict[str, LoadResult]:
         folders = interface_folders(Project.at(self.folder / "systems"))
         interfaces = Interfaces.load(folders) if folders else _INSTALLED
-        names = [name for name in self.files if name.startswith(("systems/", "nodes/"))]
-        paths = [Path(name) for name in names if name.endswith(".yaml")]
-        return collect_diagnostics([load(path, interfaces=interfaces) for path in paths])
+        return {name: load(Path(name), interfaces=interfaces) for name in names}
+
+    def _affected(self, edit: Edit, text: str) -> list[str]:
+        """Return the files to load again: others cannot change, and loading takes all the time."""
+        if not edit.file.endswith((".yaml", ".py")) or "/" not in edit.file:
+            return self.loaded
+        words = {
+            name: set(re.findall(r"\w+", f"{Path(name).stem} {text}"))
+            for name, text in {**self.files, edit.file: text}.items()
+        }
+        affected, added = set(), {edit.file}
+        while added:
+            affected |= added
+            stems = {Path(name).stem for name in added}
+            added = {name for name, used in words.items() if used & stems} - affected
+        return [name for name in self.loaded if name in affected]
 
     def added(self, edit: Edit) -> list[Diagnostic]:
         """Return what is reported because of the edit."""
         text = self.files[edit.file]
         assert text.count(edit.old) >= 1, f"{edit}: {edit.old!r} is not in the file"
-        self._write(edit.file, text.replace(edit.old, edit.new, 1))
+        edited = text.replace(edit.old, edit.new, 1)
+        self._write(edit.file, edited)
         try:
-            return [item for item in self._diagnostics() if _identity(item) not in self.known]
+            results = {**self.results, **self._load(self._affected(edit, edited))}
+            reported = collect_diagnostics(list(results.values()))
+            return [item for item in reported if _identity(item) not in self.known]
         finally:
             self._write(edit.file, text)
 
