@@ -142,10 +142,11 @@ class ChildProcesses:
             running = self._launcher
         if connection is None or running is None:
             return
-        for child in tuple(self._children.values()):
-            packet = {"end": child.number, "terminate_s": 0.0, "kill_s": 0.0}
-            connection.send(json.dumps(packet).encode())
-        connection.shutdown(socket.SHUT_WR)
+        with suppress(OSError):  # it was killed, and its children with it
+            for child in tuple(self._children.values()):
+                packet = {"end": child.number, "terminate_s": 0.0, "kill_s": 0.0}
+                connection.send(json.dumps(packet).encode())
+            connection.shutdown(socket.SHUT_WR)
         if self._thread is not None:
             self._thread.join(_LAUNCHER_ENDS_WITHIN_S)
         connection.close()

@@ -57,6 +57,7 @@ class MemberNode(OutsideNode):
         self._awaited: tuple[str, Future[None]] | None = None  # the goal of a transition
         self._after: Sequence[str] = ()
         self._has_failed = False
+        self._late_reports: _LateReports | None = None  # while it is awaited to be taken down
         self._is_lost = False  # its process has ended, and its return has not been reported
         process.add(self)
 
@@ -142,12 +143,18 @@ class MemberNode(OutsideNode):
     async def _is_taken_down(self) -> bool:
         """Wait until reports say that its process has taken the failed node down.
 
-        A node hangs that does not begin to move, or moves for longer than a transition may take.
+        A node hangs that does not begin to move, or moves for longer than a transition may take. If
+        reports are missing, the whole process may hang, or this computer was busy: it is lost then,
+        see :class:`.MemberProcess`.
         """
-        is_down = await self._until(self._is_down, monotonic() + _REPORTED_WITHIN_S)
-        if not is_down and self._is_moving:
-            is_down = await self._until(self._is_down, monotonic() + self._timeout_s)
-        return is_down
+        self._late_reports = late = _LateReports()
+        await self._until(
+            lambda: self._is_down() or self._is_moving or late.are_enough,
+            monotonic() + STARTS_WITHIN_S,
+        )
+        self._late_reports = None
+        left_s = self._timeout_s if self._is_moving else 0.0
+        return await self._until(self._is_down, monotonic() + left_s)
 
     def _is_down(self) -> bool:
         return not self._is_moving and self._reported not in (INACTIVE, ACTIVE)
@@ -216,6 +223,8 @@ class MemberNode(OutsideNode):
         self._is_moving = not is_primary
         if is_primary:
             self._reported = state
+        if self._late_reports is not None:
+            self._late_reports.count()
         if self._awaited is not None and self._awaited[0] == state:
             self._awaited[1].set_result(None)
         failed_now = bool(reported.held_down) and not self._has_failed
@@ -267,6 +276,24 @@ class MemberNode(OutsideNode):
         self._state = state
         self.activations += state == ACTIVE
         self._listener.on_transition_end(TransitionOutcome(transition, state, success=True))
+
+
+class _LateReports:
+    """Counts the reports of a node after the time in which it should have begun to move.
+
+    The first of them may be older, and have waited in this process.
+    """
+
+    def __init__(self) -> None:
+        self._due_s = monotonic() + _REPORTED_WITHIN_S
+        self._count = 0
+
+    def count(self) -> None:
+        self._count += monotonic() >= self._due_s
+
+    @property
+    def are_enough(self) -> bool:
+        return self._count > 1
 
 
 def _wake(sleeper: Future[None], _: object) -> None:

@@ -140,6 +140,11 @@ class MemberProcess:
         is_settled = all(node.state in PRIMARY_STATES for node in life.states.values())
         return is_settled and life.reports > 1  # the first one may be an old one that was latched
 
+    @property
+    def is_running(self) -> bool:
+        """Whether it certainly runs: it reports, or holds the instance lock on this computer."""
+        return (self._life is not None and self._life.is_up) or is_held(self._name)
+
     def keep_goals(self, goals: str) -> None:
         """Let the process keep the goals of the system."""
         if self._life is not None and self._life.is_up:

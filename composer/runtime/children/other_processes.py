@@ -98,6 +98,11 @@ class OtherProcesses:
         return all(process.is_known for process in self._all)
 
     @property
+    def is_running_unknown(self) -> bool:
+        """Whether one certainly runs that has not reported yet, or whose nodes move."""
+        return any(process.is_running and not process.is_known for process in self._all)
+
+    @property
     def found_goals(self) -> SystemGoals | None:
         """What an earlier coordinating process has left; None if the system is to be started."""
         return self._goals.found

@@ -88,6 +88,29 @@ def test_the_end_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
     os.close(pipe.reading)
 
 
+def test_the_end_waits_for_a_reader_that_was_stopped() -> None:
+    pipe = FullPipe()
+    queue = queue_to(pipe.writing)
+    pipe.close_writing()
+    queue.put("text\n")
+    received: list[bytes] = []
+    reader = threading.Thread(target=lambda: received.append(pipe.read()))
+    writer, waits = queue._thread, 0
+
+    def join(timeout: float) -> None:
+        nonlocal waits
+        waits += 1
+        if waits == 2:
+            reader.start()
+            timeout = LIMIT_S
+        threading.Thread.join(writer, timeout)
+
+    writer.join = join  # type: ignore[assignment,method-assign]
+    assert queue.close()
+    reader.join(LIMIT_S)
+    assert received == [b"text\n"]
+
+
 def test_a_closed_pipe_drops_everything() -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -19,10 +19,12 @@ _MAX_WAITING_CHARACTERS = 1_048_576
 _WRITE_CHARACTERS = 65_536
 #: One write at the end, when the program waits for progress.
 _LAST_WRITE_CHARACTERS = 4096
-#: At the end, waiting text is given up if none of it is written for this time ...
-_STALLED_S = 0.25
-#: ... and in any case after this time.
-_LAST_WRITE_S = 3.0
+#: At the end, waiting text is given up if none of it is written in so many waits in a row: if the
+#: computer stops for a second, that is one of them.
+_WAIT_S = 0.25
+_STALLED_WAITS = 4
+#: In any case, it is given up after so many waits.
+_MAX_WAITS = 12
 
 
 class Sink(Protocol):
@@ -110,12 +112,14 @@ class OutputQueue:
             self._is_closing = True
             if self._is_idle:
                 self._wake()
-        for _ in range(round(_LAST_WRITE_S / _STALLED_S)):
+        stalled = 0
+        for _ in range(_MAX_WAITS):
             before = self._written_bytes
-            self._thread.join(_STALLED_S)
+            self._thread.join(_WAIT_S)
             # On a busy machine, the thread may not have had a turn yet.
             is_stalled = self._is_writing and self._written_bytes == before
-            if is_stalled or not self._thread.is_alive():
+            stalled = stalled + 1 if is_stalled else 0
+            if stalled == _STALLED_WAITS or not self._thread.is_alive():
                 break
         return not self._thread.is_alive()
 

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -199,6 +200,38 @@ def test_no_child_survives_the_launcher(children: ChildProcesses) -> None:
     again = start(children, "exit 0", [])  # by a new launcher
     wait_until(again.ended.done, "the end")
     assert again.ended.result() == 0
+
+
+def test_a_launcher_that_was_killed_is_closed_without_an_error(children: ChildProcesses) -> None:
+    """Its end may not have been noticed yet."""
+    printed, closing = threading.Event(), threading.Event()
+
+    def on_line(*_: object) -> None:
+        printed.set()
+        closing.wait(PATIENCE_S)  # keeps the thread from noticing anything
+
+    children.start(Command(["sh", "-c", "echo ready; exec sleep 60"]), on_line)
+    assert printed.wait(PATIENCE_S)
+    process = children._launcher
+    assert process is not None
+    process.kill()
+    process.wait(PATIENCE_S)
+    closer = threading.Thread(target=lambda: errors.append(closed(children)))
+    errors: list[BaseException | None] = []
+    closer.start()
+    wait_until(lambda: children._connection is None, "the begin of the end")
+    closing.set()
+    closer.join(PATIENCE_S)
+    assert errors == [None]
+
+
+def closed(children: ChildProcesses) -> BaseException | None:
+    """Close, and return what was raised."""
+    try:
+        children.close()
+    except OSError as error:
+        return error
+    return None
 
 
 def test_nothing_is_started_for_a_composer_that_is_gone(tmp_path: Path) -> None:

@@ -1,0 +1,103 @@
+"""A failed node of another process hangs only if reports say so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rcl_interfaces.msg import SetParametersResult
+
+from composer.model import ExecutorKind, LogLevel
+from composer.runtime.children import member_node
+from composer.runtime.children.member_context import ProcessUnavailable
+from composer.runtime.children.member_node import MemberNode
+from composer.runtime.children.member_report import MemberState
+from composer.runtime.children.outside_node import OutsideContext
+from composer.runtime.executors.futures import Future
+from composer.runtime.metrics.statistics import Statistics
+from tests.ros.children.split_robot import DETECTOR, TEXT
+from tests.ros.support.in_process import system_of
+from tests.ros.support.loops import Bench, bench, wait_until
+
+
+class Process:
+    """A process that runs, and does what is requested."""
+
+    moved_s = 0.0
+    pid = 1
+
+    def __init__(self) -> None:
+        self.killed = ""
+
+    def add(self, _: object) -> None:
+        pass
+
+    async def ensure(self) -> None:
+        pass
+
+    async def kill(self, reason: str) -> None:
+        self.killed = reason
+        raise ProcessUnavailable(reason)
+
+    def request(self, *_: object) -> Future[SetParametersResult]:
+        done: Future[SetParametersResult] = Future()
+        done.set_result(SetParametersResult(successful=True, reason="1"))
+        return done
+
+
+class Listener:
+    """Ignores what the node reports."""
+
+    def on_ended(self, *_: object, **__: object) -> None:
+        pass
+
+    def on_transition_end(self, *_: object) -> None:
+        pass
+
+
+def failed_node(on: Bench, process: Any, folder: Path) -> MemberNode:
+    """Return a node that has failed, and that its process has not taken down yet."""
+    model = next(n for n in system_of(TEXT, folder, detector=DETECTOR).nodes if n.process)
+    nothing: Any = None
+    listener: Any = Listener()
+    context = OutsideContext(on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO)
+    node = MemberNode(model, process, context)
+    report(on, node, "active")
+    return node
+
+
+def report(on: Bench, node: MemberNode, state: str) -> None:
+    on.loop.run(lambda: node.on_report(MemberState(state, "silent for 1 s")))
+
+
+def test_a_node_hangs_only_if_late_reports_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(member_node, "_REPORTED_WITHIN_S", 0.0)
+    with bench(ExecutorKind.EVENTS) as on:
+        process = Process()
+        node = failed_node(on, process, tmp_path)
+        restart = on.loop.run_task(node.run_step("configure", lambda: False))
+        report(on, node, "active")  # the process was busy; this one may be older
+        on.loop.run(lambda: None)
+        assert not process.killed
+        report(on, node, "active")
+        wait_until(restart.done, "the end of the restart")
+        assert process.killed == "/lab/camera hangs"
+        assert not restart.result().success
+
+
+def test_a_node_that_is_taken_down_late_does_not_hang(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(member_node, "_REPORTED_WITHIN_S", 0.0)
+    with bench(ExecutorKind.EVENTS) as on:
+        process = Process()
+        node = failed_node(on, process, tmp_path)
+        restart = on.loop.run_task(node.run_step("configure", lambda: False))
+        report(on, node, "active")
+        report(on, node, "unconfigured")
+        wait_until(restart.done, "the end of the restart")
+        assert not process.killed
+        assert restart.result().success
