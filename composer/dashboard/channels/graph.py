@@ -148,15 +148,20 @@ class LiveFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Yield all states and rates."""
+        from composer.remote.systems.system_reports import of_whole_systems
+
         observed = self._ros.observed
-        reports = {name: item for name, item in observed.reports.current().items() if item}
+        # Sorted: what other processes of a system report of their nodes is newer, and comes later.
+        current = sorted(observed.reports.current().items())
+        reports = {name: report for name, report in current if report is not None}
         nodes: dict[str, Any] = {
             name: {"state": state} for name, state in observed.states().items()
         }
+        for system in of_whole_systems(reports).values():
+            nodes |= {node.node: _state(node) for node in system.nodes}
         edges: dict[str, Any] = {}
         reported: set[str] = set()
         for report in reports.values():
-            nodes |= {node.node: _state(node) for node in report.nodes}
             reported |= {topic for node in report.nodes for topic in (*node.sent, *node.received)}
         for pair in self._pairs.update(reports).values():
             known = {} if pair.before is None else {node.node: node for node in pair.before.nodes}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.messages import Values, to_json
-from composer.dashboard.observing.processes import ProcessMonitor
+from composer.dashboard.observing.processes import ProcessMonitor, total
 from composer.dashboard.outbox import Update
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _TRANSITIONS = {
 _SHOWN = (
     *("state", "desired", "since_s", "restarts", "errors", "last_error", "held_down", "sent_hz"),
     *("received_hz", "busy", "slowest", "overruns", "queue_drops", "qos_events", "depends_on"),
-    "process",
+    *("process", "host", "pid"),
 )
 
 
@@ -65,9 +65,11 @@ class NodesFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Yield all nodes and systems if anything is new."""
+        from composer.remote.systems.system_reports import of_whole_systems
+
         observed = self._ros.observed
         self.period_s = _SOON_S if observed.is_new else _PERIOD_S
-        reports = observed.reports.current()
+        reports = of_whole_systems(observed.reports.current())
         managed = {
             node.node: (name, node)
             for name, report in reports.items()
@@ -81,21 +83,23 @@ class NodesFeed(Feed):
         if (states, held_down, activities) == self._last and now_s < self._due_s:
             return
         self._last, self._due_s = (states, held_down, activities), now_s + _PERIOD_S * _EARLY
-        nodes = [self._managed(name, node) for name, node in managed.values()]
-        nodes += [self._other(*item) for item in states.items() if item[0] not in managed]
         if now_s >= self._usage_due_s:
             self._usage_due_s = now_s + _USAGE_PERIOD_S
             self._usage = self._measured(reports.values())
+        nodes = [self._managed(name, node) for name, node in managed.values()]
+        nodes += [self._other(*item) for item in states.items() if item[0] not in managed]
         systems = [self._system(name, report) for name, report in sorted(reports.items())]
-        yield Update(to_json({"systems": systems, "nodes": nodes}))
+        yield Update(to_json({"host": self._host, "systems": systems, "nodes": nodes}))
 
     def _measured(self, reports: Iterable[SystemReport | None]) -> dict[str, Any]:
         """Return the usage of the processes on this computer by their ids."""
-        return {
-            report.pid: self._processes.usage(report.pid)
-            for report in reports
-            if report is not None and report.host == self._host
-        }
+        pids = {pid for report in reports if report is not None for pid in self._local(report)}
+        return {pid: self._processes.usage(pid) for pid in pids}
+
+    def _local(self, report: SystemReport) -> set[str]:
+        """Return the ids of the processes of a system on this computer."""
+        places = {(node.host, node.pid) for node in report.nodes} | {(report.host, report.pid)}
+        return {pid for host, pid in places if host == self._host and pid}
 
     def _system(self, name: str, report: SystemReport | None) -> dict[str, Any]:
         declared = self._declared
@@ -107,7 +111,7 @@ class NodesFeed(Feed):
             "message": "it does not respond" if report is None else report.message,
             "host": "" if report is None else report.host,
             "pid": "" if report is None else report.pid,
-            "process": None if report is None else self._usage.get(report.pid),
+            "process": None if report is None else total(map(self._usage.get, self._local(report))),
             "commands": list(COMMANDS),
             "file": declared.file if declared is not None and is_declared else None,
         }
@@ -117,6 +121,7 @@ class NodesFeed(Feed):
             "name": node.node,
             "system": system,
             **{key: getattr(node, key) for key in _SHOWN},
+            "usage": self._usage.get(node.pid) if node.host == self._host else None,
             "transitions": _TRANSITIONS.get(node.state, []),
             "declared_at": self._declared_at(node.node),
         }

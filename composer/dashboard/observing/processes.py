@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,21 @@ class _Reading:
     memory_mb: float
     threads: int
     up_s: float
+
+
+def total(usages: Iterable[Mapping[str, Any] | None]) -> dict[str, Any] | None:
+    """Return the usage of several processes together, None if none of them runs."""
+    known = [usage for usage in usages if usage is not None]
+    if not known:
+        return None
+    percents = [usage["cpu_percent"] for usage in known]
+    return {
+        "cpu_percent": None if None in percents else round(sum(percents), 1),
+        "memory_mb": round(sum(usage["memory_mb"] for usage in known), 1),
+        "threads": sum(usage["threads"] for usage in known),
+        "up_s": max(usage["up_s"] for usage in known),
+        "processes": len(known),
+    }
 
 
 class ProcessMonitor:

@@ -31,6 +31,11 @@ export function percent(share) {
   return known(share) ? `${digits(share * 100)} %` : NONE;
 }
 
+/** Write the use of the processors and of memory by processes; ["–", "–"] if it is not known. */
+export function usage({ cpu_percent: cpu, memory_mb: memory } = {}) {
+  return [known(cpu) ? `${digits(cpu)} %` : NONE, known(memory) ? bytes(memory * 1e6) : NONE];
+}
+
 export function bytes(value) {
   if (!known(value)) return NONE;
   let left = value;

@@ -1,7 +1,7 @@
 /** What is around every view: the bar with the state of the system, the views, the connection. */
 import { createAppearance } from "./graph/appearance.js";
 import { button, h, refill, setText } from "./dom.js";
-import { bytes, duration, percent } from "./format.js";
+import { duration, usage } from "./format.js";
 import { icon } from "./icons.js";
 import { attempt, confirmed, toast } from "./widgets/notices.js";
 
@@ -110,12 +110,9 @@ export function createFrame(app) {
     setText(activity, system.answers ? `${system.activity} · ${active} of ${managed} active` : "not responding");
     activity.title = system.message;
     const { process } = system;
-    setText(figures, process ? [
-      `CPU ${percent(process.cpu_percent / 100)}`,
-      `memory ${bytes(process.memory_mb * 1e6)}`,
-      `up ${duration(process.up_s)}`,
-    ].join("   ") : `on ${system.host}`);
-    figures.title = `process ${system.pid} on ${system.host}`;
+    const [cpu, memory] = usage(process ?? {});
+    setText(figures, process ? `CPU ${cpu}   memory ${memory}   up ${duration(process.up_s)}` : `on ${system.host}`);
+    figures.title = process?.processes > 1 ? `${process.processes} processes on ${system.host}` : `process ${system.pid} on ${system.host}`;
     showCommands(system);
   }
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from composer.fast_dataclass import dataclass
 from composer.report.display import visible
@@ -27,6 +27,8 @@ class NodeReport:
     ``depends_on`` are the states that the nodes it depends on must have, by their full names.
     ``sent``, ``received`` and ``dropped`` count messages by topic; the last is without zeros.
     ``process`` is the process of the system that it runs in, empty for the one that reports.
+    ``host`` and ``pid`` are those of the operating system's process; ``pid`` is empty while none
+    runs or it is not known.
     """
 
     node: str
@@ -49,6 +51,8 @@ class NodeReport:
     received: Mapping[str, int]
     dropped: Mapping[str, int]
     process: str = ""
+    host: str = ""
+    pid: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,9 @@ class PartialReport:
     states: Mapping[str, str]
 
 
+#: None stands for a system that did not respond.
+AnyReport = TypeVar("AnyReport", SystemReport, SystemReport | None)
+
 #: The name, the message and the values of a diagnostic status, as plain data.
 Status: TypeAlias = tuple[str, str, Mapping[str, str]]
 
@@ -138,7 +145,7 @@ def system_report(name: str, statuses: Iterable[Status]) -> SystemReport:
             message=visible(text),
             host=values["host"],
             pid=values["pid"],
-            nodes=tuple(_node_report(node, values) for node, _, values in nodes),
+            nodes=tuple(_node_report(node, each, values["host"]) for node, _, each in nodes),
             is_ready=values.get("ready") == "true",
         )
     except (ValueError, KeyError, TypeError) as error:
@@ -174,6 +181,13 @@ def with_processes(report: SystemReport, others: Mapping[str, SystemReport]) -> 
     )
 
 
+def of_whole_systems(reports: Mapping[str, AnyReport]) -> dict[str, AnyReport]:
+    """Return reports by their names, without those of processes whose nodes another one has."""
+    answered = [report for report in reports.values() if report is not None]
+    others = {name for report in answered for name in report.processes.values()}
+    return {name: report for name, report in reports.items() if name not in others}
+
+
 def with_callbacks_of_processes(reports: Mapping[str, SystemReport]) -> dict[str, SystemReport]:
     """Return reports by their names, each with the callbacks of other processes of its system."""
     found = {}
@@ -200,7 +214,7 @@ def invalid_report(error: Exception) -> InvalidReportError:
     )
 
 
-def _node_report(status_name: str, values: Mapping[str, str]) -> NodeReport:
+def _node_report(status_name: str, values: Mapping[str, str], host: str) -> NodeReport:
     return NodeReport(
         node=reported_node(status_name),
         state=values["state"],
@@ -222,6 +236,8 @@ def _node_report(status_name: str, values: Mapping[str, str]) -> NodeReport:
         received=_counts(values["received"]),
         dropped=_counts(values["dropped"]),
         process=values.get("process", ""),
+        host=values.get("host", "") or host,
+        pid=values.get("pid", ""),
     )
 
 

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from time import monotonic
+from typing import Any
 
 from composer.model import Executable, ExecutableKind, LifecycleKind, Node
 from composer.runtime.callbacks.log import severity
@@ -62,6 +64,11 @@ class ExecutableNode(OutsideNode):
     def pid(self) -> int | None:
         """The process id, None while no process runs."""
         return None if self._child is None else self._child.pid
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """Its process; its rates and counters are not known."""
+        return {"pid": str(self.pid or "")}
 
     def destroy(self) -> None:
         """Kill the process, if there is one, without waiting for that."""

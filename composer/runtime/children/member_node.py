@@ -73,7 +73,7 @@ class MemberNode(OutsideNode):
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """Its rates and counters, by the names of the fields of ``NodeStatus``."""
+        """What its process reports of it, by the names of the fields of ``NodeStatus``."""
         return self._process.figures(self.full_name).current
 
     @property

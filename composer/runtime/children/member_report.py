@@ -23,7 +23,8 @@ _COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
 class MemberState:
     """A node as its process reports it: its state, and why it is held down, if it has failed.
 
-    ``figures`` are rates and counters, by the names of the fields of ``NodeStatus``.
+    ``figures`` are rates, counters and the operating system's process, by the names of the fields
+    of ``NodeStatus``.
     """
 
     state: str
@@ -73,31 +74,34 @@ def parse_report(content: bytes) -> MemberReport | None:
         number = int(values.get("number", "0"))
     except ValueError:
         return None
+    host = values.get("host", "")
     return MemberReport(
         activity=values.get("activity", ""),
-        host=values.get("host", ""),
+        host=host,
         pid=values.get("pid", ""),
         started_s=started_s,
         started_by=values.get("started_by", ""),
         number=number,
         goals=values.get("goals", ""),
-        nodes={status.name.partition(": ")[2]: _node(status.values) for status in nodes},
+        nodes={status.name.partition(": ")[2]: _node(status.values, host) for status in nodes},
     )
 
 
-def _node(values: Mapping[str, str]) -> MemberState:
-    return MemberState(values.get("state", ""), values.get("held_down", ""), _figures(values))
+def _node(values: Mapping[str, str], host: str) -> MemberState:
+    state, held_down = values.get("state", ""), values.get("held_down", "")
+    return MemberState(state, held_down, _figures(values, host))
 
 
-def _figures(values: Mapping[str, str]) -> Mapping[str, Any]:
-    """Return the rates and counters in a report; none if it is not of this version."""
+def _figures(values: Mapping[str, str], host: str) -> Mapping[str, Any]:
+    """Return the figures in a report from a host; none if it is not of this version."""
     try:
         rates = {name: finite(values[name]) for name in _RATES}
         counts = {name: int(values[name]) for name in _COUNTS}
         by_name = {name: _counts(values[name]) for name in _COUNTS_BY_NAME}
     except (KeyError, ValueError):
         return {}
-    return {**rates, **counts, **by_name, "slowest": values.get("slowest", "")}
+    place = {"host": host, "pid": values.get("pid", "")}
+    return {**rates, **counts, **by_name, **place, "slowest": values.get("slowest", "")}
 
 
 def _counts(text: str) -> Mapping[str, int]:

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from time import monotonic
+from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from rclpy.node import Node as RosNode
@@ -123,6 +124,11 @@ class OutsideNode(ABC):
     def callback_owners(self) -> tuple[object, ...]:
         """Nothing: its callbacks run elsewhere."""
         return ()
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """What is known of it, by the names of the fields of ``NodeStatus``."""
+        return {}
 
     def now_s(self) -> float:
         """Return the system time in seconds."""

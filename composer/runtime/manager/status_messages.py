@@ -60,6 +60,8 @@ def _of_node(system: str, node: NodeStatus) -> Status:
         "desired": node.desired,
         "depends_on": " ".join(f"{on}={state}" for on, state in node.depends_on.items()),
         "process": node.process,
+        "host": node.host,
+        "pid": node.pid,
         "left_to_manager": " ".join(node.left_to_manager),
         "since": f"{node.since_s:.3f}",
         "restarts": str(node.restarts),

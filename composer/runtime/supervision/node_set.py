@@ -26,7 +26,7 @@ from composer.runtime.children.executable_node import ExecutableNode
 from composer.runtime.children.external_node import ExternalNode
 from composer.runtime.children.member_node import MemberNode
 from composer.runtime.children.other_processes import OtherProcesses
-from composer.runtime.children.outside_node import OutsideContext
+from composer.runtime.children.outside_node import OutsideContext, OutsideNode
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.futures import Future
@@ -191,9 +191,9 @@ class NodeSet:
         )
 
     def reported_figures(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return the rates and counters that other processes report for their nodes."""
+        """Return what is known of the nodes outside the process, by fields of ``NodeStatus``."""
         nodes = tuple(self.nodes.items())
-        return {name: node.figures for name, node in nodes if isinstance(node, MemberNode)}
+        return {name: node.figures for name, node in nodes if isinstance(node, OutsideNode)}
 
     def summaries(self) -> tuple[NodeSummary, ...]:
         """Return the states and the counters of all nodes."""

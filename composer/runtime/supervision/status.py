@@ -28,6 +28,8 @@ class NodeStatus:
     that the nodes it depends on must have, by their full names. ``left_to_manager`` are the
     services that the manager node has instead (see :class:`composer.model.Introspection`).
     ``process`` is the process of the system that the node runs in, empty for the one that reports.
+    ``pid`` is the id of the operating system's process, empty while none runs or it is not known,
+    and ``host`` its computer, empty for that of the process that reports.
 
     Rates are in hertz over the last second, and so is ``busy``, the share of a thread that its
     callbacks took. ``slowest`` is the callback with the longest call so far, and its time.
@@ -43,6 +45,8 @@ class NodeStatus:
     depends_on: Mapping[str, str] = field(default_factory=dict)
     left_to_manager: tuple[str, ...] = ()
     process: str = ""
+    host: str = ""
+    pid: str = ""
     state: str = "unconfigured"
     since_s: float = 0.0
     restarts: int = 0
@@ -175,6 +179,7 @@ class Status:
                 },
                 left_to_manager=models[name].introspection.left_to_manager,
                 process=_process_of(models[name]),
+                pid=str(os.getpid()) if models[name].in_process else "",
                 since_s=now_s,
             )
             for name in order
@@ -251,7 +256,7 @@ class Status:
     ) -> None:
         """Read the counters of the nodes; rates are those between the last two calls.
 
-        ``reported`` are the figures of nodes of other processes, instead of counters.
+        ``reported`` is what is known of nodes outside the process, by fields of ``NodeStatus``.
         """
         now_s = time.monotonic()
         with self._lock:
@@ -264,11 +269,13 @@ class Status:
             }
 
     def _with_counters(self, name: str, node: NodeStatus) -> NodeStatus:
-        if name in self._reported:
-            return replace(node, **self._reported[name])
         counters = self._statistics.get(name)
-        if counters is None:
-            return node
+        if counters is not None:
+            node = self._counted(name, node, counters)
+        reported = self._reported.get(name)
+        return replace(node, **reported) if reported else node
+
+    def _counted(self, name: str, node: NodeStatus, counters: Statistics) -> NodeStatus:
         rates = self._counters[name].rates(self._counters_before.get(name))
         return replace(
             node,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,10 @@ def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
 
         reported = system.host._status.snapshot  # with the rates that the processes report
         wait_until(lambda: all(node.sent_hz > 1 for node in reported().nodes[:2]), "the rates")
+        known = [(node.host, node.pid) for node in reported().nodes]
+        host = socket.gethostname()
+        others = [(host, str(pid)) for pid in pids]
+        assert known == [*others, ("", str(os.getpid()))]
 
         # The nodes have their own services; what other tools do with them is followed.
         state = peer.call(GetState, "/lab/detector/get_state").current_state.label

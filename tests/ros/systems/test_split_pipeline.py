@@ -25,6 +25,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from composer.remote.systems.local_queries import local_report
 from composer.runtime.process.instance_lock import local_systems
 from tests.ros.support.commands import COMPOSE, compose, output_of
+from tests.ros.support.dashboard import browser, dashboard
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.pipeline import (
     NODES,
@@ -183,6 +184,25 @@ def check_a_drive(external: ExternalNode) -> None:
     check_the_drive(commands, odometry, line_m=start.y)
 
 
+def check_the_measured_processes(path: Path) -> None:
+    """Check that the dashboard measures the process of each node."""
+    owners = ("/pipeline/sensing", "/pipeline/planning", "/pipeline")
+    with dashboard(str(path)) as server, browser(server.address) as page:
+
+        def is_measured(data: Any) -> bool:
+            found = {node["name"]: node for node in data["nodes"]}
+            return all((found.get(name, {}).get("usage") or {}).get("threads") for name in NODES)
+
+        data = page.until(page.subscribe("nodes"), is_measured)
+    pids = local_systems()
+    found = {node["name"]: node for node in data["nodes"]}
+    for name, owner in zip(NODES, owners, strict=True):
+        place = [found[name][key] for key in ("system", "host", "pid")]
+        assert place == ["/pipeline", socket.gethostname(), pids[owner]]
+    (system,) = data["systems"]
+    assert (system["name"], system["process"]["processes"]) == ("/pipeline", 3)
+
+
 def check_the_drawn_processes() -> None:
     names = ("/pipeline/sensing", "/pipeline/planning", "/pipeline")
     owners = dict(zip(NODES, names, strict=True)) | {f"{name}/manager": name for name in names}
@@ -228,6 +248,7 @@ def test_commands_for_the_system_include_all_processes(split: RunningSystem, pat
     )
     assert all(node["callbacks"] for node in listed)
     check_the_drawn_processes()
+    check_the_measured_processes(path)
     assert compose("diff", path).stderr == "pipeline: runs as declared\n"
     assert "/planning/planner active" in output_of("logs", "--system", "pipeline", "planner")
     assert "subgraph" in output_of("graph", path, "--view", "deployment", "--format", "mermaid")

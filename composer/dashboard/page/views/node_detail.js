@@ -1,6 +1,6 @@
 /** The details of one node: what it does, what it did wrong, and what can be done with it. */
 import { button, empty, h, refill } from "../dom.js";
-import { count, duration, hertz, milliseconds, percent } from "../format.js";
+import { count, duration, hertz, milliseconds, percent, usage } from "../format.js";
 import { pathOf } from "../router.js";
 import { asked, attempt, confirmed, toast } from "../widgets/notices.js";
 import { detailHead, facts, section, stateBadge } from "../widgets/parts.js";
@@ -10,6 +10,18 @@ import { sourceOf } from "./graph_details.js";
 const TRANSITIONS = ["configure", "activate", "deactivate", "cleanup", "shutdown"];
 const LOWERING = ["deactivate", "cleanup", "shutdown"];
 const VIEWS = { publisher: "topics", subscription: "topics", service: "services", client: "services", "action server": "actions", "action client": "actions" };
+
+/** The name of the process, in a system with several of them, and its id. */
+function processOf({ process, host, pid }) {
+  return pid && [process, `${pid} on ${host}`].filter(Boolean).join(", ");
+}
+
+function usageOf(node, ownHost) {
+  if (node.pid && node.host !== ownHost) return [["CPU and memory", "not measured on other computers"]];
+  if (!node.usage) return [];
+  const [cpu, memory] = usage(node.usage);
+  return [["CPU of process", cpu], ["memory of process", memory]];
+}
 
 export function createNodeDetail(app) {
   const element = h("aside", { class: "detail", "aria-label": "Details of the node", hidden: true });
@@ -58,7 +70,7 @@ export function createNodeDetail(app) {
     element.hidden = true;
   }
 
-  function update({ nodes }) {
+  function update({ host, nodes }) {
     if (name === "") return;
     const node = nodes.find((one) => one.name === name);
     if (!node) {
@@ -87,6 +99,8 @@ export function createNodeDetail(app) {
         ["sent", node.system ? hertz(node.sent_hz) : null],
         ["received", node.system ? hertz(node.received_hz) : null],
         ["busy", node.system ? percent(node.busy) : null],
+        ["process", processOf(node)],
+        ...usageOf(node, host),
         ["errors", node.system ? count(node.errors) : null],
         ["restarts", node.system ? count(node.restarts) : null],
         ["over budget", node.overruns ? count(node.overruns) : null],

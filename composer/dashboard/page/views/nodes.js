@@ -1,6 +1,6 @@
 /** The nodes: states, figures, transitions; the plan, and the drift against the declaration. */
 import { h, refill } from "../dom.js";
-import { count, duration, hertz, percent } from "../format.js";
+import { count, duration, hertz, percent, usage } from "../format.js";
 import { pathOf } from "../router.js";
 import { searchField, matches, split, stateBadge, tabs } from "../widgets/parts.js";
 import { createTable } from "../widgets/table.js";
@@ -19,6 +19,8 @@ const COLUMNS = [
   { id: "sent", label: "Sent", number: true, level: 2, value: (node) => node.sent_hz, text: (node) => hertz(node.sent_hz) },
   { id: "received", label: "Received", number: true, level: 2, value: (node) => node.received_hz, text: (node) => hertz(node.received_hz) },
   { id: "busy", label: "Busy", number: true, level: 2, value: (node) => node.busy, text: (node) => percent(node.busy) },
+  { id: "cpu", label: "CPU of process", number: true, level: 3, value: (node) => node.usage?.cpu_percent ?? null, text: (node) => usage(node.usage ?? {})[0] },
+  { id: "memory", label: "Memory of process", number: true, level: 3, value: (node) => node.usage?.memory_mb ?? null, text: (node) => usage(node.usage ?? {})[1] },
   { id: "dropped", label: "Dropped", number: true, level: 3, value: (node) => node.queue_drops, text: (node) => count(node.queue_drops), tone: (node) => (node.queue_drops > 0 ? "warn" : "") },
   { id: "errors", label: "Errors", number: true, value: (node) => node.errors, text: (node) => count(node.errors), tone: (node) => (node.errors > 0 ? "bad" : "") },
   { id: "restarts", label: "Restarts", number: true, level: 3, value: (node) => node.restarts, text: (node) => count(node.restarts), tone: (node) => (node.restarts > 0 ? "warn" : "") },

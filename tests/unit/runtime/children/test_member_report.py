@@ -21,6 +21,7 @@ NODE = {
     "queue_drops": "1",
     "calls": "4",
     "skipped": "0",
+    "pid": "8",
     "sent": "/a=5 /b=1",
     "received": "",
     "dropped": "",
@@ -42,6 +43,7 @@ def test_a_report_has_the_process_and_its_nodes() -> None:
     assert (camera.state, camera.held_down) == ("active", "")
     assert camera.figures["sent"] == {"/a": 5, "/b": 1}
     assert (camera.figures["errors"], camera.figures["sent_hz"]) == (3, 2.0)
+    assert (camera.figures["host"], camera.figures["pid"]) == ("vm", "8")  # of an executable
 
 
 @pytest.mark.parametrize("activity", ["stopping", "stopped"])

@@ -1,0 +1,100 @@
+"""The CPU time and memory of processes, and of which systems they are."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from composer.dashboard.messages import to_json
+from composer.dashboard.observing.processes import ProcessMonitor, total
+from composer.remote.systems.system_reports import (
+    SystemReport,
+    of_whole_systems,
+    system_report,
+)
+
+BUSY = "print(flush=True)\nwhile True: pass"
+
+
+def usage(cpu_percent: float | None, memory_mb: float = 10.0) -> dict[str, float | None]:
+    return {"cpu_percent": cpu_percent, "memory_mb": memory_mb, "threads": 2, "up_s": memory_mb}
+
+
+def test_the_usage_is_that_of_each_process() -> None:
+    monitor = ProcessMonitor()
+    with subprocess.Popen([sys.executable, "-c", BUSY], stdout=subprocess.PIPE) as busy:
+        try:
+            assert busy.stdout is not None
+            busy.stdout.readline()
+            pid = str(busy.pid)
+            first = monitor.usage(pid)
+            assert first is not None
+            assert first["cpu_percent"] is None
+            assert first["memory_mb"] > 1
+            assert first["threads"] == 1
+            while not (monitor.usage(pid) or {})["cpu_percent"]:
+                pass
+        finally:
+            busy.kill()
+    assert monitor.usage(pid) is None
+    own = monitor.usage(str(os.getpid()))
+    assert own is not None
+    assert own["cpu_percent"] is None
+
+
+@pytest.mark.parametrize("pid", ["", "unknown", "-1", "1/../2", "²"])
+def test_only_ids_of_processes_are_read(pid: str) -> None:
+    assert ProcessMonitor().usage(pid) is None
+
+
+def test_the_usage_of_a_system_is_that_of_its_processes() -> None:
+    assert total([usage(1.5), None, usage(2.0, 20.0)]) == {
+        "cpu_percent": 3.5,
+        "memory_mb": 30.0,
+        "threads": 4,
+        "up_s": 20.0,
+        "processes": 2,
+    }
+    assert (total([usage(1.5), usage(None)]) or {})["cpu_percent"] is None
+    assert total([None]) is None
+    assert json.loads(to_json(total([usage(0.1), usage(0.2)])))["cpu_percent"] == 0.3
+
+
+def report(name: str, **nodes: dict[str, str]) -> SystemReport:
+    zeros = dict.fromkeys(("since", "restarts", "errors", "sent_hz", "received_hz", "busy"), "0")
+    zeros |= dict.fromkeys(("overruns", "queue_drops"), "0")
+    texts = dict.fromkeys(("last_error", "held_down", "slowest", "qos_events", "depends_on"), "")
+    texts |= dict.fromkeys(("sent", "received", "dropped"), "")
+    usual = {"state": "active", "desired": "active", **zeros, **texts}
+    system = {"activity": "running", "host": "robot", "pid": "1"}
+    statuses = [(f"{name}: /{node}", "", usual | values) for node, values in nodes.items()]
+    return system_report(name, [(name, "", system), *statuses])
+
+
+def test_nodes_have_the_process_that_they_run_in() -> None:
+    found = report(
+        "/robot",
+        own={"pid": "1", "host": ""},
+        other={"pid": "2", "host": "arm", "process": "acting"},
+        ended={"pid": "", "host": ""},
+        of_another_version={},
+    )
+    assert [(node.host, node.pid) for node in found.nodes] == [
+        ("robot", "1"),
+        ("arm", "2"),
+        ("robot", ""),
+        ("robot", ""),
+    ]
+
+
+def test_a_system_is_listed_once() -> None:
+    whole = report("/robot", other={"process": "acting"})
+    acting, alone = report("/robot/acting", other={}), report("/robot/lab", node={})
+    reports = {"/robot": whole, "/robot/acting": acting, "/robot/lab": alone, "/silent": None}
+    assert of_whole_systems(reports).keys() == {"/robot", "/robot/lab", "/silent"}
+    # Without the report of the system, only they have their nodes.
+    assert "/robot/acting" in of_whole_systems({**reports, "/robot": None})
