@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Mapping
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -26,22 +27,37 @@ def wheel_versions() -> dict[str, str]:
 
 
 def complete_package(name: str, folder: Path | None, target: Path) -> None:
-    """Write the complete package to ``target``, which is replaced. Raises CommandError.
+    """Write the complete package to ``target``, which is replaced as a whole. Raises CommandError.
 
     Without a folder, it is a package of ROS whose definitions come with the composer.
     """
     try:
         package = bundled_package(name) if folder is None else read_package(name, folder)
-        files = package.files(wheel_versions())
-        shutil.rmtree(target, ignore_errors=True)
-        for path, text in files.items():
-            file = target / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text, encoding="utf-8")
+        _replace_folder(target, package.files(wheel_versions()))
     except InvalidPackage as error:
         raise CommandError(str(error), hint="with a sourced ROS 2, use --generate") from error
     except (OSError, UnicodeDecodeError) as error:
         raise CommandError(f"cannot complete package '{name}': {error}") from error
+
+
+def _replace_folder(target: Path, files: Mapping[str, str]) -> None:
+    """Write files to a folder, which is as before if that fails. Raises OSError."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as temporary:
+        new, old = Path(temporary, "new"), Path(temporary, "old")
+        new.mkdir()
+        for path, text in files.items():
+            file = new / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        if target.exists():
+            target.rename(old)
+        try:
+            new.rename(target)
+        except OSError:
+            if old.exists():
+                old.rename(target)
+            raise
 
 
 def install_package(name: str, folder: Path) -> None:

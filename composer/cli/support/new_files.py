@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from composer.cli.support.errors import CommandError
@@ -13,38 +14,43 @@ from composer.cli.support.errors import CommandError
 
 def write_new_files(root: Path, files: Mapping[str, str]) -> None:
     """Write new files below ``root``, all or none, and their folders. Raises CommandError."""
-    for path in files:
-        if (root / path).exists():
-            raise CommandError(
-                f"'{root / path}' exists already", hint="choose another name, or remove it first"
-            )
-    written: list[Path] = []
-    try:
-        for path, text in files.items():
-            write_new_file(root / path, text)
-            written.append(root / path)
-    except CommandError:
-        for file in written:
-            file.unlink(missing_ok=True)
-        raise
+    _write(_encoded(root, files), replace=False)
 
 
 def write_exports(root: Path, files: Mapping[str, str], *, replace: bool) -> list[Path]:
-    """Write files below ``root``, and return those that were not there with the same text.
+    """Write files below ``root``, all or none; return those that were not there with this text.
 
-    With ``replace``, each file replaces one that exists. Otherwise, all or none of them are
-    written. Raises CommandError.
+    With ``replace``, files that exist are replaced. Raises CommandError.
     """
     changed = {path: text for path, text in files.items() if not _has_text(root / path, text)}
-    if not replace:
-        try:
-            write_new_files(root, changed)
-        except CommandError as error:
-            raise CommandError(error.message, hint="--force replaces it") from error
-    else:
-        for path, text in changed.items():
-            _write(root / path, text.encode(), os.replace)
+    try:
+        _write(_encoded(root, changed), replace=replace)
+    except CommandError as error:
+        if error.hint is None:
+            raise
+        raise CommandError(error.message, hint="--force replaces it") from error
     return [root / path for path in changed]
+
+
+def write_new_file(path: Path, text: str) -> None:
+    """Write a new file, whole or not at all, and its folder. Raises CommandError."""
+    _write({path: text.encode()}, replace=False)
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write a file in a folder that exists, in place of one there. Raises CommandError."""
+    is_device = path.exists() and not path.is_file()  # such as /dev/stdout or a pipe
+    if path.parent.is_dir() and not is_device:
+        _write({path.resolve(): data}, replace=True)
+        return
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise CommandError(f"cannot write '{path}': {error.strerror}") from error
+
+
+def _encoded(root: Path, files: Mapping[str, str]) -> dict[Path, bytes]:
+    return {root / path: text.encode() for path, text in files.items()}
 
 
 def _has_text(path: Path, text: str) -> bool:
@@ -54,37 +60,73 @@ def _has_text(path: Path, text: str) -> bool:
         return False
 
 
-def write_new_file(path: Path, text: str) -> None:
-    """Write a new file, whole or not at all, and its folder. Raises CommandError."""
-    _write(path, text.encode(), os.link)  # unlike rename(), does not replace a file
+def _write(files: Mapping[Path, bytes], *, replace: bool) -> None:
+    """Write files and their folders, all or none. Raises CommandError."""
+    for path in files:
+        with _errors_of(path):
+            if not replace and path.exists():
+                raise FileExistsError
+    # At the end, first the files of before are restored, if it has failed.
+    with ExitStack() as folders, ExitStack() as temporaries, ExitStack() as placed:
+        new: dict[Path, Path] = {}
+        for path, data in files.items():
+            with _errors_of(path):
+                _make_folder(path.parent, folders)
+                new[path] = _temporary(path, temporaries)
+                new[path].write_bytes(data)
+                new[path].chmod(0o666 & ~_umask())
+        # Nothing has changed until here: what can fail for lack of space has been done.
+        old = {path: _copied(path, temporaries) for path in files if os.path.lexists(path)}
+        for path in files:
+            with _errors_of(path):
+                if replace:
+                    new[path].replace(path)
+                else:
+                    os.link(new[path], path)  # unlike a rename, does not replace a file
+            if path in old:
+                placed.callback(old[path].replace, path)
+            else:
+                placed.callback(path.unlink, missing_ok=True)
+        placed.pop_all()
+        folders.pop_all()
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file in a folder that exists, in place of one there. Raises CommandError."""
-    is_device = path.exists() and not path.is_file()  # such as /dev/stdout or a pipe
-    if path.parent.is_dir() and not is_device:
-        _write(path.resolve(), data, os.replace)
-        return
+def _make_folder(folder: Path, folders: ExitStack) -> None:
+    """Make a folder and its parents, which are removed at the end. Raises OSError."""
+    missing = [item for item in (folder, *folder.parents) if not item.exists()]
+    for item in reversed(missing):
+        with suppress(FileExistsError):
+            item.mkdir()
+            folders.callback(_remove_folder, item)
+
+
+def _remove_folder(folder: Path) -> None:
+    with suppress(OSError):  # another program has written to it
+        folder.rmdir()
+
+
+def _temporary(path: Path, temporaries: ExitStack) -> Path:
+    """Return a new empty file next to ``path``, which is removed at the end. Raises OSError."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    os.close(handle)
+    temporaries.callback(Path(name).unlink, missing_ok=True)
+    return Path(name)
+
+
+def _copied(path: Path, temporaries: ExitStack) -> Path:
+    """Return a copy of a file. Raises CommandError."""
+    with _errors_of(path):
+        copy = _temporary(path, temporaries)
+        copy.unlink()
+        shutil.copy2(path, copy, follow_symlinks=False)
+        return copy
+
+
+@contextmanager
+def _errors_of(path: Path) -> Iterator[None]:
+    """Context manager: an OSError in the block becomes a CommandError about ``path``."""
     try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise CommandError(f"cannot write '{path}': {error.strerror}") from error
-
-
-def _write(path: Path, data: bytes, place: Callable[[Path, Path], None]) -> None:
-    """Write a file, whole or not at all; ``place`` gives the temporary file its name."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        temporary = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            temporary.chmod(0o666 & ~_umask())
-            place(temporary, path)
-        finally:
-            with suppress(FileNotFoundError):
-                temporary.unlink()
+        yield
     except FileExistsError:
         raise CommandError(
             f"'{path}' exists already", hint="choose another name, or remove it first"

@@ -1,0 +1,97 @@
+"""Files that commands write: all or none."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from composer.cli.support import interface_builds
+from composer.cli.support.errors import CommandError
+from composer.cli.support.interface_builds import complete_package
+from composer.cli.support.new_files import write_exports, write_new_files
+
+
+def contents(root: Path) -> dict[str, str]:
+    """Return all files below a folder, with hidden ones; folders have an empty name at the end."""
+    return {
+        f"{path.relative_to(root)}{'/' * path.is_dir()}": "" if path.is_dir() else path.read_text()
+        for path in sorted(root.rglob("*"))
+    }
+
+
+def test_new_files_are_written_with_their_folders(tmp_path: Path) -> None:
+    write_new_files(tmp_path, {"a/b/c.yaml": "c", "d.yaml": "d"})
+    assert contents(tmp_path) == {"a/": "", "a/b/": "", "a/b/c.yaml": "c", "d.yaml": "d"}
+    assert (tmp_path / "d.yaml").stat().st_mode & 0o777 == 0o666 & ~current_umask()
+
+
+def current_umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def test_nothing_is_left_if_a_new_file_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(CommandError, match=r"cannot write '.*file/x.yaml': Not a directory"):
+        write_new_files(tmp_path, {"a/b/c.yaml": "c", "file/x.yaml": "x"})
+    assert contents(tmp_path) == {"file": "in the way"}
+
+
+def test_nothing_is_left_if_a_file_appears_meanwhile(tmp_path: Path) -> None:
+    (tmp_path / "there").symlink_to("nowhere")  # exists() says no
+    with pytest.raises(CommandError, match="there' exists already"):
+        write_new_files(tmp_path, {"a/b/c.yaml": "c", "there": "x"})
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+
+
+@pytest.mark.parametrize("step", ["write", "place"])
+def test_exports_replace_all_files_or_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    (tmp_path / "first").write_text("old")
+    before = contents(tmp_path)
+    files = {"first": "new", "sub/second": "new", "third": "new"}
+    with monkeypatch.context() as patch:
+        if step == "place":
+            replace = Path.replace
+
+            def fails(path: Path, target: Path) -> Path:
+                if target.name == "third":
+                    raise OSError(28, "No space left on device")
+                return replace(path, target)
+
+            patch.setattr(Path, "replace", fails)
+        else:
+            (tmp_path / "third").mkdir()
+            before["third/"] = ""
+        with pytest.raises(CommandError, match=r"cannot write '.*third': (No space|Is a dir)"):
+            write_exports(tmp_path, files, replace=True)
+    assert contents(tmp_path) == before
+    if step == "place":
+        write_exports(tmp_path, files, replace=True)
+        assert contents(tmp_path) == {**files, "sub/": ""}
+
+
+def test_an_interface_package_stays_if_it_cannot_be_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "build" / "tf2_msgs"
+    complete_package("tf2_msgs", None, target)
+    (target / "old").touch()
+    before = contents(tmp_path)
+
+    class Package:
+        def files(self, _: object) -> dict[str, str]:
+            return {"a": "a", "a/b": "b"}  # no folder and file of one name
+
+    monkeypatch.setattr(interface_builds, "bundled_package", lambda _: Package())
+    with pytest.raises(CommandError, match="cannot complete package 'tf2_msgs'"):
+        complete_package("tf2_msgs", None, target)
+    assert contents(tmp_path) == before
+    monkeypatch.undo()
+    complete_package("tf2_msgs", None, target)
+    del before["build/tf2_msgs/old"]
+    assert contents(tmp_path) == before
