@@ -10,7 +10,7 @@ from rclpy.node import Node
 #: A server drops its response if it has not discovered the client within 0.1 s.
 _REPEAT_AFTER_S = 1.0
 #: Names of service types that change nothing begin with these.
-_READS = ("Get", "List", "Describe")
+_READS = ("Get", "List", "Describe", "Plan")
 
 
 def servers_of(node: Node, name: str) -> set[bytes]:
