@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.behavior_checks.arguments import api_signature, constructor, signature_of
 from composer.behavior_checks.attributes import attribute_problem
 from composer.behavior_checks.awaiting import (
     missing_await,
@@ -13,63 +12,50 @@ from composer.behavior_checks.awaiting import (
     unawaited,
     used_without_await,
 )
-from composer.behavior_checks.calls import call_problems
 from composer.behavior_checks.changing_attributes import changing_attributes
 from composer.behavior_checks.classes import class_problems
 from composer.behavior_checks.collection_calls import (
     key_problems,
-    method_problems,
     stored_problems,
 )
-from composer.behavior_checks.elements import element_problems, size_problem
-from composer.behavior_checks.field_values import field_problem
-from composer.behavior_checks.fitting import argument_problem, value_problem
+from composer.behavior_checks.elements import element_problems
+from composer.behavior_checks.fitting import argument_problem
 from composer.behavior_checks.formats import text_problems
+from composer.behavior_checks.function_calls import CallChecker
 from composer.behavior_checks.iteration import iteration_problems
+from composer.behavior_checks.message_values import ValueChecker
 from composer.behavior_checks.misspelled_attributes import misspelled_attributes
 from composer.behavior_checks.node_classes import missing_constructors, undeclared_parameters
 from composer.behavior_checks.operations import (
-    annotations_by_name,
     annotations_of,
     operation_problems,
     returned_exceptions,
-    uncallable,
 )
-from composer.behavior_checks.parts import outside_functions, possible_values, scalar_name
+from composer.behavior_checks.parts import outside_functions, scalar_name
 from composer.behavior_checks.problems import CodeProblem, Kind, distinct
-from composer.behavior_checks.rclpy_calls import rclpy_call, transition_problems
+from composer.behavior_checks.rclpy_calls import transition_problems
 from composer.behavior_checks.returns import must_return, return_problems
-from composer.behavior_source import BehaviorSource, Function, Module
+from composer.behavior_source import BehaviorSource, Function
 from composer.behavior_source.flow import returned_values
 from composer.behavior_source.receivers import lacks_self
-from composer.behavior_source.spans import attribute_span, span_of, start_span
+from composer.behavior_source.spans import attribute_span, span_of
 from composer.behavior_types.annotations import annotated
-from composer.behavior_types.api_values import api_parameters
 from composer.behavior_types.bindings import assigned_pairs, nodes_of
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.handlers import Handler
-from composer.behavior_types.hosted import HostedTypes, rclpy_function
+from composer.behavior_types.hosted import HostedTypes
 from composer.behavior_types.inference import BehaviorTypes
-from composer.behavior_types.objects import fields_expected
 from composer.behavior_types.values import (
-    ApiMethod,
-    ApiValue,
     Collection,
-    CollectionMethod,
-    InterfaceClass,
-    ModuleFunction,
     OwnClass,
-    OwnMethod,
     Parameters,
     Pending,
     Ports,
     Self,
-    Value,
 )
-from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING
-from composer.interfaces import Action, Field, FieldType, Interfaces, Message, Service
+from composer.interfaces import Interfaces, Message
 from composer.model import Node
 from composer.source import Span
 
@@ -150,6 +136,7 @@ class _FunctionChecker:
                     yield from self._attribute(node)
         for pending in used_without_await(self.function, self.scope):
             yield missing_await(pending, self.function, self.scope)
+        calls = CallChecker(self.scope, self._values)
         for node in nodes_of(self.function):
             match node:
                 case ast.Attribute():
@@ -157,7 +144,7 @@ class _FunctionChecker:
                 case ast.Subscript():
                     yield from self._index(node)
                 case ast.Call():
-                    yield from self._call(node)
+                    yield from calls.problems(node)
                 case ast.Assign(targets=[target], value=value):
                     for part, given in assigned_pairs(target, value):
                         yield from self._assignment(part, given)
@@ -168,6 +155,10 @@ class _FunctionChecker:
             yield from text_problems(node, self.scope)
             yield from element_problems(node, self.function, self.scope)
             yield from iteration_problems(node, self.scope)
+
+    @property
+    def _values(self) -> ValueChecker:
+        return ValueChecker(self.scope, self.function)
 
     # --- attributes
 
@@ -202,100 +193,6 @@ class _FunctionChecker:
             if found is not None:
                 yield CodeProblem(found[0], found[1], self._span(index), found[2])
 
-    # --- calls
-
-    def _call(self, node: ast.Call) -> Iterator[CodeProblem]:
-        called = rclpy_function(node, self.scope)
-        if called is not None:
-            yield from rclpy_call(node, called, self.scope, self._value)
-            return
-        match self.scope.type_of(node.func):
-            case InterfaceClass(definition=Message() as message):
-                yield from self._constructor(node, message)
-            case InterfaceClass(definition=Service() | Action() as definition):
-                parts = "Request" if isinstance(definition, Service) else "Goal"
-                name = definition.name.rpartition("/")[2]
-                problem = f"{definition.name} cannot be created"
-                hint = f"create {name}.{parts}()"
-                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
-            case ApiMethod(owner=owner, member=member):
-                signature = api_signature(owner.class_name, member.name)
-                types = api_parameters(owner.class_name, member.name, self.types.interfaces)
-                found = list(call_problems(node, signature, self.scope, types))
-                yield from found
-                expected = self._expected(owner, member.name)
-                if expected is not None and node.args and not found:
-                    yield from self._value(node.args[0], expected)
-            case OwnMethod(method=method, home=home) if method.node is not None:
-                if not lacks_self(method.node):
-                    yield from self._own_call(node, method.node, home, is_bound=True)
-            case ModuleFunction(node=function, home=home, is_bound=is_bound):
-                yield from self._own_call(node, function, home, is_bound=is_bound)
-            case OwnClass() as own:
-                parameters = constructor(own)
-                if parameters is not None:
-                    fields = fields_expected(self.scope, own)
-                    yield from call_problems(node, parameters, self.scope, fields)
-            case CollectionMethod(owner=collection, name=name):
-                yield from method_problems(node, collection, name, self.scope)
-            case other:
-                yield from self._element_added(node)
-                reason = uncallable(other)
-                if reason is not None:
-                    yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
-
-    def _own_call(
-        self, node: ast.Call, function: Function, home: Module, *, is_bound: bool
-    ) -> Iterator[CodeProblem]:
-        signature = signature_of(function, is_bound=is_bound)
-        if signature is not None:
-            expected = annotations_by_name(function, home, self.types)
-            yield from call_problems(node, signature, self.scope, expected)
-
-    def _element_added(self, node: ast.Call) -> Iterator[CodeProblem]:
-        """Check what ``append`` and ``insert`` add to a list in a message."""
-        if isinstance(node.func, ast.Attribute) and node.func.attr in {"append", "insert"}:
-            array = self.scope.type_of(node.func.value)
-            if isinstance(array, FieldType) and array.is_array and node.args:
-                yield from self._value(node.args[-1], array.element)
-
-    def _constructor(self, node: ast.Call, message: Message) -> Iterator[CodeProblem]:
-        for argument in node.args:
-            if not isinstance(argument, ast.Starred):
-                problem = f"{message.name} takes keyword arguments only"
-                fields = ", ".join(f"{name}=..." for name in message.field_names[:3])
-                hint = f"fields: {fields}" if fields else None
-                yield CodeProblem(Kind.VALUE, problem, self._span(argument), hint)
-                return
-        for keyword in node.keywords:
-            if keyword.arg is None:
-                continue
-            field = message.field(keyword.arg)
-            if field is not None:
-                yield from self._field(keyword.value, field)
-            elif keyword.arg != "check_fields":
-                problem = f"{message.name} has no field '{keyword.arg}'"
-                hint = suggestion(keyword.arg, message.field_names)
-                span = start_span(keyword, len(keyword.arg), self.scope.home.source)
-                yield CodeProblem(Kind.FIELD, problem, span, hint)
-                return  # more of them come from the wrong class
-
-    def _expected(self, owner: ApiValue, name: str) -> Message | None:
-        """Return the message that the first argument of a method of the API must be."""
-        port = owner.port
-        definition = self.types.interfaces.find(port.interface.value) if port else None
-        match name, definition:
-            case "publish", Message() as message:
-                return message
-            case "call", Service() as service:
-                return service.request
-            case "send_goal", Action() as action:
-                return action.goal
-            case "publish_feedback", Action() as action:
-                return action.feedback
-            case _:
-                return None
-
     # --- values
 
     def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[CodeProblem]:
@@ -317,7 +214,7 @@ class _FunctionChecker:
         message = owner if isinstance(owner, Message) else None
         field = message.field(target.attr) if message is not None else None
         if field is not None:
-            yield from self._field(value, field)
+            yield from self._values.field(value, field)
 
     def _annotated(self, annotation: ast.expr, value: ast.expr) -> Iterator[CodeProblem]:
         expected = self.scope.annotated(annotation, self.scope.home)
@@ -331,7 +228,7 @@ class _FunctionChecker:
         returns = self.handler.returns if self.handler is not None else ANYTHING
         if isinstance(returns, Message):
             for value in returned_values(self.function):
-                yield from self._value(value, returns)
+                yield from self._values.value(value, returns)
         if isinstance(self.types, HostedTypes):
             yield from must_return(self.function, self.scope, returns)
             return
@@ -339,41 +236,6 @@ class _FunctionChecker:
         if is_service and isinstance(returns, Message):
             return
         yield from return_problems(self.function, self.scope, self.handler)
-
-    def _field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
-        problem = field_problem(node, field, self.scope)
-        if problem is not None:
-            yield problem
-        else:
-            yield from self._value(node, field.type)
-
-    def _value(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
-        for part in possible_values(node, self.scope):
-            found = list(self._part(part, expected))
-            yield from found
-            if found:
-                return  # the other parts have the same cause
-
-    def _part(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
-        found = self.scope.type_of(node)
-        if isinstance(found, Pending):
-            yield missing_await(found, self.function, self.scope)
-            return
-        if isinstance(node, ast.List | ast.Tuple) and isinstance(expected, FieldType):
-            is_checked = expected.is_array and expected.name != "byte"
-            items = [item for item in node.elts if not isinstance(item, ast.Starred)]
-            items = items if is_checked else []
-            wrong = (problem for item in items for problem in self._value(item, expected.element))
-            first = next(wrong, None)  # the others have the same cause
-            if first is not None:
-                yield first
-                return
-        problem = value_problem(node, found, expected, self.types.interfaces)
-        if problem is None and isinstance(expected, FieldType):
-            size = size_problem(node, expected)
-            problem = (size, None) if size is not None else None
-        if problem is not None:
-            yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])
 
     # --- annotations
 

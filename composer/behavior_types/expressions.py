@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import field
-from types import GeneratorType
 from typing import TYPE_CHECKING
 
 from composer.behavior_source import Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.annotations import annotated
-from composer.behavior_types.api_values import api_member, api_result, class_member
 from composer.behavior_types.bindings import Binding, Bindings, How
+from composer.behavior_types.displays import computed
 from composer.behavior_types.literals import constant_type, integer_constant
+from composer.behavior_types.members import attribute_of
 from composer.behavior_types.names import (
     constant_named,
     full_name,
@@ -21,66 +21,39 @@ from composer.behavior_types.names import (
     imported_from,
     interface_name,
 )
-from composer.behavior_types.objects import (
-    attribute_of_class,
-    attribute_of_object,
-    created_object,
-    given_class,
-    returned_by,
-)
-from composer.behavior_types.operators import binary, both, comparison, is_text, unary
 from composer.behavior_types.own_classes import (
     class_named,
 )
-from composer.behavior_types.rclpy_api import is_rclpy, rclpy_value
+from composer.behavior_types.rclpy_api import rclpy_value
 from composer.behavior_types.rebinding import joined, with_changes
+from composer.behavior_types.results import awaited, result_of
 from composer.behavior_types.standard_types import (
-    builtin_result,
-    called,
     element_of,
     exception_type,
-    method_result,
     sliced,
 )
 from composer.behavior_types.values import (
-    NONE,
-    ApiMethod,
     ApiValue,
-    BuiltinMethod,
-    BuiltinObject,
     Collection,
-    CollectionMethod,
     InterfaceClass,
     ModuleFunction,
-    OwnClass,
-    OwnMethod,
     OwnObject,
     Parameters,
-    Pending,
     Ports,
     Self,
     Value,
     join,
-    join_all,
 )
 from composer.fast_dataclass import dataclass
 from composer.field_types import (
     ANYTHING,
     STRING,
     fields_of,
-    parameter_type,
 )
 from composer.interfaces import FieldType, Message
-from composer.model import PortKind
 
 if TYPE_CHECKING:
     from composer.behavior_types.inference import BehaviorTypes
-
-_PORT_CLASSES = {
-    PortKind.PUBLISHER: "Publisher",
-    PortKind.CLIENT: "Client",
-    PortKind.ACTION_CLIENT: "ActionClient",
-}
 
 
 @dataclass(slots=True)
@@ -157,11 +130,11 @@ class FunctionTypes:
                 return self.name(name)
             case ast.Attribute(value=value, attr=name):
                 found = self._global(dotted(node))
-                return self.member(self.type_of(value), name) if found is ANYTHING else found
+                return attribute_of(self, self.type_of(value), name) if found is ANYTHING else found
             case ast.Call():
-                return self._call(node)
+                return result_of(self, node)
             case ast.Await(value=value):
-                return _awaited(self.type_of(value))
+                return awaited(self.type_of(value))
             case ast.Subscript(value=value, slice=index):
                 return self._item(self.type_of(value), index)
             case ast.IfExp(body=first, orelse=second):
@@ -169,51 +142,7 @@ class FunctionTypes:
             case ast.NamedExpr(value=value):
                 return self.type_of(value)
             case _:
-                return self._computed(node)
-
-    def _computed(self, node: ast.expr) -> Value:
-        """Return the type of an operation, or of a collection."""
-        match node:
-            case ast.BinOp(left=left, op=operator, right=right):
-                return binary(self.type_of(left), operator, self.type_of(right))
-            case ast.UnaryOp(op=operator, operand=operand):
-                return unary(operator, self.type_of(operand))
-            case ast.Compare(left=left, ops=operators, comparators=others):
-                return comparison(operators, [self.type_of(item) for item in (left, *others)])
-            case ast.BoolOp(op=operator, values=values):
-                return both(operator, [self.type_of(value) for value in values])
-            case ast.List(elts=items):
-                return Collection(list, self._common(items), is_empty=not items)
-            case ast.Tuple(elts=items):
-                types = tuple(self.type_of(item) for item in items)
-                has_more = any(isinstance(item, ast.Starred) for item in items)
-                return Collection(tuple, join_all(types), items=None if has_more else types)
-            case ast.GeneratorExp(elt=item):
-                return Collection(GeneratorType, self.type_of(item))
-            case ast.Starred(value=value):
-                return self.element(self.type_of(value))
-            case ast.Set(elts=items):
-                return Collection(set, self._common(items))
-            case ast.Dict(keys=keys, values=values):
-                common = self._of_record(values), self._common(keys)
-                return Collection(dict, *common, is_empty=not values)
-            case ast.ListComp(elt=item):
-                return Collection(list, self.type_of(item))
-            case ast.SetComp(elt=item):
-                return Collection(set, self.type_of(item))
-            case ast.DictComp(key=key, value=value):
-                return Collection(dict, self.type_of(value), self.type_of(key))
-            case _:
-                return ANYTHING
-
-    def _common(self, items: Iterable[ast.expr | None]) -> Value:
-        """Return the type of all of the items, ANYTHING if they differ."""
-        return join_all(ANYTHING if item is None else self.type_of(item) for item in items)
-
-    def _of_record(self, values: Sequence[ast.expr]) -> Value:
-        """Return the type of the values of a dict; None is the place of a value of any type."""
-        is_open = any(self.type_of(value) is NONE for value in values)
-        return ANYTHING if is_open else self._common(values)
+                return computed(self, node)
 
     def name(self, name: str) -> Value:
         """Return the type of a name."""
@@ -277,73 +206,6 @@ class FunctionTypes:
         definition = self.owner.interfaces.find(name) if name and not rest else None
         return InterfaceClass(definition) if definition is not None else rclpy_value(full)
 
-    def member(self, owner: Value, name: str) -> Value:
-        """Return the type of attribute ``name`` of a value."""
-        match owner:
-            case Self():
-                return self.owner.attribute(name)
-            case Ports(kind=kind):
-                port = self.owner.node.port(name)
-                found = port is not None and port.kind is kind
-                return ApiValue(_PORT_CLASSES[kind], port) if found else ANYTHING
-            case Parameters():
-                parameter = self.owner.node.parameter(name)
-                if parameter is None:
-                    return ANYTHING
-                choices = parameter.choices.value if parameter.choices is not None else ()
-                value = parameter_type(parameter.type.value, choices)
-                is_array = isinstance(value, FieldType) and value.is_array
-                return Collection(list, element_of(value)) if is_array else value
-            case ApiValue():
-                return api_member(owner, name, self.owner.interfaces)
-            case InterfaceClass(definition=definition):
-                return class_member(definition, name)
-            case Collection():
-                return CollectionMethod(owner, name)
-            case BuiltinObject(python=python):
-                return BuiltinMethod(python, name)
-            case OwnObject():
-                return attribute_of_object(self, owner, name)
-            case OwnClass():
-                return attribute_of_class(owner, name)
-            case FieldType() if is_text(owner):
-                return CollectionMethod(Collection(str, STRING), name)
-            case Message() | FieldType():
-                message = fields_of(owner, self.owner.interfaces)
-                member = message.field(name) if message is not None else None
-                if member is None:
-                    return class_member(message, name) if message is not None else ANYTHING
-                return self._normal(member.type)
-            case _:
-                return ANYTHING
-
-    def _call(self, node: ast.Call) -> Value:
-        match self.type_of(node.func):
-            case InterfaceClass(definition=Message() as message):
-                return message
-            case ApiMethod(owner=owner, member=member):
-                result = api_result(owner, member.name, self.owner.interfaces)
-                return Pending(member.name, node, result) if member.is_async else result
-            case OwnMethod(method=method, home=home) if method.node is not None:
-                return returned_by(self, method.node, home, node)
-            case ModuleFunction(node=function, home=home, parameter=parameter):
-                if is_rclpy(home) and parameter is ANYTHING:
-                    parameter = given_class(self, function, node, is_bound=True)
-                return returned_by(self, function, home, node, parameter)
-            case OwnClass() as own:
-                return created_object(self, own, node)
-            case BuiltinMethod(python=python, name=name):
-                return builtin_result(python, name, [self.type_of(item) for item in node.args])
-            case CollectionMethod(owner=collection, name=name):
-                return method_result(collection, name, [self.type_of(item) for item in node.args])
-        full = self.called_name(node.func)
-        if full == "super" and not node.args:
-            return self.owner.parent(self)
-        if not full or any(isinstance(item, ast.Starred) for item in node.args):
-            return ANYTHING
-        named = {item.arg: self.type_of(item.value) for item in node.keywords if item.arg}
-        return called(full, [self.type_of(item) for item in node.args], named)
-
     def annotated(self, annotation: ast.expr, home: Module) -> Value:
         """Return the type that an annotation in ``home`` names."""
         return annotated(annotation, home, self.owner.node, self.owner.interfaces)
@@ -351,7 +213,7 @@ class FunctionTypes:
     def _item(self, owner: Value, index: ast.expr) -> Value:
         if isinstance(owner, Ports | Parameters):
             name = index.value if isinstance(index, ast.Constant) else None
-            return self.member(owner, name) if isinstance(name, str) else ANYTHING
+            return attribute_of(self, owner, name) if isinstance(name, str) else ANYTHING
         if isinstance(index, ast.Slice):
             return sliced(owner)
         if isinstance(owner, Collection):
@@ -364,7 +226,7 @@ class FunctionTypes:
     def element(self, owner: Value) -> Value:
         """Return the type of what iterating over a value gives."""
         found = element_of(owner)
-        return self._normal(found) if isinstance(found, FieldType) else found
+        return self.normal(found) if isinstance(found, FieldType) else found
 
     def _at(self, owner: Value, position: int) -> Value:
         """Return the type of the item at a position of what is unpacked."""
@@ -373,19 +235,9 @@ class FunctionTypes:
             return owner.items[position] if -count <= position < count else ANYTHING
         return self.element(owner)
 
-    def _normal(self, type_: FieldType) -> Value:
+    def normal(self, type_: FieldType) -> Value:
         """Return the message of a type that is one, so that equal types compare as equal."""
         return fields_of(type_, self.owner.interfaces) or type_
-
-
-def _awaited(awaitable: Value) -> Value:
-    match awaitable:
-        case Pending(result=result):
-            return result
-        case OwnObject(of=of, parameter=parameter) if is_rclpy(of.home):
-            return parameter
-        case _:
-            return ANYTHING
 
 
 def _compatible(annotation: Value, given: Value) -> bool:

@@ -14,6 +14,7 @@ from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.handlers import Handler
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.literals import constant_type
+from composer.behavior_types.members import attribute_of
 from composer.behavior_types.names import own_name
 from composer.behavior_types.objects import annotation_in, given_class
 from composer.behavior_types.own_classes import known_attributes
@@ -143,7 +144,7 @@ class HostedTypes(BehaviorTypes):
     def of_base(self, name: str) -> Value:
         """Return the type of an attribute of rclpy's class."""
         for own in self.bases:
-            found = self._at_base.member(OwnObject(own), name)
+            found = attribute_of(self._at_base, OwnObject(own), name)
             if found is not ANYTHING:
                 return found
         return ANYTHING

@@ -1,0 +1,109 @@
+"""Checks calls: of functions, methods and classes, of messages, and of the API."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.arguments import api_signature, constructor, signature_of
+from composer.behavior_checks.calls import call_problems
+from composer.behavior_checks.collection_calls import method_problems
+from composer.behavior_checks.message_values import ValueChecker
+from composer.behavior_checks.operations import annotations_by_name, uncallable
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_checks.rclpy_calls import rclpy_call
+from composer.behavior_source import Function, Module
+from composer.behavior_source.receivers import lacks_self
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.api_values import api_parameters
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.hosted import rclpy_function
+from composer.behavior_types.objects import fields_expected
+from composer.behavior_types.values import (
+    ApiMethod,
+    ApiValue,
+    CollectionMethod,
+    InterfaceClass,
+    ModuleFunction,
+    OwnClass,
+    OwnMethod,
+)
+from composer.fast_dataclass import dataclass
+from composer.interfaces import Action, Message, Service
+from composer.source import Span
+
+
+@dataclass(frozen=True, slots=True)
+class CallChecker:
+    """Checks the calls in one function."""
+
+    scope: FunctionTypes
+    values: ValueChecker
+
+    def problems(self, node: ast.Call) -> Iterator[CodeProblem]:
+        """Yield why a call fails."""
+        called = rclpy_function(node, self.scope)
+        if called is not None:
+            yield from rclpy_call(node, called, self.scope, self.values.value)
+            return
+        match self.scope.type_of(node.func):
+            case InterfaceClass(definition=Message() as message):
+                yield from self.values.created(node, message)
+            case InterfaceClass(definition=Service() | Action() as definition):
+                parts = "Request" if isinstance(definition, Service) else "Goal"
+                name = definition.name.rpartition("/")[2]
+                problem = f"{definition.name} cannot be created"
+                hint = f"create {name}.{parts}()"
+                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
+            case ApiMethod(owner=owner, member=member):
+                signature = api_signature(owner.class_name, member.name)
+                types = api_parameters(owner.class_name, member.name, self.scope.owner.interfaces)
+                found = list(call_problems(node, signature, self.scope, types))
+                yield from found
+                expected = self._expected(owner, member.name)
+                if expected is not None and node.args and not found:
+                    yield from self.values.value(node.args[0], expected)
+            case OwnMethod(method=method, home=home) if method.node is not None:
+                if not lacks_self(method.node):
+                    yield from self._own_call(node, method.node, home, is_bound=True)
+            case ModuleFunction(node=function, home=home, is_bound=is_bound):
+                yield from self._own_call(node, function, home, is_bound=is_bound)
+            case OwnClass() as own:
+                parameters = constructor(own)
+                if parameters is not None:
+                    fields = fields_expected(self.scope, own)
+                    yield from call_problems(node, parameters, self.scope, fields)
+            case CollectionMethod(owner=collection, name=name):
+                yield from method_problems(node, collection, name, self.scope)
+            case other:
+                yield from self.values.added(node)
+                reason = uncallable(other)
+                if reason is not None:
+                    yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
+
+    def _own_call(
+        self, node: ast.Call, function: Function, home: Module, *, is_bound: bool
+    ) -> Iterator[CodeProblem]:
+        signature = signature_of(function, is_bound=is_bound)
+        if signature is not None:
+            expected = annotations_by_name(function, home, self.scope.owner)
+            yield from call_problems(node, signature, self.scope, expected)
+
+    def _expected(self, owner: ApiValue, name: str) -> Message | None:
+        """Return the message that the first argument of a method of the API must be."""
+        port = owner.port
+        definition = self.scope.owner.interfaces.find(port.interface.value) if port else None
+        match name, definition:
+            case "publish", Message() as message:
+                return message
+            case "call", Service() as service:
+                return service.request
+            case "send_goal", Action() as action:
+                return action.goal
+            case "publish_feedback", Action() as action:
+                return action.feedback
+            case _:
+                return None
+
+    def _span(self, node: ast.expr) -> Span:
+        return span_of(node, self.scope.home.source)

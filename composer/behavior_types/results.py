@@ -1,0 +1,68 @@
+"""The types of what calls return."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.behavior_types.api_values import api_result
+from composer.behavior_types.objects import created_object, given_class, returned_by
+from composer.behavior_types.rclpy_api import is_rclpy
+from composer.behavior_types.standard_types import builtin_result, called, method_result
+from composer.behavior_types.values import (
+    ApiMethod,
+    BuiltinMethod,
+    CollectionMethod,
+    InterfaceClass,
+    ModuleFunction,
+    OwnClass,
+    OwnMethod,
+    OwnObject,
+    Pending,
+    Value,
+)
+from composer.field_types import ANYTHING
+from composer.interfaces import Message
+
+if TYPE_CHECKING:
+    from composer.behavior_types.expressions import FunctionTypes
+
+
+def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
+    """Return the type of what a call returns."""
+    match scope.type_of(node.func):
+        case InterfaceClass(definition=Message() as message):
+            return message
+        case ApiMethod(owner=owner, member=member):
+            result = api_result(owner, member.name, scope.owner.interfaces)
+            return Pending(member.name, node, result) if member.is_async else result
+        case OwnMethod(method=method, home=home) if method.node is not None:
+            return returned_by(scope, method.node, home, node)
+        case ModuleFunction(node=function, home=home, parameter=parameter):
+            if is_rclpy(home) and parameter is ANYTHING:
+                parameter = given_class(scope, function, node, is_bound=True)
+            return returned_by(scope, function, home, node, parameter)
+        case OwnClass() as own:
+            return created_object(scope, own, node)
+        case BuiltinMethod(python=python, name=name):
+            return builtin_result(python, name, [scope.type_of(item) for item in node.args])
+        case CollectionMethod(owner=collection, name=name):
+            return method_result(collection, name, [scope.type_of(item) for item in node.args])
+    full = scope.called_name(node.func)
+    if full == "super" and not node.args:
+        return scope.owner.parent(scope)
+    if not full or any(isinstance(item, ast.Starred) for item in node.args):
+        return ANYTHING
+    named = {item.arg: scope.type_of(item.value) for item in node.keywords if item.arg}
+    return called(full, [scope.type_of(item) for item in node.args], named)
+
+
+def awaited(awaitable: Value) -> Value:
+    """Return the type of what waiting for a value gives."""
+    match awaitable:
+        case Pending(result=result):
+            return result
+        case OwnObject(of=of, parameter=parameter) if is_rclpy(of.home):
+            return parameter
+        case _:
+            return ANYTHING
