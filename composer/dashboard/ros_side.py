@@ -162,11 +162,11 @@ class RosSide:
     def _join(self, stack: ExitStack) -> RosGraphSide:
         from composer.dashboard.observing.observed import Observed, first_topology
         from composer.remote.shared_session import SharedSession
-        from composer.runtime.process.dds_profiles import use_dashboard_profile
+        from composer.runtime.process.dds_announcements import announce_less_often
         from composer.runtime.process.environment import prepare_environment
 
         prepare_environment()
-        use_dashboard_profile(os.environ)
+        announce_less_often(os.environ)
         first = first_topology()
         session = stack.enter_context(SharedSession())
         observed = stack.enter_context(

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import MutableMapping, Sequence
-from pathlib import Path
 
 from composer.model import Discovery
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import has_interface, interface_names
-from composer.runtime.process.dds_profiles import generated_profile, is_own_profile
+from composer.runtime.process.dds_profiles import is_own_profile, save_profile
 from composer.runtime.process.dds_xml import Profile, add, child
-from composer.runtime.process.instance_lock import private_path
 
 _PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
@@ -46,14 +43,10 @@ def use_interfaces(discovery: Discovery | None, environment: MutableMapping[str,
             f" {_RANGE_VARIABLE}"
         ]
     content = profile_for_interfaces(environment[_PROFILES_VARIABLE], interfaces)
-    path = private_path(generated_profile(content))
-    if path is None:
-        return [f"{_UNUSED}: there is no private folder for the profile"]
     try:
-        _write(path, content)
+        environment[_PROFILES_VARIABLE] = str(save_profile(content))
     except OSError as error:
-        return [f"{_UNUSED}: cannot write '{path}': {error.strerror}"]
-    environment[_PROFILES_VARIABLE] = str(path)
+        return [f"{_UNUSED}: cannot write the profile '{error.filename}': {error.strerror}"]
     return []
 
 
@@ -65,10 +58,3 @@ def profile_for_interfaces(path: str, interfaces: Sequence[str]) -> str:
         is_address = interface.replace(".", "").isdigit()
         add(allowed, "address" if is_address else "interface", interface)
     return profile.text()
-
-
-def _write(path: Path, content: str) -> None:
-    """Write the file as a whole: other processes may read it now."""
-    partial = path.with_suffix(f".{os.getpid()}")
-    partial.write_text(content, encoding="utf-8")
-    partial.replace(path)

@@ -8,16 +8,17 @@ second. See docs/decisions/0024-fast-dds-profile.md and
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
 from composer.ownership import TrustedUsers
-from composer.runtime.process.instance_lock import FOLDER_NAME
+from composer.runtime.process.instance_lock import FOLDER_NAME, private_path
 
 _PROFILE = Path(__file__).with_name("fast_dds.xml")
 _PROFILE_FOR_LARGE_SYSTEMS = Path(__file__).with_name("fast_dds_large.xml")
-_PROFILE_FOR_DASHBOARDS = Path(__file__).with_name("fast_dds_dashboard.xml")
 _PROFILE_FOR_COMMANDS = Path(__file__).with_name("fast_dds_commands.xml")
 _PROFILE_FOR_COMMANDS_ON_LOCALHOST = Path(__file__).with_name("fast_dds_commands_localhost.xml")
 #: Read by Fast DDS 2 only; other middleware and later versions do not need the profile.
@@ -62,12 +63,25 @@ def is_own_profile(environment: Mapping[str, str]) -> bool:
     return path in ours or _is_generated(environment)
 
 
-def generated_profile(content: str) -> str:
-    """Return the file name of a profile that is written at run time.
+def is_default_profile(environment: Mapping[str, str]) -> bool:
+    """Say whether the profile is that of :func:`use_discovery_profile`."""
+    return environment.get(_VARIABLE) == str(_PROFILE)
 
-    It follows from the content: processes of a system share the file, also those that start later.
+
+def save_profile(content: str) -> Path:
+    """Write a profile to the folder of the lock files, and return its path. Raises OSError.
+
+    The file name follows from the content: processes of a system share the file, also those that
+    start later.
     """
-    return f"{_GENERATED}{hashlib.sha256(content.encode()).hexdigest()[:16]}.xml"
+    name = f"{_GENERATED}{hashlib.sha256(content.encode()).hexdigest()[:16]}.xml"
+    path = private_path(name)
+    if path is None:
+        raise FileNotFoundError(errno.ENOENT, "there is no private folder for it", name)
+    partial = path.with_suffix(f".{os.getpid()}")  # other processes may read the file now
+    partial.write_text(content, encoding="utf-8")
+    partial.replace(path)
+    return path
 
 
 def _is_generated(environment: Mapping[str, str]) -> bool:
@@ -100,12 +114,3 @@ def use_large_system_profile(environment: MutableMapping[str, str]) -> None:
     """
     if environment.get(_VARIABLE) == str(_PROFILE):
         environment[_VARIABLE] = str(_PROFILE_FOR_LARGE_SYSTEMS)
-
-
-def use_dashboard_profile(environment: MutableMapping[str, str]) -> None:
-    """Select the profile for a process that observes for long: it announces itself less often.
-
-    Other processes answer its first announcement, and it answers theirs.
-    """
-    if environment.get(_VARIABLE) == str(_PROFILE):
-        environment[_VARIABLE] = str(_PROFILE_FOR_DASHBOARDS)

@@ -52,8 +52,16 @@ class Profile:
 
     def text(self) -> str:
         """Return the profile as XML."""
-        ElementTree.register_namespace("", _NAMESPACE)
-        return ElementTree.tostring(self._root, encoding="unicode")
+        return _text(self._root)
+
+
+def without(path: str, name: str) -> str:
+    """Return the profile in the file ``path`` without the elements ``name``, as XML."""
+    root = ElementTree.parse(path).getroot()  # noqa: S314 - a file of ours
+    for parent in tuple(root.iter()):
+        for element in parent.findall(f"{{{_NAMESPACE}}}{name}"):
+            parent.remove(element)
+    return _text(root)
 
 
 def child(parent: Element, name: str) -> Element:
@@ -81,6 +89,11 @@ def extend(parent: Element, text: str) -> None:
 
 def _find(parent: Element, name: str) -> Element | None:
     return parent.find(f"{{{_NAMESPACE}}}{name}")
+
+
+def _text(root: Element) -> str:
+    ElementTree.register_namespace("", _NAMESPACE)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _parse(text: str) -> Element:

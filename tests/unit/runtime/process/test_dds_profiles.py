@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from composer.runtime.process.dds_announcements import announce_less_often
 from composer.runtime.process.dds_profiles import (
     use_command_profile,
-    use_dashboard_profile,
     use_discovery_profile,
     use_large_system_profile,
 )
@@ -73,16 +73,16 @@ def test_a_dashboard_announces_itself_less_often(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
     everything = _settings(environment)
-    use_dashboard_profile(environment)
+    announce_less_often(environment)
     missing = everything - _settings(environment)
     assert missing
     assert all("leaseAnnouncement" in setting for setting in missing)
     selected = dict(environment)
     use_discovery_profile(environment, tmp_path)  # it joins the ROS graph for another browser
-    use_dashboard_profile(environment)
+    announce_less_often(environment)
     assert environment == selected
     configured = {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
-    use_dashboard_profile(configured)
+    announce_less_often(configured)
     assert configured == {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}
 
 
