@@ -16,6 +16,8 @@ from enum import StrEnum
 #: Batches of messages that wait for each subscription, and bytes that wait for one browser.
 MAX_BATCHES = 8
 MAX_BYTES = 16 * 1024 * 1024
+#: Bytes that wait for one subscription: of large messages only the latest are of use.
+MAX_QUEUED_BYTES = 2 * 1024 * 1024
 MAX_REPLIES = 256
 
 
@@ -58,6 +60,7 @@ class Waiting:
     updates: deque[Update] = field(default_factory=deque)
     sequence: int = 0
     dropped: int = 0
+    size: int = 0
 
 
 #: Returns an update of a subscription as it is sent.
@@ -102,7 +105,7 @@ class Outbox:
         waiting = self._subscriptions.pop(subscription, None)
         self._due.pop(subscription, None)
         if waiting is not None:
-            self._size -= sum(update.size for update in waiting.updates)
+            self._size -= waiting.size
 
     def reply(self, message: str | bytes) -> None:
         """Add the response to a request; responses are sent before updates."""
@@ -118,14 +121,17 @@ class Outbox:
             return
         waiting.dropped += update.dropped
         limit = 1 if waiting.delivery is Delivery.LATEST else self._max_batches
-        while waiting.updates and len(waiting.updates) >= limit:
-            self._drop_oldest(waiting)
-        while waiting.updates and self._size + update.size > MAX_BYTES:
+        while waiting.updates and (
+            len(waiting.updates) >= limit
+            or waiting.size + update.size > MAX_QUEUED_BYTES
+            or self._size + update.size > MAX_BYTES
+        ):
             self._drop_oldest(waiting)
         if self._size + update.size > MAX_BYTES:
             waiting.dropped += update.count
             return
         waiting.updates.append(update)
+        waiting.size += update.size
         self._size += update.size
         self._due[subscription] = None
         self._ready.set()
@@ -144,6 +150,7 @@ class Outbox:
         del self._due[subscription]
         waiting = self._subscriptions[subscription]
         update = waiting.updates.popleft()
+        waiting.size -= update.size
         self._size -= update.size
         if waiting.updates:
             self._due[subscription] = None  # at the end: every subscription gets its turn
@@ -152,6 +159,7 @@ class Outbox:
     def _drop_oldest(self, waiting: Waiting) -> None:
         update = waiting.updates.popleft()
         waiting.dropped += update.count
+        waiting.size -= update.size
         self._size -= update.size
 
 

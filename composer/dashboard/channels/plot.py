@@ -42,7 +42,7 @@ class PlotFeed(Feed):
 
     def start(self, ros: RosGraphSide) -> None:
         """Prepare to read the topics."""
-        self._readers = [TopicReader(ros, topic, None, _DEPTH, raw=False) for topic in self._series]
+        self._readers = [TopicReader(ros, topic, None, _DEPTH) for topic in self._series]
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -58,8 +58,9 @@ class PlotFeed(Feed):
             if samples:
                 count += len(samples)
                 at_s = [sample.at_s for sample in samples]
+                messages = [reader.message(sample) for sample in samples]
                 for field in self._series[reader.topic]:
-                    numbers = [_number(sample.content, field) for sample in samples]
+                    numbers = [_number(message, field) for message in messages]
                     series.append(
                         {"topic": reader.topic, "field": field, "at_s": at_s, "values": numbers}
                     )

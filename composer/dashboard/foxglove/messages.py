@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.foxglove.catalog import Channel
-from composer.dashboard.foxglove.frames import WARNING, ClientMessage, number
+from composer.dashboard.foxglove.frames import WARNING, ClientMessage, number, status
 from composer.dashboard.foxglove.link import Link, Running
 from composer.dashboard.foxglove.topics import PublishedFeed, TopicFeed
 from composer.dashboard.messages import Values
@@ -16,6 +16,7 @@ from composer.dashboard.outbox import Update
 _MAX_SUBSCRIPTIONS = 1000
 _MAX_CHANNELS = 100
 _MAX_ITEMS = 10_000
+_SKIPPED = "there are more bytes than the dashboard reads of one topic"
 
 
 class Subscriptions:
@@ -69,13 +70,20 @@ class Subscriptions:
 
     def _sender(self, identifier: int, topic: str) -> Callable[[Update], None]:
         outbox = self._link.outbox
+        skipped, reported = 0, 0
 
         def send(update: Update) -> None:
+            nonlocal skipped, reported
             if update.is_error:
                 self._link.say_error(update)
                 return
             outbox.put(identifier, update)
-            if identifier not in self._slow and outbox.dropped(identifier):
+            skipped += update.dropped
+            if skipped > 2 * reported:
+                reported = skipped
+                text = f"{skipped} messages of '{topic}' were skipped: {_SKIPPED}"
+                self._link.post(status(WARNING, text, f"skipped {topic}"))
+            if identifier not in self._slow and outbox.dropped(identifier) > skipped:
                 self._slow.add(identifier)
                 text = f"messages of '{topic}' are dropped: they are read too slowly"
                 self._link.say(WARNING, text)

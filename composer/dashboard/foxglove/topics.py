@@ -10,7 +10,7 @@ from composer.dashboard.errors import BadRequestError, RequestError, from_ros
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.catalog import Channel
 from composer.dashboard.messages import to_json
-from composer.dashboard.observing.meters import LARGE_TYPES
+from composer.dashboard.observing.large_messages import LARGE_TYPES
 from composer.dashboard.outbox import Delivery, Update
 from composer.qos import QosProfile, Reliability
 
@@ -41,6 +41,7 @@ class TopicFeed(Feed):
         self._channel = channel
         self.is_shared = channel.type in LARGE_TYPES
         self.delivery = Delivery.LATEST if self.is_shared else Delivery.QUEUE
+        self._lost = 0
         self._reader: TopicReader
 
     def start(self, ros: RosGraphSide) -> None:
@@ -52,7 +53,8 @@ class TopicFeed(Feed):
     def poll(self) -> Iterator[Update]:
         """Yield the messages that have arrived."""
         for sample in self._reader.take(_DEPTH):
-            yield Update(sample.content, at_ns=sample.received_ns)
+            lost, self._lost = self._reader.lost - self._lost, self._reader.lost
+            yield Update(sample.content, dropped=lost, at_ns=sample.received_ns)
 
     def close(self) -> None:
         """Unsubscribe."""

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
+from composer.dashboard.observing.large_messages import LARGE_BYTES, LARGE_TYPES, large_profile
 from composer.model import PortKind
 from composer.qos import Durability, QosProfile, Reliability
 
@@ -21,11 +24,6 @@ if TYPE_CHECKING:
     from composer.remote.shared_session import SampledTopic, SharedSession
 
 _DEPTH = 100
-#: Messages of these types are large: few of them may wait.
-LARGE_TYPES = frozenset(
-    f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "PointCloud2", "PointCloud")
-) | {"nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray"}
-_LARGE_DEPTH = 5
 #: A rate is that of the messages of the last seconds.
 _WINDOW_S = 3.0
 #: A topic is silent after this many times the length of the window.
@@ -36,7 +34,10 @@ _MAX_TAKEN = 200
 
 @dataclass(frozen=True, slots=True)
 class TopicFigures:
-    """What was measured of a topic; None where it is not known yet."""
+    """What was measured of a topic; None where it is not known yet.
+
+    ``lost`` counts messages that did not arrive, without those that waited here for too long.
+    """
 
     rate_hz: float | None
     bytes_per_s: float | None
@@ -48,6 +49,8 @@ class TopicFigures:
 
 @dataclass(slots=True)
 class _Meter:
+    subscribe: Callable[[QosProfile], SampledTopic]
+    profile: QosProfile
     sampled: SampledTopic
     has_one_publisher: bool
     users: int = 0
@@ -83,12 +86,15 @@ class TopicMeters:
         if not publishers or len(types) != 1:
             return False
         (type_name,) = types
-        profile = measuring_profile(publishers, type_name)
+        profile = _profile(publishers)
+        if type_name in LARGE_TYPES:
+            profile = large_profile(profile)
+        subscribe = partial(self._session.sample, topic, type_name, raw=True)
         try:
-            sampled = self._session.sample(topic, type_name, profile, raw=True)
+            sampled = subscribe(profile)
         except InvalidValueError:
             return False
-        self._meters[topic] = _Meter(sampled, len(publishers) == 1, users=1)
+        self._meters[topic] = _Meter(subscribe, profile, sampled, len(publishers) == 1, users=1)
         return True
 
     def release(self, topic: str) -> None:
@@ -117,32 +123,34 @@ class TopicMeters:
         self._meters.clear()
 
 
-def measuring_profile(publishers: Sequence[ObservedEndpoint], type_name: str) -> QosProfile:
-    """Return a profile for measurements: messages from before the subscription do not arrive.
-
-    Large messages are requested without reliability, so that a reader that is late never delays a
-    publisher.
-    """
-    is_large = type_name in LARGE_TYPES
+def _profile(publishers: Sequence[ObservedEndpoint]) -> QosProfile:
+    """Return a profile for measurements: messages from before the subscription do not arrive."""
     reliable = all(
         end.qos is not None and end.qos.reliability is Reliability.RELIABLE for end in publishers
     )
     return QosProfile(
-        depth=_LARGE_DEPTH if is_large else _DEPTH,
-        reliability=Reliability.RELIABLE if reliable and not is_large else Reliability.BEST_EFFORT,
+        depth=_DEPTH,
+        reliability=Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
         durability=Durability.VOLATILE,
     )
 
 
 def _take(meter: _Meter) -> None:
-    for sample in meter.sampled.take(_MAX_TAKEN):
+    samples = meter.sampled.take(_MAX_TAKEN)
+    is_complete = len(samples) < meter.profile.depth
+    for sample in samples:
         published = 1
         if meter.has_one_publisher and 0 < meter.last_number < sample.number:
             published = sample.number - meter.last_number
-            meter.lost += published - 1
+            meter.lost += (published - 1) * is_complete
         meter.last_number = sample.number
         meter.messages += 1
         meter.window.append((sample.at_s, len(sample.content), published))
+    large = large_profile(meter.profile)
+    if large != meter.profile and any(len(sample.content) >= LARGE_BYTES for sample in samples):
+        meter.sampled.close()
+        meter.profile, meter.sampled = large, meter.subscribe(large)
+        meter.last_number = 0
 
 
 def _figures(meter: _Meter, now_s: float) -> TopicFigures:

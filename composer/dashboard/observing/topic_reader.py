@@ -1,14 +1,21 @@
-"""One topic whose messages a channel shows: finds its type and QoS, and follows changes of both."""
+"""One topic whose messages a channel shows: finds its type and QoS, and follows changes of both.
+
+Of large messages, and of more bytes per second than a reader can use, some are skipped.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import time
 from typing import TYPE_CHECKING
 
 from composer.dashboard.errors import RequestError
-from composer.dashboard.observing.meters import LARGE_TYPES
+from composer.dashboard.observing.large_messages import (
+    LARGE_BYTES,
+    LARGE_TYPES,
+    ByteLimit,
+    large_profile,
+)
 from composer.model import PortKind
-from composer.qos import Durability, Reliability
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
@@ -16,22 +23,14 @@ if TYPE_CHECKING:
     from composer.qos import QosProfile
     from composer.remote.shared_session import Sample, SampledTopic
 
-#: Large messages that may wait for the next poll.
-_LARGE_DEPTH = 5
-
 
 class TopicReader:
-    """Reads a topic, as bytes on request. Use it on the thread of feeds."""
+    """Reads a topic as bytes. Use it on the thread of feeds.
 
-    def __init__(
-        self,
-        ros: RosGraphSide,
-        topic: str,
-        type_name: str | None,
-        depth: int,
-        *,
-        raw: bool = True,
-    ) -> None:
+    ``lost`` counts the messages that were published and not read.
+    """
+
+    def __init__(self, ros: RosGraphSide, topic: str, type_name: str | None, depth: int) -> None:
         """Begin at the first call of :meth:`take`; without a type, it is that of the publishers."""
         self.topic = topic
         self.type_name = type_name or ""
@@ -39,7 +38,8 @@ class TopicReader:
         self._ros = ros
         self._given_type = type_name
         self._depth = depth
-        self._raw = raw
+        self._limit = ByteLimit()
+        self._is_large = False
         self._sampled: SampledTopic | None = None
         self._profile: QosProfile | None = None
         self._last_number = 0
@@ -50,15 +50,20 @@ class TopicReader:
         Raises RosError, RequestError if the topic has no publisher or no single, installed type.
         """
         self._subscribe()
-        samples = [] if self._sampled is None else self._sampled.take(limit)
+        if self._sampled is None or not self._limit.allows(time.monotonic()):
+            return []  # what waits too long is dropped by DDS, without being copied
+        samples = self._sampled.take(limit)
         for sample in samples:
+            size = len(sample.content)
+            self._limit.count(size)
+            self._is_large = self._is_large or size >= LARGE_BYTES
             if 0 < self._last_number < sample.number:
                 self.lost += sample.number - self._last_number - 1
             self._last_number = sample.number
         return samples
 
     def message(self, sample: Sample) -> object:
-        """Return the message of a sample of bytes."""
+        """Return the message of a sample."""
         assert self._sampled is not None  # noqa: S101 - it is the source of the sample
         return self._sampled.message(sample)
 
@@ -80,9 +85,8 @@ class TopicReader:
         if self._sampled is not None and (profile, type_name) == (self._profile, self.type_name):
             return
         self.close()
-        self._last_number = 0
         self.type_name, self._profile = type_name, profile
-        self._sampled = self._ros.session.sample(self.topic, type_name, profile, raw=self._raw)
+        self._sampled = self._ros.session.sample(self.topic, type_name, profile, raw=True)
 
     def _only_type(self, publishers: list[ObservedEndpoint]) -> str:
         types = sorted({end.type for end in publishers})
@@ -95,17 +99,9 @@ class TopicReader:
         return types[0]
 
     def _wanted_profile(self, publishers: list[ObservedEndpoint], type_name: str) -> QosProfile:
-        """Return the strictest profile that all publishers satisfy.
-
-        A stream of large messages is not requested reliably: a reader that is late would delay a
-        publisher. Latched ones, such as maps, only arrive if they are.
-        """
+        """Return the strictest profile that all publishers satisfy, except for large messages."""
         from composer.remote.messages.topics import strictest_compatible_qos
 
         offers = [end.qos for end in publishers if end.qos is not None]
         profile = strictest_compatible_qos(offers, self._depth)
-        if type_name in LARGE_TYPES:
-            profile = replace(profile, depth=min(self._depth, _LARGE_DEPTH))
-            if profile.durability is Durability.VOLATILE:
-                return replace(profile, reliability=Reliability.BEST_EFFORT)
-        return profile
+        return large_profile(profile) if self._is_large or type_name in LARGE_TYPES else profile

@@ -236,6 +236,24 @@ def test_nonsense_and_large_messages_end_only_their_connection(server: Dashboard
     assert server.memory_mb() < before_mb + 30
 
 
+def test_messages_of_any_type_are_skipped_if_they_have_too_many_bytes(server: Dashboard) -> None:
+    with raw(server.address) as client, browser(server.address) as page:
+        client.subscribe("/large")
+        client.wait(
+            lambda: any("messages of '/large' were skipped" in text for text in client.said)
+        )
+        assert client.is_served()
+        # What is skipped for the page is counted there, and only the dashboard has not read it.
+        echo = page.subscribe("echo", topic="/large", fields=["data"], max_hz=100)
+        page.until(echo, lambda data: data["messages"])
+        page.wait(lambda: any(each["dropped"] > 5 for each in page.updates if each["sub"] == echo))
+        topics = page.subscribe("topics", measure=["/large"])
+        data = page.until(
+            topics, lambda data: (data["figures"].get("/large", {}).get("messages") or 0) > 3
+        )
+        assert data["figures"]["/large"]["mean_bytes"] > 1_000_000
+
+
 def test_clients_that_never_read_cost_no_memory(server: Dashboard) -> None:
     with ExitStack() as stack, raw(server.address) as other:
         for _ in range(10):

@@ -1,6 +1,7 @@
 """A plain rclpy node that publishes images: /camera (rgb8, 640 x 480) at 30 Hz.
 
-It also publishes a simulated time on /clock, which begins at 1000 s, and once a latched /map.
+It also publishes a simulated time on /clock, which begins at 1000 s, once a latched /map, and for
+subscriptions 120 MB per second on /large, in messages of 1 MB.
 
 Prints ``ready`` at the start.
 """
@@ -17,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import UInt8MultiArray
 
 WIDTH, HEIGHT = 640, 480
 #: The smallest valid PNG: one transparent pixel.
@@ -38,6 +40,8 @@ class Camera(Node):
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.maps = self.create_publisher(OccupancyGrid, "/map", kept)
         self.maps.publish(OccupancyGrid(data=[0, 100, -1]))
+        self.large = self.create_publisher(UInt8MultiArray, "/large", 10)
+        self.content = UInt8MultiArray(data=array("B", bytes(1_000_000)))
         self.clocks = self.create_publisher(Clock, "/clock", 10)
         self.time = Clock()
         self.time.clock.sec = 1000
@@ -47,6 +51,8 @@ class Camera(Node):
         self.time.clock.sec += 1
         self.clocks.publish(self.time)
         self.images.publish(self.image)
+        for _ in range(4 if self.large.get_subscription_count() else 0):
+            self.large.publish(self.content)
         self.compressed.publish(CompressedImage(format="png", data=PNG))
 
 

@@ -24,7 +24,7 @@ const COLUMNS = [
   { id: "dropped", label: "Dropped", number: true, level: 3, value: (node) => node.queue_drops, text: (node) => count(node.queue_drops), tone: (node) => (node.queue_drops > 0 ? "warn" : "") },
   { id: "errors", label: "Errors", number: true, value: (node) => node.errors, text: (node) => count(node.errors), tone: (node) => (node.errors > 0 ? "bad" : "") },
   { id: "restarts", label: "Restarts", number: true, level: 3, value: (node) => node.restarts, text: (node) => count(node.restarts), tone: (node) => (node.restarts > 0 ? "warn" : "") },
-  { id: "slowest", label: "Slowest callback", level: 3, text: (node) => node.slowest ?? "" },
+  { id: "slowest", label: "Slowest callback", level: 4, text: (node) => node.slowest ?? "" },
 ];
 
 function wanted(node) {

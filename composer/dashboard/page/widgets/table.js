@@ -2,7 +2,7 @@
  * A table whose rows keep their elements when the data changes, so that nothing flickers.
  *
  * A column is {id, label, text(row), value(row), render(row), number, level}: `text` or `render` (a node)
- * fills a cell, `value` sorts, a `number` is aligned to the right, and `level` 2 and 3 are left out on
+ * fills a cell, `value` sorts, a `number` is aligned to the right, and `level` 2 to 4 are left out on
  * narrow screens. The first column is the link that `hrefOf` returns.
  */
 import { button, empty, h, setText } from "../dom.js";
