@@ -7,6 +7,7 @@ import shlex
 from pathlib import PurePosixPath
 
 from composer.fast_dataclass import dataclass
+from composer.model.hosts import pattern_of
 
 CONTAINERFILE = PurePosixPath("Containerfile")
 #: Where BuildKit and podman look for it first.
@@ -64,7 +65,7 @@ class Contents:
     ``file`` is the file of the system below the root of its project. ``composer`` is the
     requirement of the composer for pip, ``python`` the version of Python (3.12).
     ``has_requirements`` is whether the project has a requirements.txt, ``has_interfaces`` whether
-    it has interface packages to be compiled.
+    it has interface packages to be compiled. ``private`` are files below the root that stay here.
     """
 
     system: str
@@ -73,6 +74,7 @@ class Contents:
     python: str = "3.12"
     has_requirements: bool = False
     has_interfaces: bool = False
+    private: tuple[PurePosixPath, ...] = ()
 
     @property
     def run(self) -> list[str]:
@@ -96,6 +98,6 @@ def containerfile(contents: Contents) -> str:
     )
 
 
-def ignored_files() -> str:
+def ignored_files(contents: Contents) -> str:
     """Return the names of files that are not copied into the image."""
-    return _IGNORED
+    return _IGNORED + "".join(f"{pattern_of(path)}\n" for path in contents.private)

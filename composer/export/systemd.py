@@ -178,7 +178,8 @@ def _description(system: System, service: Service | None = None) -> str:
     elif service is not None and service.process is not None:
         part = f", process {service.process.name}"
     text = f": {system.description}" if system.description and not part else ""
-    return _escaped(" ".join(f"ROS 2 system {system.name}{part}{text}".split()))
+    line = " ".join(f"ROS 2 system {system.name}{part}{text}".split())
+    return _escaped(line.rstrip("\\ "))  # one at the end would continue the line
 
 
 def _workspace(environment: Mapping[str, str]) -> dict[str, str]:

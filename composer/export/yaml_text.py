@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -44,7 +45,8 @@ def yaml_text(document: Mapping[str, Any]) -> str:
 
     Keys such as ``#1`` stand for comments, whose values are their texts.
     """
-    text = yaml.dump(document, Dumper=_Dumper, sort_keys=False, width=10_000, allow_unicode=True)
+    width: Any = math.inf  # a line that begins within a text could look like a comment
+    text = yaml.dump(document, Dumper=_Dumper, sort_keys=False, width=width, allow_unicode=True)
     return _COMMENT.sub(_comment, text)
 
 

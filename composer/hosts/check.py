@@ -72,7 +72,7 @@ async def _ask(
 ) -> Inventory:
     command = python_command(host, ("-m", "composer.hosts.inventory"), os.environ)
     try:
-        process = await connection.create_process(command)
+        process = await connection.create_process(command, errors="replace")
         with suppress(BrokenPipeError):  # it has ended already; its exit code says why
             process.stdin.write(written_question(question))
             process.stdin.write_eof()

@@ -34,27 +34,9 @@ async def connect(host: Host, root: Path) -> asyncssh.SSHClientConnection:
     Settings in ``~/.ssh/config`` apply, but passwords are never asked for, agents never forwarded
     and unknown host keys never accepted.
     """
-    options = asyncssh.SSHClientConnectionOptions(
-        port=() if host.port is None else host.port,
-        username=() if host.user is None else host.user.value,
-        client_keys=() if host.identity_file is None else [str(key_file(host.identity_file, root))],
-        known_hosts=() if host.known_hosts is None else str(key_file(host.known_hosts, root)),
-        public_key_auth=True,
-        password_auth=False,
-        kbdint_auth=False,
-        host_based_auth=False,
-        gss_auth=False,
-        gss_kex=False,
-        agent_forwarding=False,
-        x11_forwarding=False,
-        connect_timeout=_CONNECT_WITHIN_S,
-        login_timeout=_CONNECT_WITHIN_S,
-        keepalive_interval=_KEEPALIVE_S,
-        keepalive_count_max=_KEEPALIVE_COUNT,
-        host=host.address.value,
-    )
     port = "" if host.port is None else f" -p {host.port}"
     try:
+        options = _options(host, root)
         return await asyncssh.connect(host.address.value, options=options)
     except asyncssh.HostKeyNotVerifiable as error:
         known = f" -o UserKnownHostsFile={host.known_hosts}" if host.known_hosts else ""
@@ -77,6 +59,32 @@ async def connect(host: Host, root: Path) -> asyncssh.SSHClientConnection:
         ) from error
     except OSError as error:
         raise HostError(host, f"cannot connect: {_reason(error)}") from error
+    except ValueError as error:  # of a file that asyncssh reads
+        reason = f"cannot read the configuration, keys or known hosts of ssh: {error}"
+        raise HostError(host, reason, "check the files in ~/.ssh") from error
+
+
+def _options(host: Host, root: Path) -> asyncssh.SSHClientConnectionOptions:
+    """Return the options of a connection. Raises ValueError, OSError."""
+    return asyncssh.SSHClientConnectionOptions(
+        port=() if host.port is None else host.port,
+        username=() if host.user is None else host.user.value,
+        client_keys=() if host.identity_file is None else [str(key_file(host.identity_file, root))],
+        known_hosts=() if host.known_hosts is None else str(key_file(host.known_hosts, root)),
+        public_key_auth=True,
+        password_auth=False,
+        kbdint_auth=False,
+        host_based_auth=False,
+        gss_auth=False,
+        gss_kex=False,
+        agent_forwarding=False,
+        x11_forwarding=False,
+        connect_timeout=_CONNECT_WITHIN_S,
+        login_timeout=_CONNECT_WITHIN_S,
+        keepalive_interval=_KEEPALIVE_S,
+        keepalive_count_max=_KEEPALIVE_COUNT,
+        host=host.address.value,
+    )
 
 
 def load_keys(host: Host, root: Path) -> None:
@@ -89,7 +97,7 @@ def load_keys(host: Host, root: Path) -> None:
     path = key_file(host.identity_file, root)
     try:
         asyncssh.read_private_key(path)
-    except asyncssh.KeyImportError as error:
+    except ValueError as error:
         text = str(error).lower()
         if "passphrase" in text:
             raise HostError(

@@ -33,6 +33,7 @@ _ENDS_WITHIN_S = 20.0
 _USAGE, _CONFIG = 2, 78
 _FINAL = (_USAGE, _CONFIG, NO_WORKSPACE, NO_SETUP, NO_PYTHON)
 _GUARD = "composer.hosts.guard"
+_SESSIONS = "a host needs one for each process: increase MaxSessions in its sshd_config"
 #: What the process that coordinates reports as well.
 _COMPOSE = "compose"
 
@@ -99,9 +100,12 @@ class Deployment:
             _, left = await asyncio.wait(serving, timeout=_ENDS_WITHIN_S)
             for task in left:
                 task.cancel()
-            await asyncio.gather(*serving, return_exceptions=True)
+            results = await asyncio.gather(*serving, return_exceptions=True)
         if self._problem is not None:
             raise self._problem
+        for result in results:
+            if isinstance(result, Exception):  # a defect: it has ended everything
+                raise result
         return code
 
     async def _coordinate(self) -> int:
@@ -155,6 +159,9 @@ class Deployment:
                 self.end()
                 await asyncio.gather(*tasks, return_exceptions=True)
                 return
+            except Exception:
+                self.end()
+                raise
             else:
                 return
             current = await self._reconnect(host)
@@ -192,7 +199,10 @@ class Deployment:
     async def _run_once(
         self, item: RemoteProcess, connection: asyncssh.SSHClientConnection
     ) -> tuple[int, str]:
-        """Run a process to its end; return its exit code and the last lines of its output."""
+        """Run a process to its end; return its exit code and the last lines of its output.
+
+        Raises HostError, asyncssh.Error.
+        """
         tail: list[str] = []
 
         def show(text: str) -> None:
@@ -205,7 +215,16 @@ class Deployment:
         run = ("-m", "composer", "run", self._options.system, *self._options.start)
         words = (*run, "--process", item.process.name.value)
         command = python_command(item.host, words, os.environ, SILENCE_S)
-        process = await connection.create_process(command, encoding=None, stderr=asyncssh.STDOUT)
+        try:
+            process = await connection.create_process(
+                command, encoding=None, stderr=asyncssh.STDOUT
+            )
+        except asyncssh.ChannelOpenError as error:
+            if connection.is_closed():
+                raise
+            raise HostError(
+                item.host, "its ssh server refuses another session", _SESSIONS
+            ) from error
         beat = asyncio.create_task(self._beat(process))
         lines = OutputLines(show)
         try:

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from importlib.metadata import distributions
 from pathlib import Path
+from typing import Any
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces.sources import installed_prefixes
@@ -67,9 +68,17 @@ def read_answer(text: str) -> Inventory:
     line = next((line for line in reversed(text.splitlines()) if line.startswith("{")), "")
     try:
         found = json.loads(line)
-        return Inventory(found["python"], found["packages"], found["interfaces"], found["files"])
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        facts = (found["packages"], found["interfaces"], found["files"])
+        return Inventory(str(found["python"]), *map(_texts, facts))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError("not an inventory") from error
+
+
+def _texts(facts: Mapping[str, str | None]) -> dict[str, Any]:
+    """Return texts by name, None for what is not there. Raises ValueError, AttributeError."""
+    if not all(value is None or isinstance(value, str) for value in facts.values()):
+        raise ValueError("not only texts")
+    return dict(facts)
 
 
 def _packages() -> dict[str, str]:

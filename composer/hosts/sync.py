@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import asyncssh
 
@@ -13,6 +13,7 @@ from composer.fast_dataclass import dataclass
 from composer.hosts.connection import HostError, key_file
 from composer.hosts.remote_command import quoted_path, workspace
 from composer.model import Host
+from composer.model.hosts import pattern_of
 
 #: In a workspace: it holds a copy of a project, which may be replaced.
 MARK = ".compose-sync"
@@ -30,6 +31,7 @@ EXCLUDED = (
     "node_modules",
 )
 _NOT_OURS, _NOT_WRITABLE = 74, 75
+_FOLDER = "compose-workspace:"
 _COPY_WITHIN_S = 3600.0
 
 
@@ -38,12 +40,13 @@ class SyncOptions:
     """What to copy: everything below ``root`` but ``EXCLUDED``.
 
     With ``delete``, files of the workspace that are not in the project are deleted. With
-    ``dry_run``, nothing is changed.
+    ``dry_run``, nothing is changed. ``private`` are files below ``root`` that stay here.
     """
 
     root: Path
     delete: bool = False
     dry_run: bool = False
+    private: tuple[PurePosixPath, ...] = ()
 
 
 def root_problem(root: Path) -> str | None:
@@ -63,16 +66,13 @@ async def prepare_workspace(
     Raises HostError.
     """
     folder = quoted_path(workspace(host))
-    lines = (
-        [f"echo {folder}", f"[ -d {folder} ] || exit 0"]
-        if dry_run
-        else [f"echo {folder}", f"mkdir -p {folder}"]
-    )
+    lines = [f"printf '\\n{_FOLDER}%s\\n' {folder}"]
+    lines.append(f"[ -d {folder} ] || exit 0" if dry_run else f"mkdir -p {folder}")
     lines += [f"cd {folder}", f'[ -e {MARK} ] || [ -z "$(ls -A)" ] || exit {_NOT_OURS}']
     lines += [] if dry_run else [f"touch {MARK}"]
     script = " && ".join(f"{{ {line}; }}" for line in lines) + f" || exit {_NOT_WRITABLE}"
     try:
-        done = await connection.run(f"exec sh -c {shlex.quote(script)}")
+        done = await connection.run(f"exec sh -c {shlex.quote(script)}", errors="replace")
     except (asyncssh.Error, OSError) as error:
         raise HostError(host, f"connection lost: {error}") from error
     name = workspace(host)
@@ -82,11 +82,21 @@ async def prepare_workspace(
             f"the workspace '{name}' holds other files, which were not copied by 'compose sync'",
             f"choose another folder; or permit it: ssh {host.login} touch {name}/{MARK}",
         )
-    lines = (str(done.stdout or "") + str(done.stderr or "")).splitlines()
-    path = next((line for line in lines if line.startswith("/")), None)
+    output = str(done.stdout or "")
+    path = folder_in(output)
     if done.exit_status != 0 or path is None:
+        lines = (output + str(done.stderr or "")).splitlines()
         raise HostError(host, f"cannot write to '{name}': {lines[-1] if lines else 'no reason'}")
     return path
+
+
+def folder_in(output: str) -> str | None:
+    """Return the absolute path of the workspace in the output of the command that prepares it.
+
+    Other lines come from start-up files of the shell.
+    """
+    found = [line for line in output.splitlines() if line.startswith(f"{_FOLDER}/")]
+    return found[-1].removeprefix(_FOLDER) if found else None
 
 
 def copy_project(host: Host, target: str, options: SyncOptions) -> tuple[str, ...]:
@@ -101,6 +111,7 @@ def copy_project(host: Host, target: str, options: SyncOptions) -> tuple[str, ..
             check=False,
             capture_output=True,
             text=True,
+            errors="replace",
             stdin=subprocess.DEVNULL,
             timeout=_COPY_WITHIN_S,
         )
@@ -122,7 +133,9 @@ def rsync_command(host: Host, target: str, options: SyncOptions) -> list[str]:
     settings = {"BatchMode": "yes", "StrictHostKeyChecking": "yes", "PasswordAuthentication": "no"}
     files = {"IdentityFile": host.identity_file, "UserKnownHostsFile": host.known_hosts}
     settings |= {
-        name: str(key_file(file, options.root)) for name, file in files.items() if file is not None
+        name: str(key_file(file, options.root)).replace("%", "%%")  # ssh replaces %h and others
+        for name, file in files.items()
+        if file is not None
     }
     for name, value in settings.items():
         quoted = f'"{value}"' if " " in value else value
@@ -141,6 +154,7 @@ def rsync_command(host: Host, target: str, options: SyncOptions) -> list[str]:
         *(["--delete"] if options.delete else []),
         *(["--dry-run"] if options.dry_run else []),
         *(f"--exclude={pattern}" for pattern in EXCLUDED),
+        *(f"--exclude={pattern_of(path)}" for path in options.private),
         f"--rsh={shlex.join(ssh)}",
         "--",
         f"{options.root}{os.sep}",

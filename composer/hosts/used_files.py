@@ -7,16 +7,18 @@ from pathlib import Path
 
 from composer.behavior_source import find_behavior
 from composer.hosts.inventory import Question
-from composer.model import BehaviorReference, System
+from composer.model import BehaviorReference, Executable, System
 from composer.project import SETTINGS_FILE, Project
 from composer.source import SourceFile
+
+_LONGEST_NAME = 256  # of a file, for Linux
 
 
 def question_about(system: System, path: Path, project: Project) -> Question:
     """Return what other computers must have in common with this one to run the system in ``path``.
 
-    The files are those of the project: YAML, parameters, Python code and settings. What is
-    installed is compared by its version.
+    The files are those of the project: YAML, parameters, Python code, programs and settings. What
+    is installed is compared by its version.
     """
     names = {
         str(found.resolve().relative_to(project.root))
@@ -32,6 +34,8 @@ def _files(system: System, project: Project) -> Iterator[Path]:
         yield Path(source.path)
     for node in system.nodes:
         yield from node.type_files
+        if node.executable is not None:
+            yield from _words_of(node.executable)
     seen: set[tuple[str, Path]] = set()
     for reference in _references(system):
         key = (reference.text.value, reference.folder)
@@ -39,6 +43,16 @@ def _files(system: System, project: Project) -> Iterator[Path]:
             seen.add(key)
             yield from (module.path for module in find_behavior(reference).own_modules)
     yield project.root / SETTINGS_FILE
+
+
+def _words_of(executable: Executable) -> Iterator[Path]:
+    """Yield the words of the command of a program, as files: a script may be any of them."""
+    folder = executable.folder
+    if executable.working_directory is not None:
+        folder /= executable.working_directory.value
+    for word in executable.command:
+        if len(word.value) < _LONGEST_NAME:
+            yield folder / word.value
 
 
 def _sources(system: System) -> Iterator[SourceFile]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Iterable
 from dataclasses import field
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 from composer.fast_dataclass import dataclass
 from composer.source import Located, Span
@@ -36,6 +39,25 @@ class Host:
     def login(self) -> str:
         """The address, with the user if that is set: ``robot@192.168.1.20``."""
         return self.address.value if self.user is None else f"{self.user}@{self.address}"
+
+
+def private_files(hosts: Iterable[Host], root: Path) -> tuple[PurePosixPath, ...]:
+    """Return the private keys of hosts that are below ``root``, relative to it.
+
+    They are never copied to other computers, nor into images.
+    """
+    found: set[PurePosixPath] = set()
+    for host in hosts:
+        if host.identity_file is not None and not host.identity_file.startswith("~"):
+            path = os.path.relpath(root / host.identity_file, root)
+            if not path.startswith(".."):
+                found.add(PurePosixPath(path))
+    return tuple(sorted(found))
+
+
+def pattern_of(path: PurePosixPath) -> str:
+    """Return the pattern of one file below a root, for rsync and for .dockerignore."""
+    return "/" + re.sub(r"[*?\[]", r"\\\g<0>", str(path))
 
 
 def workspace_problem(text: str) -> str | None:

@@ -39,7 +39,7 @@ VALUES = {
     "DATE": "2001-01-01",
     "PRICE": "$5 $HOME $(HOME) $$ %d \"'\\ #x",
     "TEXT": "a: b",
-    "LONG": "x" * 300 + " y" * 300,
+    "LONG": "x" * 300 + " y" * 6000 + " #1: " * 10,
     "EMPTY": "",
 }
 
@@ -48,7 +48,7 @@ VALUES = {
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a project with a system, in the current folder."""
     (tmp_path / "systems").mkdir()
-    text = SYSTEM.replace("LONG: LONG", f"LONG: {VALUES['LONG']}")
+    text = SYSTEM.replace("LONG: LONG", f'LONG: "{VALUES["LONG"]}"')
     (tmp_path / "systems" / "robot.yaml").write_text(text)
     monkeypatch.chdir(tmp_path)
     for name in VARIABLES:
@@ -206,6 +206,14 @@ def test_the_image_has_what_the_project_needs(project: Path) -> None:
     text = (project / "deploy" / "Containerfile").read_text()
     assert "COPY requirements.txt .\n" in text
     assert "compose interfaces build" in text
+
+
+def test_the_image_has_no_private_keys(project: Path) -> None:
+    add(project, "hosts: {jetson: {identity_file: keys/robot}, arm: {identity_file: ~/.ssh/id}}\n")
+    export("docker-compose", "-o", "deploy")
+    ignored = (project / "deploy" / "Containerfile.dockerignore").read_text().splitlines()
+    assert "/keys/robot" in ignored
+    assert not [line for line in ignored if ".ssh" in line]
 
 
 def test_two_formats_share_the_image(project: Path) -> None:

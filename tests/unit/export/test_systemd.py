@@ -28,7 +28,7 @@ hosts: {jetson: {}}
 
 def system_of(folder: Path, text: str = "") -> tuple[System, Path]:
     path = folder / "my robot.yaml"
-    path.write_text(f"system: robot\ndescription: 100 %\n{NODES}{text}")
+    path.write_text(f"system: robot\ndescription: 100 % \\\n{NODES}{text}")
     found = load(path).system
     assert found is not None
     return found, path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 
@@ -15,6 +15,7 @@ from composer.hosts.remote_command import (
     quoted_path,
 )
 from composer.model import Host
+from composer.model.hosts import private_files
 from composer.source import Located, SourceFile, Span
 
 SPAN = Span(SourceFile("robot.yaml"), 1, 1)
@@ -93,19 +94,31 @@ def test_rsync_has_the_options_of_the_host(tmp_path: Path) -> None:
         user=located("pilot"),
         address=located("fe80::1"),
         port=2222,
-        identity_file="keys/my key",
+        identity_file="keys/my %h key",
         known_hosts="~/.ssh/robots",
     )
-    command = sync.rsync_command(
-        there, "/home/pilot/robot", sync.SyncOptions(tmp_path, delete=True)
-    )
+    private = private_files([there, host("~/robot", identity_file="~/.ssh/id")], tmp_path)
+    assert private == (PurePosixPath("keys/my %h key"),)
+    options = sync.SyncOptions(tmp_path, delete=True, private=(*private, PurePosixPath("key[1]")))
+    command = sync.rsync_command(there, "/home/pilot/robot", options)
+    assert {"--exclude=/keys/my %h key", r"--exclude=/key\[1]"} <= set(command)
     assert command[-2:] == [f"{tmp_path}/", "pilot@[fe80::1]:/home/pilot/robot/"]
     assert "--delete" in command
     assert "--dry-run" not in command
     (shell,) = (word for word in command if word.startswith("--rsh="))
     assert "-a -x -p 2222" in shell
     assert "StrictHostKeyChecking=yes" in shell
-    assert f"'IdentityFile=\"{tmp_path}/keys/my key\"'" in shell
+    assert f"'IdentityFile=\"{tmp_path}/keys/my %%h key\"'" in shell
+
+
+def test_the_workspace_is_not_taken_from_other_output() -> None:
+    """Files may be deleted there."""
+    sync = pytest.importorskip("composer.hosts.sync", reason="asyncssh is not installed")
+    assert sync.folder_in("/opt/ros/jazzy\n\ncompose-workspace:/home/pilot/my robot\n") == (
+        "/home/pilot/my robot"
+    )
+    assert sync.folder_in("/opt/ros/jazzy\n") is None
+    assert sync.folder_in("compose-workspace:robot\n") is None
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,17 @@ def test_the_program_answers_with_an_inventory(
     assert found.packages["ros2-composer"]
 
 
-@pytest.mark.parametrize("text", ["", "hello", "{", "{}", "[]", json.dumps({"python": "3.11"})])
+ANSWER = {"python": "3.11", "packages": {}, "interfaces": {}, "files": {}}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "hello", "{", "{}", "[]", '{"a":' * 100_000, json.dumps({"python": "3.11"})),
+        json.dumps({**ANSWER, "packages": None}),
+        json.dumps({**ANSWER, "files": {"robot.yaml": 1}}),
+    ],
+)
 def test_other_output_is_not_an_inventory(text: str) -> None:
     with pytest.raises(ValueError, match="not an inventory"):
         read_answer(text)
@@ -81,7 +91,8 @@ def test_the_files_of_a_system(tmp_path: Path) -> None:
     files = {
         "composer.yaml": "",
         "systems/robot.yaml": "system: robot\ninclude: [base.yaml]\nparameter_files: [p.yaml]\n"
-        "nodes:\n  arm: {type: arm}\n",
+        "nodes:\n  arm: {type: arm}\n"
+        "  driver: {type: driver}\n",
         "systems/base.yaml": "system: base\nnodes:\n  camera: {on_activate: {log: on}}\n",
         "systems/p.yaml": "/arm:\n  ros__parameters: {speed: 2}\n",
         "systems/other.yaml": "system: other\nnodes:\n  camera: {on_activate: {log: on}}\n",
@@ -90,11 +101,13 @@ def test_the_files_of_a_system(tmp_path: Path) -> None:
         "nodes/arm.py": "from composer.behavior import Behavior\nfrom motor import turn\n"
         "class Arm(Behavior):\n    def on_tick(self):\n        turn()\n",
         "nodes/motor.py": "def turn() -> None: ...\n",
+        "nodes/driver.yaml": "node: driver\nexecutable: {command: [python3, scripts/drive.py]}\n",
+        "nodes/scripts/drive.py": "",
         "nodes/unused.py": "",
     }
     for name, text in files.items():
         path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     path = tmp_path / "systems" / "robot.yaml"
     result = load(path)

@@ -251,8 +251,10 @@ def _domain_id() -> int:
     """Return the ROS domain. Raises CommandError."""
     import os
 
+    from composer.model.hosts import domain_problem
+
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    if not (text.isascii() and text.isdigit()):
+    if domain_problem(text) is not None:
         raise CommandError(f"ROS_DOMAIN_ID is '{text}', which is not a domain id")
     return int(text)
 
@@ -266,6 +268,7 @@ def _image(
     from composer.export.container_image import Contents
     from composer.export.deployment import services
     from composer.interfaces.sources import find_packages
+    from composer.model.hosts import private_files
     from composer.report.tool import NAME, tool_version
 
     root = result.project.root
@@ -276,6 +279,7 @@ def _image(
         composer=f"{NAME}[ros]=={tool_version()}",
         has_requirements=(root / "requirements.txt").is_file(),
         has_interfaces=not used.isdisjoint(find_packages(result.project.interface_folders).folders),
+        private=private_files(system.hosts, root),
     )
     return contents, name or f"{services(system)[0].label}:latest"
 
@@ -308,7 +312,7 @@ def _write_image_and(
     files = {
         name: text,
         str(CONTAINERFILE): containerfile(contents),
-        str(IGNORED_FILES): ignored_files(),
+        str(IGNORED_FILES): ignored_files(contents),
     }
     _write_all(folder, files, replace=replace)
 

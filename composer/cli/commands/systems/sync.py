@@ -55,13 +55,14 @@ def sync(
     """Copy the project to the hosts of a system.
 
     Copies the folder of the project to the workspace of each host, with rsync over ssh, except for
-    environments, builds, logs and .git. Nothing outside the workspaces is changed. A folder with
-    files that this command has not copied is refused.
+    environments, builds, logs, .git and the private keys of the hosts. Nothing outside the
+    workspaces is changed. A folder with files that this command has not copied is refused.
     """
     require_hosts("compose sync", "rsync", "ssh")
     result, declared, _ = load_for_hosts(system)
     from composer.hosts.start import sync_hosts
     from composer.hosts.sync import SyncOptions, root_problem
+    from composer.model.hosts import private_files
     from composer.runtime.process.addresses import is_this_computer
 
     root = result.project.root
@@ -74,7 +75,7 @@ def sync(
     with reported_problems():
         sync_hosts(
             chosen,
-            SyncOptions(root, delete=delete, dry_run=dry_run),
+            SyncOptions(root, delete, dry_run, private_files(declared.hosts, root)),
             lambda host, changes: _report(host, changes, dry_run=dry_run),
         )
 

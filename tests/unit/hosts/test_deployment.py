@@ -1,0 +1,61 @@
+"""What ends a system over several computers."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from composer.model import Host, Process
+from composer.source import Located, SourceFile, Span
+
+asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
+from composer.hosts.connection import HostError  # noqa: E402
+from composer.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess  # noqa: E402
+
+SPAN = Span(SourceFile("robot.yaml"), 1, 1)
+
+
+def located(text: str) -> Located[str]:
+    return Located(text, SPAN)
+
+
+def deployment(folder: Path, write: Callable[[str], None]) -> tuple[Deployment, RemoteProcess]:
+    host = Host(located("jetson"), SPAN, located("10.0.0.5"), workspace=located("~/robot"))
+    process = Process(located("vision"), SPAN, host=host.name)
+    item = RemoteProcess(process, host)
+    wait = ("/bin/sh", "-c", "sleep 60", "--")
+    options = DeploymentOptions(folder, "robot.yaml", (), wait, write, lambda *_: None)
+    return Deployment([item], options), item
+
+
+async def refused(*_: object, **__: object) -> None:
+    raise asyncssh.ChannelOpenError(asyncssh.OPEN_CONNECT_FAILED, "open failed")
+
+
+def test_a_refused_session_is_not_tried_again(tmp_path: Path) -> None:
+    """The connection is not lost. It would be closed, and with it all other processes end."""
+    deployed, item = deployment(tmp_path, lambda _: None)
+    connection: Any = SimpleNamespace(create_process=refused, is_closed=lambda: False)
+    with pytest.raises(HostError, match="refuses another session") as refusal:
+        asyncio.run(deployed._keep(item, connection))
+    assert "MaxSessions" in str(refusal.value.hint)
+    closed: Any = SimpleNamespace(create_process=refused, is_closed=lambda: True)
+    with pytest.raises(asyncssh.ChannelOpenError):
+        asyncio.run(deployed._keep(item, closed))
+
+
+def test_a_defect_ends_everything(tmp_path: Path) -> None:
+    """It must not leave the system waiting for a process that nothing starts."""
+    deployed, _ = deployment(tmp_path, lambda _: None)
+
+    async def broken(*_: object, **__: object) -> None:
+        raise KeyError("defect")
+
+    connections: Any = {"jetson": SimpleNamespace(create_process=broken, abort=lambda: None)}
+    with pytest.raises(KeyError, match="defect"):
+        asyncio.run(deployed.run(connections))
