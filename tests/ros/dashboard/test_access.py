@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import signal
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -268,6 +269,42 @@ def is_open(url: str) -> bool:
     except (OSError, http.client.HTTPException):  # it may end within a response
         return False
     return True
+
+
+#: A browser in the terminal: it loads the page, and runs until its user leaves it.
+BROWSER = """#!{python}
+import os, pathlib, sys, time, urllib.error, urllib.request
+dashboard = os.getppid()
+try:
+    urllib.request.urlopen(sys.argv[1], timeout={patience_s})
+except urllib.error.HTTPError as error:  # without the cookie: it was redirected to /
+    pathlib.Path("{seen}").write_text(f"{{sys.argv[1]}} {{error.code}} {{error.url}}")
+while os.getppid() == dashboard:
+    time.sleep(0.1)
+"""
+
+
+def test_the_browser_opens_the_page(
+    shared_domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program, seen = tmp_path / "browser", tmp_path / "seen"
+    program.write_text(BROWSER.format(python=sys.executable, patience_s=PATIENCE_S, seen=seen))
+    program.chmod(0o700)
+    monkeypatch.setenv("BROWSER", str(program))
+    with dashboard("--open") as server:
+        address = server.address
+        expected = f"{address.origin}/?token={address.token} 401 {address.origin}/"
+        until(lambda: seen.exists() and seen.read_text() == expected)
+
+
+def test_without_a_browser_the_address_is_left_to_the_user(
+    shared_domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BROWSER", "")
+    monkeypatch.setenv("PATH", "")
+    with dashboard("--open") as server:
+        until(lambda: "the browser cannot be opened" in server.errors())
+        assert get(server.address).status == 200
 
 
 def test_two_dashboards_use_two_ports(ros_domain_id: int) -> None:

@@ -22,7 +22,7 @@ from composer.cli.support.options import (
     SettingsOfRun,
     examples,
 )
-from composer.cli.support.output.terminal import write
+from composer.cli.support.output.terminal import say, write
 from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
@@ -120,9 +120,7 @@ def dashboard(
         if foxglove:
             write(foxglove_line(url))
         if open_browser:
-            import webbrowser
-
-            webbrowser.open(url)
+            _open(url)
 
     try:
         run_dashboard(
@@ -138,6 +136,18 @@ def dashboard(
     except (InvalidTokenFileError, PortInUseError) as error:
         raise CommandError(str(error)) from error
     end_now(0)  # threads of ROS may hang
+
+
+def _open(url: str) -> None:
+    """Open the page, on another thread: some browsers run until the user leaves them."""
+    import threading
+    import webbrowser
+
+    def run() -> None:
+        if not webbrowser.open(url):
+            say("dashboard: the browser cannot be opened, so open the address yourself")
+
+    threading.Thread(target=run, name="browser", daemon=True).start()
 
 
 def _declared(
