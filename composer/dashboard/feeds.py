@@ -142,10 +142,11 @@ class Feeds:
         try:
             while self._is_open and is_needed():
                 closing, due = self._wait()
-                for running in closing:
-                    self._close(running)
+                # In this order: what is replaced must not be forgotten by what both observe.
                 for running in due:
                     self._poll(running, ros)
+                for running in closing:
+                    self._close(running)
                 self._deliver()
         finally:
             with self._changed:

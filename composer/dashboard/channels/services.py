@@ -22,7 +22,7 @@ class ServicesFeed(Feed):
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError."""
-        self._hidden = values.flag("hidden")
+        self._hidden, self._chosen = values.flag("hidden"), values.text("chosen", "")
         values.end()
         self._declared = declared
         self._ros: RosGraphSide
@@ -51,7 +51,8 @@ class ServicesFeed(Feed):
             for end in topology.nodes[node]:
                 if end.kind not in (server, client):
                     continue
-                if not self._hidden and (end.is_for_tools or topology.is_for_tools(end.name)):
+                is_hidden = end.is_for_tools or topology.is_for_tools(end.name)
+                if is_hidden and not self._hidden and end.name != self._chosen:
                     continue
                 item = found.setdefault(
                     end.name, {"name": end.name, "types": [], "servers": [], "clients": []}

@@ -31,7 +31,7 @@ class TopicsFeed(Feed):
         """Read the parameters of the channel. Raises BadRequestError."""
         del declared
         self._measure = list(dict.fromkeys(values.texts("measure", _MAX_MEASURED)))
-        self._hidden = values.flag("hidden")
+        self._hidden, self._chosen = values.flag("hidden"), values.text("chosen", "")
         values.end()
         self._ros: RosGraphSide
         self._measured: set[str] = set()
@@ -81,6 +81,7 @@ class TopicsFeed(Feed):
             _topic(name, ends)
             for name, ends in sorted(topology.of_topics.items())
             if self._hidden
+            or name == self._chosen
             or not (topology.is_for_tools(name) or all(end.is_for_tools for _, end in ends))
         ]
 

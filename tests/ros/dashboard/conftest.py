@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import Browser, Dashboard, browser, dashboard
+from tests.ros.support.pages import opened
 from tests.ros.support.system_process import REPOSITORY, RunningSystem
+
+if TYPE_CHECKING:
+    from playwright import sync_api
 
 FILE = "systems/pipeline.yaml"
 
@@ -33,3 +38,10 @@ def page(server: Dashboard) -> Iterator[Browser]:
     """A connection to the dashboard."""
     with browser(server.address) as opened:
         yield opened
+
+
+@pytest.fixture
+def view(browser: sync_api.Browser, server: Dashboard) -> Iterator[sync_api.Page]:
+    """The page in a real browser."""
+    with opened(browser, server.address) as opened_page:
+        yield opened_page

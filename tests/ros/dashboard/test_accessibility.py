@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,12 +28,6 @@ DETAILS = (
 )
 PACKAGES = Path(__file__).parents[2] / "browser"
 AXE = PACKAGES / "node_modules" / "axe-core" / "axe.min.js"
-
-
-@pytest.fixture
-def view(browser: Browser, server: Dashboard) -> Iterator[Page]:
-    with opened(browser, server.address) as page:
-        yield page
 
 
 def test_a_view_is_busy_until_its_module_is_loaded(view: Page) -> None:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.ros.support.commands import hand_written
+from tests.ros.support.commands import hand_written, output_of
 from tests.ros.support.dashboard import dashboard
-from tests.ros.support.pages import opened
+from tests.ros.support.pages import opened, visit
 from tests.ros.support.system_process import RunningSystem
 
 if TYPE_CHECKING:
@@ -23,6 +23,9 @@ system: dropping
 nodes:
   source:
     behavior: dropping:Source
+    parameters:
+      mode: {type: string, default: slow, choices: [slow, "fast, very"], description: How fast.}
+      gear: {type: integer, default: 1, choices: [1, 2, 3]}
     publishers: {burst: {type: std_msgs/msg/Int64, qos: {depth: 100}}}
     timers: {send: {period_ms: 100}}
   sink:
@@ -55,17 +58,33 @@ def dropping(browser: Browser, tmp_path: Path, ros_domain_id: int) -> Iterator[P
     path.with_name("dropping.py").write_text(SOURCE, encoding="utf-8")
     with RunningSystem(str(path)) as system:
         system.wait_for("2 of 2 nodes active")
-        with dashboard() as server, opened(browser, server.address) as page:
+        with (
+            dashboard(path.name, cwd=tmp_path) as server,
+            opened(browser, server.address) as page,
+        ):
             yield page
 
 
-def test_chains_and_dropped_messages_are_shown(dropping: Page) -> None:
+def test_what_the_pipeline_does_not_have(dropping: Page) -> None:
     page = dropping
     expect(page, ".world .drop-label", r"^\d+ dropped$")
     assert page.locator(".world path.lossy").count() == 1
     page.keyboard.press("7")
     expect(page, ".chain[data-tone=good]", r"through.*mean [\d.]+ .s.*budget 10(\.0)? s|10,?000")
     expect(page, ".chain", r"0 of [1-9][\d,]* over the budget")
+    # Declared choices are a list.
+    visit(page, "/parameters/source")
+    mode, gear = page.get_by_label("mode"), page.get_by_label("gear")
+    expect(page, "[data-name=mode]", "one of: slow, fast, very")
+    assert mode.locator("option").all_inner_texts() == ["slow", "fast, very"]
+    assert mode.input_value() == "slow"
+    mode.select_option("fast, very")
+    expect(page, "[data-name=mode] .outcome", "^Set$")
+    gear.select_option("3")
+    expect(page, "[data-name=gear] .outcome", "^Set$")
+    expect(page, "[data-name=gear] .declared", r"^declared 1 at dropping\.yaml:\d+:\d+$")
+    assert output_of("param", "get", "/source", "mode").strip().endswith("fast, very")
+    assert output_of("param", "get", "/source", "gear").strip().endswith("3")
 
 
 def test_a_graph_without_a_system(browser: Browser, ros_domain_id: int) -> None:

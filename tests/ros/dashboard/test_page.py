@@ -2,49 +2,33 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
+from lifecycle_msgs.msg import State, TransitionEvent
+from lifecycle_msgs.srv import GetAvailableTransitions
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Int32
+from rclpy.lifecycle import LifecycleNode
 
 from tests.ros.dashboard.conftest import FILE
-from tests.ros.support.commands import hand_written, output_of
+from tests.ros.support.commands import output_of
 from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.in_process import Peer, wait_until
-from tests.ros.support.pages import VIEWS, opened
+from tests.ros.support.pages import VIEWS, detail, expect_text, expect_texts, visit
 from tests.ros.support.system_process import REPOSITORY
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from playwright.sync_api import Browser, Locator, Page
+    from playwright.sync_api import Browser, Page, WebSocketRoute
 
 pytestmark = pytest.mark.browser
 PLANNER = "/planning/planner"
 
 
-@pytest.fixture
-def view(browser: Browser, server: Dashboard) -> Iterator[Page]:
-    with opened(browser, server.address) as page:
-        yield page
-
-
 def node(name: str) -> str:
     return f'.world [data-key="node:{name}"]'
-
-
-def detail(page: Page) -> Locator:
-    return page.locator("aside.detail:visible")
-
-
-def expect_text(place: Locator, pattern: str) -> None:
-    place.filter(has_text=re.compile(pattern)).first.wait_for()
 
 
 def test_the_graph_shows_states_rates_and_details(view: Page) -> None:
@@ -109,6 +93,105 @@ def test_a_node_is_deactivated_and_activated_by_click(view: Page) -> None:
     expect_text(view.locator(".activity"), "running · 3 of 3 active")
 
 
+#: Each transition once, with the state that it leads to.
+TRANSITIONS = {
+    "configure": "inactive",
+    "activate": "active",
+    "deactivate": "inactive",
+    "cleanup": "unconfigured",
+    "shutdown": "finalized",
+}
+
+
+def test_every_legal_transition_has_a_button_and_no_other_has(view: Page, peer: Peer) -> None:
+    name = peer.join("managed", LifecycleNode).get_fully_qualified_name()
+    view.goto(f"/nodes{name}")
+    expect_text(detail(view).locator(".state"), "unconfigured")
+    for transition, state in TRANSITIONS.items():
+        assert sorted(buttons(view)) == legal_transitions(peer, name)
+        view.click(f"button[data-transition={transition}]")
+        if transition == "shutdown":
+            view.click("dialog >> text=Cancel")
+            assert peer.state(name) == "unconfigured"
+            view.click("button[data-transition=shutdown]")
+            view.click("dialog >> button:text-is('Shutdown')")
+        expect_text(detail(view).locator(".state"), f"^{state}")
+        assert peer.state(name) == state
+    assert (buttons(view), legal_transitions(peer, name)) == ([], [])
+
+
+def buttons(view: Page) -> list[str | None]:
+    found = detail(view).locator("button[data-transition]").all()
+    return [button.get_attribute("data-transition") for button in found]
+
+
+def legal_transitions(peer: Peer, node: str) -> list[str]:
+    """Return what the node itself says."""
+    response = peer.call(GetAvailableTransitions, f"{node}/get_available_transitions")
+    return sorted(item.transition.label for item in response.available_transitions)
+
+
+def test_a_node_is_restarted_by_click(view: Page, peer: Peer) -> None:
+    events = peer.listen(TransitionEvent, f"{PLANNER}/transition_event", 100)
+    peer.wait_until_known(PLANNER)
+    view.goto(f"/nodes{PLANNER}")
+    view.click("button[data-transition=restart]")
+    expect_text(view.locator(".toast"), "Restart: done")
+    passed = ["inactive", "unconfigured", "inactive", "active"]
+    wait_until(lambda: [event.goal_state.label for event in events if ends(event)] == passed)
+    expect_text(detail(view).locator(".state"), "^active")
+    assert sorted(buttons(view)) == sorted([*legal_transitions(peer, PLANNER), "restart"])
+
+
+def ends(event: TransitionEvent) -> bool:
+    """Return whether a node is in a primary state then."""
+    return bool(event.goal_state.id <= State.PRIMARY_STATE_FINALIZED)
+
+
+def test_the_system_is_reset_and_started_again_by_click(view: Page) -> None:
+    view.goto("/nodes")
+    activity, bar = view.locator(".activity"), view.locator("#bar")
+    bar.locator("[data-command=reset]").click()
+    expect_text(view.locator("dialog"), "All nodes are cleaned up")
+    view.click("dialog >> text=Cancel")
+    expect_text(activity, "running · 3 of 3 active")
+    bar.locator("[data-command=reset]").click()
+    view.click("dialog >> button:text-is('Reset')")
+    expect_text(activity, "0 of 3 active")
+    expect_text(view.locator("tbody tr"), "planner.*unconfigured")
+    assert "unconfigured" in output_of("lifecycle", "get", PLANNER)
+    assert bar.locator("[data-command=pause]").count() == 0
+    bar.locator("[data-command=startup]").click()
+    expect_text(activity, "running · 3 of 3 active")
+    assert "active" in output_of("lifecycle", "get", PLANNER)
+
+
+def test_the_plan_has_a_cause_for_each_step(view: Page) -> None:
+    steps = output_of("run", REPOSITORY / FILE, "--dry-run").splitlines()
+    view.goto("/nodes?show=plan")
+    rows = view.locator("table[aria-label='Plan of the bring-up'] tbody tr")
+    rows.first.wait_for()
+    shown = []
+    for row in rows.all():
+        number, node, transition, why = row.locator("td, th").all_inner_texts()
+        cause, _, after = why.partition(" after step ")
+        order = "".join(f" after #{step}" for step in after.split(", ") if step)
+        shown.append(f"#{number} {transition} {node}{order}: {cause}")
+    assert shown == steps
+
+
+def test_parameters_are_described(view: Page) -> None:
+    view.goto("/parameters/lab/talker")
+    expect_text(view.locator("[data-name=speed] .hint"), r"^0 … 5 · How fast\.$")
+    visit(view, f"/parameters{PLANNER}")
+    line = view.locator("[data-name=max_velocity]")
+    expect_text(line, r"max_velocity double.*m/s")
+    expect_text(line.locator(".hint"), r"^0.01 … 5 m/s · Speed limit of every plan\.$")
+    view.get_by_label("Search parameters").fill("between two points")
+    expect_text(view.locator(".parameter:visible"), "sample_period_ms")
+    line.wait_for(state="hidden")
+
+
 def test_a_parameter_is_changed_and_refused(view: Page) -> None:
     view.goto(f"/parameters{PLANNER}")
     line = view.locator("[data-name=max_velocity]")
@@ -141,95 +224,6 @@ def test_the_drift_is_shown_until_it_is_gone(view: Page) -> None:
     view.locator(".drift", has_text="/lab/talker").wait_for()
 
 
-def test_plotted_values_are_those_published(view: Page, peer: Peer) -> None:
-    published: list[int] = []
-    # A deep queue: the browser is driven on another thread of this process.
-    qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
-    peer.node.create_subscription(
-        Int32, "/lab/count", lambda message: published.append(message.data), qos
-    )
-    wait_until(lambda: published)
-    view.goto("/topics/lab/count")
-    value = view.locator(".message [data-path=data] .value")
-    value.wait_for()
-    assert int(value.inner_text()) in range(published[0], published[-1] + 100)
-    view.click("button[aria-label='Plot data']")
-    view.wait_for_url("**tab=plot**")
-    expect_text(view.locator(".legend output"), r"^\d+$")
-    first = int(view.inner_text(".legend output"))
-    wait_until(lambda: int(view.inner_text(".legend output")) > first + 50)
-    assert view.locator(".plot canvas").is_visible()
-    view.click(".plot-panel >> text=Pause")
-    with view.expect_download() as download:
-        view.click("text=Export CSV")
-    head, *rows = csv.reader(io.StringIO(download.value.path().read_text(encoding="utf-8")))
-    assert head == ["time_s", "/lab/count:data"]
-    plotted = [int(row[1]) for row in rows]
-    wait_until(lambda: published[-1] >= plotted[-1])
-    assert len(plotted) > 50
-    start = published.index(plotted[0])
-    assert plotted == published[start : start + len(plotted)]
-
-
-def test_fields_are_added_to_a_plot_with_the_keyboard(view: Page) -> None:
-    view.goto("/topics/sensor_data?tab=plot")
-    fields = view.get_by_label("Field to add")
-    fields.locator("option[value='pose.pose.position.x']").wait_for(state="attached")
-    fields.focus()
-    for name in ("pose.pose.position.x", "pose.pose.position.y"):
-        while fields.input_value() != name:
-            view.keyboard.press("ArrowDown")
-        view.keyboard.press("Tab")
-        view.keyboard.press("Enter")
-        expect_text(view.locator(".legend li"), re.escape(name))
-        view.keyboard.press("Shift+Tab")
-    plotted = view.locator(".legend output")
-    assert plotted.count() == 2
-    wait_until(lambda: all(re.search(r"\d", text) for text in plotted.all_inner_texts()))
-    view.get_by_label("Remove /sensor_data:pose.pose.position.x").press("Enter")
-    view.wait_for_function("document.activeElement.ariaLabel?.startsWith('Remove')")
-    assert plotted.count() == 1
-
-
-def test_images_are_shown(view: Page) -> None:
-    with hand_written("hand_written_camera.py"):
-        view.goto("/topics/camera?tab=image")
-        expect_text(detail(view), r"640 . 480 rgb8")
-        drawn = view.evaluate(
-            """() => {
-            const canvas = document.querySelector("canvas.image");
-            const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, 1).data;
-            return [canvas.width, pixels[3]];
-            }"""
-        )
-        assert drawn[0] >= 320
-        assert drawn[1] == 255  # opaque: something was drawn
-        view.goto("/topics/camera/compressed?tab=image")
-        expect_text(detail(view), r"1 . 1 png")
-
-
-def test_a_message_is_published_from_a_form(view: Page) -> None:
-    view.goto("/topics/lab/in?tab=publish")
-    view.get_by_label("data").fill("hello <b>you</b>")
-    view.click("form >> text=Publish")
-    expect_text(view.locator(".toast"), "to 1 subscription")
-    view.get_by_label("Rate in Hz").fill("50")
-    view.click("form >> text=Repeat")
-    expect_text(view.locator(".publish .status"), r"^\d{2,} published to 1 subscription$")
-    view.click("form >> text=Stop")
-    view.locator("form >> text=Repeat").wait_for()
-    view.goto("/topics/lab/received")
-    expect_text(view.locator(".message"), "hello <b>you</b>")
-
-
-def test_only_what_is_on_the_screen_is_subscribed(view: Page, peer: Peer) -> None:
-    view.goto("/topics/lab/text")
-    view.locator(".message [data-path=data] .value").wait_for()
-    wait_until(lambda: peer.node.count_subscribers("/lab/text") > 0)
-    view.click("#rail a[href='/log']")
-    wait_until(lambda: peer.node.count_subscribers("/lab/text") == 0)
-
-
 def test_markup_of_nodes_stays_text(view: Page, peer: Peer) -> None:
     markup = "<img src=x onerror=alert()><b id=bold>bold</b>"
     peer.node.declare_parameter("odd", markup, ParameterDescriptor(description=markup))
@@ -244,37 +238,6 @@ def test_markup_of_nodes_stays_text(view: Page, peer: Peer) -> None:
     assert view.locator("#bold, img[src=x]").count() == 0
 
 
-def test_a_service_is_called(view: Page) -> None:
-    view.goto("/services")
-    view.click("tbody a:has-text('/plan_trajectory')")
-    view.locator("fieldset", has_text="goal").get_by_label("x").fill("1")
-    view.get_by_label("max_velocity").fill("0.5")
-    view.click("form >> text=Call")
-    expect_text(detail(view), r"Response after [\d.]+ ms")
-    expect_text(detail(view).locator(".message"), "trajectory|path|points|success")
-    view.goto("/services/lab/add")
-    view.get_by_label("data").check()
-    view.click("form >> text=Call")
-    expect_text(detail(view).locator(".message"), "switched")
-
-
-def test_a_goal_is_sent_followed_and_canceled(view: Page) -> None:
-    view.goto("/actions/lab/navigate")
-    view.get_by_label("max_velocity").fill("-1")
-    view.click("text=Send goal")
-    goal = view.locator(".goal").first
-    expect_text(goal.locator("[data-path=progress_percent]"), r"progress_percent[1-9]")
-    assert goal.locator("progress").get_attribute("value") is not None
-    view.click("#rail a[href='/log']")
-    view.go_back()
-    goal.locator("text=Cancel").click()
-    expect_text(goal.locator(".goal-status"), "canceled")
-    expect_text(goal, "stopped")
-    view.get_by_label("max_velocity").fill("0")
-    view.click("text=Send goal")
-    expect_text(view.locator(".goal").first, "reject|refused")
-
-
 def test_the_log_is_filtered_and_leads_to_nodes(view: Page) -> None:
     view.goto("/log")
     expect_text(view.locator(".log li"), "driving to")
@@ -285,6 +248,76 @@ def test_the_log_is_filtered_and_leads_to_nodes(view: Page) -> None:
     expect_text(view.locator(".log li"), "driving to")
     view.click(".log li a >> nth=0")
     view.wait_for_url("**/nodes/control/motor_controller")
+
+
+def test_the_log_is_filtered_by_level_and_paused(view: Page, peer: Peer) -> None:
+    log, lines = peer.node.get_logger(), view.locator(".log li .text")
+    sockets: list[WebSocketRoute] = []
+
+    def connect(socket: WebSocketRoute) -> None:
+        socket.connect_to_server()
+        sockets.append(socket)
+
+    view.route_web_socket("**/ws", connect)
+    view.goto("/log?text=mark")
+    log.info("mark 1")
+    log.warning("mark 2")
+    log.error("mark 3")
+    expect_texts(lines, "mark 1", "mark 2", "mark 3")
+    view.get_by_label("Lowest level").select_option("warn and above")
+    expect_texts(lines, "mark 2", "mark 3")
+    assert view.url.endswith("/log?level=warn&text=mark")
+    view.click(".toolbar >> text=Pause")
+    log.error("mark 4")
+    expect_text(view.locator(".toolbar"), "1 more while paused")
+    expect_texts(lines, "mark 2", "mark 3")
+    # New filters apply to what has arrived by then.
+    view.get_by_label("Lowest level").select_option("error and above")
+    expect_texts(lines, "mark 3", "mark 4")
+    log.error("mark 5")
+    expect_text(view.locator(".toolbar"), "1 more while paused")
+    view.click(".toolbar >> text=Pause")
+    expect_texts(lines, "mark 3", "mark 4", "mark 5")
+    # What arrives again after a lost connection is not shown twice.
+    sockets[-1].close()
+    wait_until(lambda: view.title() and len(sockets) > 1)
+    log.fatal("mark 6")
+    expect_texts(lines, "mark 3", "mark 4", "mark 5", "mark 6")
+
+
+def test_timers_are_sorted_by_lateness_and_have_histograms(view: Page) -> None:
+    view.goto("/timing?show=timers")
+    rows = view.locator("tbody tr")
+    expect_text(rows, "timer control")
+    late = view.evaluate(LATE)
+    assert sorted(name for name, _ in late) == ["timer control", "timer plan", "timer step"]
+    assert [text for _, text in late] == sorted((text for _, text in late), key=in_ms)[::-1]
+    view.get_by_role("link", name="timer step").click()
+    expect_text(view.locator(".facts:visible"), r"late, p99[\d.]+ (ms|µs)")
+    counts = view.evaluate(COUNTS)
+    assert sum(counts["bins"]) == counts["total"] > 0
+
+
+#: The names and the lateness of timers, read at once, since they change every second.
+LATE = """() => {
+    const {cellIndex} = document.querySelector("th[data-id=late][aria-sort=descending]");
+    const rows = [...document.querySelectorAll("table[aria-label^=Timers] tbody tr")];
+    return rows.map(({cells}) => [cells[0].innerText, cells[cellIndex].innerText]);
+}"""
+#: The number of calls of each bin of a histogram, and of all.
+COUNTS = """() => {
+    const numberOf = text => Number(text.match(/([\\d,]+) calls/)[1].replaceAll(",", ""));
+    const bins = document.querySelectorAll(".histogram rect title");
+    return {
+        bins: [...bins].map(bin => numberOf(bin.textContent)),
+        total: numberOf(document.querySelector(".histogram figcaption").innerText),
+    };
+}"""
+
+
+def in_ms(text: str) -> float:
+    value, unit = text.split()
+    return float(value) * {"µs": 0.001, "ms": 1.0, "s": 1000.0}[unit]
 
 
 def test_a_lost_connection_is_made_again_and_read_only_has_no_buttons(

@@ -56,6 +56,7 @@ _GOALS = {
 }
 E = TypeVar("E", bound=Event)
 T = TypeVar("T")
+N = TypeVar("N", bound=Node)
 
 
 def wait_until(condition: Callable[[], T | None], what: str = "", limit_s: float = PATIENCE_S) -> T:
@@ -215,9 +216,9 @@ class Peer:
         self._thread.join(PATIENCE_S)
         leave(self.node)
 
-    def join(self, name: str) -> Node:
+    def join(self, name: str, kind: type[N] = Node) -> N:  # type: ignore[assignment]
         """Return one more node of the same participant."""
-        node = Node(f"{name}_{os.getpid()}", context=self.context)
+        node = kind(f"{name}_{os.getpid()}", context=self.context)
         self._executor.add_node(node)
         return node
 

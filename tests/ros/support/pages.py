@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tests.ros.support.dashboard import Address
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Locator, Page
 
 PATIENCE_MS = 60_000
 VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
@@ -49,3 +50,20 @@ def visit(page: Page, path: str) -> None:
     page.evaluate("dispatchEvent(new PopStateEvent('popstate'))")
     page.locator("#main:not([aria-busy])").wait_for()
     page.locator(_READY).first.wait_for()
+
+
+def detail(page: Page) -> Locator:
+    """Return the details that are shown."""
+    return page.locator("aside.detail:visible")
+
+
+def expect_text(place: Locator, pattern: str) -> None:
+    """Wait until an element has a text."""
+    place.filter(has_text=re.compile(pattern)).first.wait_for()
+
+
+def expect_texts(places: Locator, *texts: str) -> None:
+    """Wait until the elements are those with these texts."""
+    from playwright.sync_api import expect  # noqa: PLC0415 - not everywhere
+
+    expect(places).to_have_text(list(texts), timeout=PATIENCE_MS)

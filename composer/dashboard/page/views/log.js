@@ -35,15 +35,28 @@ export function createView(app) {
 
   let subscription = null;
   let params = null;
+  const received = new Set();
   let waiting = [];
+  let isNew = true;
   let typing = 0;
 
   function receive({ lines }, { dropped }) {
     drops.show(dropped);
-    waiting.push(...lines);
+    waiting.push(...lines.filter(isUnknown));
     if (waiting.length > MOST_LINES) waiting = waiting.slice(-MOST_LINES);
-    if (pause.getAttribute("aria-pressed") === "true") showCount();
+    // New filters also apply while paused: they search in what is there.
+    if (pause.getAttribute("aria-pressed") === "true" && !isNew) showCount();
     else flush();
+    isNew = false;
+  }
+
+  /** After a lost connection, the last lines arrive again. */
+  function isUnknown(line) {
+    const record = JSON.stringify(line);
+    if (received.has(record)) return false;
+    received.add(record);
+    if (received.size > MOST_LINES) received.delete(received.values().next().value);
+    return true;
   }
 
   function flush() {
@@ -96,25 +109,29 @@ export function createView(app) {
 
   function show({ query }) {
     const wanted = { level: query.get("level") ?? "info", node: query.get("node") ?? "", text: query.get("text") ?? "", history: HISTORY };
-    const isNew = JSON.stringify(wanted) !== JSON.stringify(params);
+    const isSame = JSON.stringify(wanted) === JSON.stringify(params);
     params = wanted;
     level.value = wanted.level;
     if (document.activeElement !== node) node.value = wanted.node;
     if (document.activeElement !== text) text.value = wanted.text;
-    if (!isNew && subscription) return;
-    subscription?.end();
+    if (isSame && subscription) return;
+    isNew = true;
     waiting = [];
+    received.clear();
     list.replaceChildren();
+    const before = subscription;
     subscription = app.connection.subscribe("log", params, receive, {
       onerror(error) {
         message.hidden = false;
         message.replaceChildren(empty("The log cannot be shown.", error.message));
       },
     });
+    before?.end(); // only now: without a subscription, the server forgets the lines
   }
 
   function hide() {
     clearTimeout(typing);
+    pause.setAttribute("aria-pressed", "false");
     subscription?.end();
     subscription = null;
   }

@@ -1,6 +1,5 @@
 /** The parameters of a node: edit them, and read why a value was refused. */
 import { button, empty, h, setText } from "../dom.js";
-import { number } from "../format.js";
 import { pathOf } from "../router.js";
 import { rangeOf } from "../widgets/form.js";
 import { dropNote, detailHead, matches, searchField, split, stateBadge } from "../widgets/parts.js";
@@ -191,6 +190,7 @@ function createEditor(parameter, isFixed, edited) {
     const input = h("input", { type: "checkbox", id, disabled: isFixed, onchange: () => edited(true) });
     return { element: input, input, value: () => input.checked, set: (value) => (input.checked = value) };
   }
+  if (parameter.choices && !LISTS.test(parameter.type)) return choiceEditor(parameter.choices, id, isFixed, edited);
   const input = h("input", { type: "text", id, disabled: isFixed, spellcheck: "false", oninput: () => edited(false) });
   const isNumber = parameter.type === "double" || parameter.type === "integer";
   if (isNumber) input.inputMode = "decimal";
@@ -209,6 +209,27 @@ function createEditor(parameter, isFixed, edited) {
     set(now) {
       set(now);
       slider.value = String(now);
+    },
+  };
+}
+
+/** A list of the declared choices, and of the value if it is none of them. */
+function choiceEditor(choices, id, isFixed, edited) {
+  const values = new Map();
+  const input = h("select", { id, disabled: isFixed, onchange: () => edited(true) });
+  function add(value) {
+    const text = textOf(value);
+    values.set(text, value);
+    input.append(h("option", { value: text }, text));
+  }
+  choices.forEach(add);
+  return {
+    element: input,
+    input,
+    value: () => values.get(input.value),
+    set(now) {
+      if (!values.has(textOf(now))) add(now);
+      input.value = textOf(now);
     },
   };
 }
@@ -256,8 +277,8 @@ function numberOf(type, text) {
   return type === "integer" && !Number.isSafeInteger(found) ? text : found;
 }
 
+/** Every digit: what is edited must be the value. */
 function textOf(value) {
   if (value === null || value === undefined) return "";
-  if (typeof value === "number") return number(value);
   return typeof value === "object" ? JSON.stringify(value) : String(value);
 }

@@ -33,7 +33,7 @@ export function createView(app) {
       "div",
       { class: "toolbar" },
       searchField("Search services and actions ( / )", (text) => { searched = text; update(); }),
-      toggle("Show hidden", false, (on) => { withHidden = on; subscription?.update({ hidden: on }); }, { title: "Show services of parameters, lifecycles, managers and tools" }),
+      toggle("Show hidden", false, (on) => { withHidden = on; request(); }, { title: "Show services of parameters, lifecycles, managers and tools" }),
     ),
     list: table.element,
     detail,
@@ -46,8 +46,18 @@ export function createView(app) {
   let chosen = "";
   let shown = "";
   let subscription = null;
+  let requested = "";
   /** Goals go on while other views are shown. */
   const goals = new Map();
+
+  /** Subscribe to the list, in which the chosen one is even if it is hidden. */
+  function request() {
+    const params = { hidden: withHidden, chosen: nameOf(chosen) };
+    const now = JSON.stringify(params);
+    if (!subscription) subscription = app.connection.subscribe("services", params, receive, { onerror: (error) => table.fail(error.message) });
+    else if (now !== requested) subscription.update(params);
+    requested = now;
+  }
 
   function receive({ services, actions }) {
     entries = [
@@ -67,10 +77,10 @@ export function createView(app) {
     body.classList.toggle("open", chosen !== "");
     table.select(chosen);
     const entry = entries?.find(({ kind, name }) => `${kind} ${name}` === chosen);
-    const now = `${chosen} ${Boolean(entry)} ${app.isReadOnly()}`;
+    const now = `${chosen} ${Boolean(entries)} ${Boolean(entry)} ${app.isReadOnly()}`;
     if (now === shown || chosen === "") return;
     shown = now;
-    const name = chosen.slice(chosen.indexOf(" ") + 1);
+    const name = nameOf(chosen);
     if (!entry) {
       detail.replaceChildren(detailHead(name, "/services"), empty(entries ? `There is no ${chosen}.` : "Loading …"));
       return;
@@ -134,7 +144,7 @@ export function createView(app) {
 
   function show(route) {
     chosen = route.name ? `${route.view === "actions" ? "action" : "service"} ${route.name}` : "";
-    subscription ??= app.connection.subscribe("services", { hidden: withHidden }, receive, { onerror: (error) => table.fail(error.message) });
+    request();
     showDetail();
   }
 
@@ -144,4 +154,9 @@ export function createView(app) {
   }
 
   return { element, show, hide };
+}
+
+/** "service /plan_trajectory" -> "/plan_trajectory". */
+function nameOf(chosen) {
+  return chosen.slice(chosen.indexOf(" ") + 1);
 }

@@ -68,8 +68,7 @@ export function createView(app) {
     for (const [topic, one] of Object.entries(data.figures ?? {})) figures.set(topic, one);
     update();
     measure(false);
-    const known = topics?.find((topic) => topic.name === name);
-    if (known && (shownPart === "" || tab === "info")) showPart();
+    if (name && (shownPart === "" || tab === "info")) showPart();
   }
 
   function update() {
@@ -81,7 +80,7 @@ export function createView(app) {
   function measure(isForced) {
     const seen = table.seen().slice(0, MOST_MEASURED);
     if (name && !seen.includes(name)) seen.push(name);
-    const params = { measure: seen.slice(-MOST_MEASURED), hidden: withHidden };
+    const params = { measure: seen.slice(-MOST_MEASURED), hidden: withHidden, chosen: name };
     const now = JSON.stringify(params);
     if (now === measured && !isForced) return;
     measured = now;
@@ -105,7 +104,9 @@ export function createView(app) {
   function showPart() {
     const topic = topics?.find((one) => one.name === name);
     if (!topic) {
-      detail.replaceChildren(detailHead(name, "/topics"), empty(topics ? `There is no topic ${name}.` : "Loading …"));
+      const text = topics ? `There is no topic ${name}.` : "Loading …";
+      if (detail.textContent !== name + text) detail.replaceChildren(detailHead(name, "/topics"), empty(text));
+      shownPart = "";
       return;
     }
     const now = `${name} ${tab}`;
@@ -207,7 +208,7 @@ export function createView(app) {
     name = route.name;
     tab = route.query.get("tab") ?? "echo";
     if (!subscription) {
-      measured = JSON.stringify({ measure: name ? [name] : [], hidden: withHidden });
+      measured = JSON.stringify({ measure: name ? [name] : [], hidden: withHidden, chosen: name });
       subscription = app.connection.subscribe("topics", JSON.parse(measured), receive, { onerror: (error) => table.fail(error.message) });
       again = setInterval(() => measure(false), MEASURE_AGAIN_MS);
     }

@@ -3,7 +3,7 @@
  *
  * `value()` returns the message, or null after the browser has shown what is invalid.
  */
-import { button, h, newId } from "../dom.js";
+import { button, h, newId, setText } from "../dom.js";
 import { icon } from "../icons.js";
 
 const MOST_ITEMS = 500;
@@ -67,7 +67,7 @@ function groupEditor(field) {
   const element = h(
     "fieldset",
     { class: "group-field" },
-    h("legend", {}, field.name, " ", h("span", { class: "type" }, field.type)),
+    h("legend", {}, nameOf(field), " ", h("span", { class: "type" }, field.type)),
     parts.map(([, part]) => part.element),
   );
   return { element, value: () => objectOf(parts), set: (message) => setAll(parts, message) };
@@ -81,10 +81,10 @@ function arrayEditor(field) {
   const add = button("Add item", () => append(), { class: "quiet" });
 
   function append(value) {
-    const editor = editorOf({ ...field.element, name: `[${editors.length}]` });
+    const editor = editorOf({ ...field.element, name: "" });
     if (value !== undefined) editor.set(value);
-    const remove = button(icon("close"), () => drop(editor), { class: "quiet", "aria-label": "Remove item" });
-    editor.line = h("div", { class: "item" }, editor.element, isFixed ? null : remove);
+    editor.remove = button(icon("close"), () => remove(editor), { class: "quiet" });
+    editor.line = h("div", { class: "item" }, editor.element, isFixed ? null : editor.remove);
     editors.push(editor);
     items.append(editor.line);
     update();
@@ -96,8 +96,18 @@ function arrayEditor(field) {
     update();
   }
 
+  function remove(editor) {
+    drop(editor);
+    add.focus(); // the button that had it is gone
+  }
+
   function update() {
     add.hidden = isFixed || editors.length >= limit;
+    for (const [index, { line: item, remove: pressed }] of editors.entries()) {
+      // The first name is that of the item, the others are those of its fields.
+      setText(item.querySelector(".field-name"), `[${index}]`);
+      pressed.setAttribute("aria-label", `Remove [${index}] of ${field.name}`);
+    }
   }
 
   function set(values) {
@@ -112,7 +122,7 @@ function arrayEditor(field) {
   const element = h(
     "fieldset",
     { class: "group-field" },
-    h("legend", {}, field.name, " ", h("span", { class: "type" }, `${field.element.type ?? ""} · ${bound}`)),
+    h("legend", {}, nameOf(field), " ", h("span", { class: "type" }, `${field.element.type ?? ""} · ${bound}`)),
     items,
     add,
   );
@@ -187,6 +197,10 @@ function stringEditor(field) {
   return { element: line(field, input), value: () => input.value, set: (value) => (input.value = String(value)) };
 }
 
+function nameOf({ name }) {
+  return h("span", { class: "field-name" }, name);
+}
+
 function line(field, input, range = "") {
   const constants = (field.constants ?? []).map(({ name, value }) => `${name} = ${value}`);
   const notes = [field.comment, constants.join(", ")].filter(Boolean).join(" · ");
@@ -195,7 +209,7 @@ function line(field, input, range = "") {
   return h(
     "div",
     { class: "field-line" },
-    h("label", { for: input.id }, field.name, " ", h("span", { class: "type" }, field.type)),
+    h("label", { for: input.id }, nameOf(field), " ", h("span", { class: "type" }, field.type)),
     input,
     (notes || range) && h("p", { class: "hint", id: noteId }, [range, notes].filter(Boolean).join(" · ")),
   );

@@ -12,7 +12,7 @@ const MOST_ITEMS = 200;
 export function createMessageTree({ onplot = null, isPlotted = () => false } = {}) {
   const element = h("div", { class: "message" });
   const leaves = new Map();
-  let shape = "";
+  let shape = null;
   let filter = "";
   let last;
 
@@ -23,7 +23,7 @@ export function createMessageTree({ onplot = null, isPlotted = () => false } = {
     if (newShape !== shape) {
       shape = newShape;
       leaves.clear();
-      refill(element, ...lines.map(build));
+      refill(element, ...(lines.length > 0 ? lines.map(build) : [nothing()]));
     }
     for (const { path, text } of lines) {
       const leaf = leaves.get(path);
@@ -34,6 +34,10 @@ export function createMessageTree({ onplot = null, isPlotted = () => false } = {
   function isShown({ path, isLeaf, inside }) {
     if (filter === "") return true;
     return isLeaf ? path.toLowerCase().includes(filter) : inside.some((one) => one.toLowerCase().includes(filter));
+  }
+
+  function nothing() {
+    return h("p", { class: "hint" }, filter === "" ? "The message has no fields." : "No field matches.");
   }
 
   function build({ path, name, depth, kind, isLeaf }) {
@@ -62,11 +66,7 @@ export function createMessageTree({ onplot = null, isPlotted = () => false } = {
     show,
     filter(text) {
       filter = text.trim().toLowerCase();
-      shape = "";
-      if (last !== undefined) show(last);
-    },
-    redraw() {
-      shape = "";
+      shape = null;
       if (last !== undefined) show(last);
     },
   };
