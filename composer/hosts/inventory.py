@@ -84,9 +84,10 @@ def _texts(facts: Mapping[str, str | None]) -> dict[str, Any]:
 def _packages() -> dict[str, str]:
     found: dict[str, str] = {}
     for distribution in distributions():
-        name = distribution.name.lower().replace("_", "-")
+        metadata = distribution.metadata  # empty after an installation that was interrupted
+        name = (metadata["Name"] or "").lower().replace("_", "-")
         if name in _PACKAGES or name.startswith(_ROS_PREFIX):
-            found.setdefault(name, distribution.version)
+            found.setdefault(name, metadata["Version"] or "unknown")
     return found
 
 

@@ -25,7 +25,7 @@ def question_about(system: System, path: Path, project: Project) -> Question:
         for found in (path, *_files(system, project))
         if project.holds(found) and found.is_file()
     }
-    interfaces = {port.interface.value for node in system.nodes for port in node.ports}
+    interfaces = {port.interface.value for node in system.nodes for port in node.all_ports}
     return Question(tuple(sorted(names)), tuple(sorted(interfaces)))
 
 

@@ -60,6 +60,8 @@ def test_the_program_answers_with_an_inventory(
 ) -> None:
     tmp_path.joinpath("robot.yaml").write_text("system: robot\n", encoding="utf-8")
     question = Question(("robot.yaml", "lost.py"), ("std_msgs/msg/String", "no/msg/Such"))
+    tmp_path.joinpath("half-1.0.dist-info").mkdir()  # of an installation that was interrupted
+    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "stdin", io.StringIO(written_question(question)))
     print("Welcome to this computer", end="")  # a start-up file of the shell
@@ -101,7 +103,8 @@ def test_the_files_of_a_system(tmp_path: Path) -> None:
         "nodes/arm.py": "from composer.behavior import Behavior\nfrom motor import turn\n"
         "class Arm(Behavior):\n    def on_tick(self):\n        turn()\n",
         "nodes/motor.py": "def turn() -> None: ...\n",
-        "nodes/driver.yaml": "node: driver\nexecutable: {command: [python3, scripts/drive.py]}\n",
+        "nodes/driver.yaml": "node: driver\nexecutable: {command: [python3, scripts/drive.py]}\n"
+        "transforms: {static: {laser: {parent: base, translation_m: {x: 1}}}}\n",
         "nodes/scripts/drive.py": "",
         "nodes/unused.py": "",
     }
@@ -114,4 +117,6 @@ def test_the_files_of_a_system(tmp_path: Path) -> None:
     assert result.system is not None
     assert result.is_runnable, result.diagnostics
     unused = {"systems/other.yaml", "nodes/unused.py"}
-    assert set(question_about(result.system, path, result.project).files) == set(files) - unused
+    question = question_about(result.system, path, result.project)
+    assert set(question.files) == set(files) - unused
+    assert "tf2_msgs/msg/TFMessage" in question.interfaces
