@@ -149,7 +149,7 @@ def find_packages(folders: Iterable[Path]) -> Packages:
     searched = tuple(folders)
     for folder in searched:
         for manifest in _manifests(folder, _MAXIMUM_DEPTH):
-            name = _package_name(manifest)
+            name = package_name(manifest)
             has_interfaces = any((manifest.parent / kind).is_dir() for kind in FOLDERS)
             if name is not None and has_interfaces:
                 found.setdefault(name, manifest.parent)
@@ -171,7 +171,8 @@ def _manifests(folder: Path, depth: int) -> Iterator[Path]:
             yield from _manifests(below, depth - 1)
 
 
-def _package_name(manifest: Path) -> str | None:
+def package_name(manifest: Path) -> str | None:
+    """Return the name in a ``package.xml``; None without one."""
     try:
         text = _text(manifest)
     except _Unreadable:

@@ -46,8 +46,22 @@ def test_files_are_not_replaced(project: Path) -> None:
     assert not (project / "tests" / "test_arm.py").exists()
 
 
-@pytest.mark.parametrize("name", ["My", "9lives", "a-b", "a__b", "a/b", "", "composer"])
+@pytest.mark.parametrize("name", ["My", "9lives", "a-b", "a__b", "a/b", "", "composer", "class"])
 def test_names_that_ros_or_python_do_not_accept_are_refused(name: str, project: Path) -> None:
     done = compose("new", "node", name)
     assert done.code == 2
     assert f"'{name}'" in done.err
+
+
+@pytest.mark.parametrize("name", ["my_robot", "sensor_msgs", "class"])
+def test_packages_of_interfaces_need_a_name_of_their_own(name: str, project: Path) -> None:
+    done = compose("new", "interfaces", name)
+    assert (done.code, done.out) == (2, "")
+    assert f"the name '{name}' is in use" in done.err
+    assert not (project / "interfaces" / name).exists()
+
+
+def test_a_node_type_that_replaces_a_built_in_one_is_noted(project: Path) -> None:
+    assert (
+        "note: it replaces the built-in node type 'filter'" in compose("new", "node", "filter").err
+    )

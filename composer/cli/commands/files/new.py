@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from keyword import iskeyword
 from pathlib import Path
 from typing import Annotated
 
@@ -69,7 +70,12 @@ def node(name: Name) -> None:
     """Create a node type with a behavior, and its test."""
     from composer.scaffolding import new_node
 
-    _create(_root(), new_node(_checked(name)))
+    root = _root()
+    _create(root, new_node(_checked(name)))
+    from composer.node_types import replaced_built_in_type
+
+    if replaced_built_in_type(root / "nodes" / f"{name}.yaml") is not None:
+        say(f"note: it replaces the built-in node type '{name}' in this project")
 
 
 @app.command("interfaces", epilog=examples("compose new interfaces my_msgs"))
@@ -78,9 +84,13 @@ def interfaces(name: Name) -> None:
 
     Only its definitions and a short package.xml are needed: see 'compose interfaces build'.
     """
+    from composer.interfaces.sources import Bundle, package_name
     from composer.scaffolding import new_interfaces
 
-    _create(_root(), new_interfaces(_checked(name)))
+    root = _root()
+    if name in Bundle().packages() or name == package_name(root / "package.xml"):
+        raise _in_use(name)
+    _create(root, new_interfaces(_checked(name)))
     say("next: compose interfaces build")
 
 
@@ -91,9 +101,13 @@ def _checked(name: str) -> str:
             f"'{name}' is not a valid name",
             hint="names have lower-case letters, digits and single underscores, such as my_robot",
         )
-    if name in _RESERVED:
-        raise UsageError(f"the name '{name}' is in use", hint="choose another one")
+    if name in _RESERVED or iskeyword(name):
+        raise _in_use(name)
     return name
+
+
+def _in_use(name: str) -> UsageError:
+    return UsageError(f"the name '{name}' is in use", hint="choose another one")
 
 
 def _root() -> Path:
