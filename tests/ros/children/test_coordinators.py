@@ -61,7 +61,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             assert system.node("detector").state == "inactive"
             members[0].wait()
             members[0] = subprocess.Popen([*command_of(path), "--process", "sensing"])
-            wait_until(lambda: states(system) == {"active"}, "the return")
+            wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
 
             moves.clear()
             members[1].send_signal(signal.SIGSTOP)
@@ -71,7 +71,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             assert failed.reason == "process 'acting' has not reported for 5 s"
             members[1].send_signal(signal.SIGCONT)  # it returns before the pause is complete
             wait_until(lambda: "/lab/arm inactive" in system.states()[-3:], "the end of the pause")
-            wait_until(lambda: states(system) == {"active"}, "the return")
+            wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
             assert not moves  # it was active all the time
             assert system.node("camera").activations == 2
         assert all(member.poll() is None for member in members)
