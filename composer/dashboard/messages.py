@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from composer.dashboard.errors import BadRequestError
 from composer.diagnostics import nearest
+from composer.document.scalars import text_of_not_finite
 
 T = TypeVar("T")
 
@@ -151,15 +152,10 @@ def json_safe(value: Any) -> Any:
         case int() if not isinstance(value, bool):
             return value if -_EXACT <= value <= _EXACT else str(value)
         case float():
-            return value if math.isfinite(value) else _yaml_number(value)
+            return value if math.isfinite(value) else text_of_not_finite(value)
         case Mapping():
             return {str(key): json_safe(item) for key, item in value.items()}
         case list() | tuple():
             return [json_safe(item) for item in value]
         case _:
             return value if isinstance(value, bool | str | None) else str(value)
-
-
-def _yaml_number(value: float) -> str:
-    """Return NaN or an infinity as YAML writes it."""
-    return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"

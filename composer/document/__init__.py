@@ -6,6 +6,7 @@ possible, also together with diagnostics, so that later stages can report theirs
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
@@ -20,8 +21,9 @@ from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.parameter_files import ParameterFileBuilder
 from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
+from composer.document.scalars import resolve_plain
 from composer.source import SourceFile, Span, shown_path
-from composer.tree import Mapping, Scalar, Tree, describe
+from composer.tree import Mapping, Scalar, ScalarValue, Tree, describe
 
 #: Larger files are systems, which are parsed once anyway.
 _MAX_CACHED_BYTES = 32_768
@@ -65,9 +67,14 @@ def _parse(data: bytes, shown: str) -> tuple[Mapping | None, SourceFile, tuple[D
 _parse_cached = lru_cache(maxsize=64)(_parse)
 
 
-def parse_document(source: SourceFile) -> tuple[Mapping | None, list[Diagnostic]]:
-    """Return the tree of a text and the diagnostics of its YAML."""
-    builder = TreeBuilder(source)
+def parse_document(
+    source: SourceFile, resolve: Callable[[str], ScalarValue] = resolve_plain
+) -> tuple[Mapping | None, list[Diagnostic]]:
+    """Return the tree of a text and the diagnostics of its YAML.
+
+    ``resolve`` returns the value of an unquoted scalar, or raises NumberRefused.
+    """
+    builder = TreeBuilder(source, resolve)
     diagnostics = _build(builder, source)
     if diagnostics is not None:
         return None, diagnostics

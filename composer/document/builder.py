@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
 
 import yaml
@@ -63,12 +64,18 @@ class _Open:
 
 
 class TreeBuilder:
-    """Handles the events of one document; ``root`` is the tree after the last one."""
+    """Handles the events of one document; ``root`` is the tree after the last one.
 
-    def __init__(self, source: SourceFile) -> None:
+    ``resolve`` returns the value of an unquoted scalar. It raises NumberRefused.
+    """
+
+    def __init__(
+        self, source: SourceFile, resolve: Callable[[str], ScalarValue] = resolve_plain
+    ) -> None:
         self.root: Tree | None = None
         self.diagnostics: list[Diagnostic] = []
         self._source = source
+        self._resolve = resolve
         self._open: list[_Open] = []
         self._anchors: dict[str, _Anchored | None] = {}  # None while the value is being read
         self._values = 0
@@ -193,9 +200,6 @@ class TreeBuilder:
             value, diagnostics = check_value(event.value, span)
             self.diagnostics += diagnostics
         return Scalar(value, span, verbatim, offset)
-
-    def _resolve(self, text: str) -> ScalarValue:
-        return resolve_plain(text)
 
     def _plain(self, text: str, span: Span) -> ScalarValue:
         try:

@@ -98,7 +98,7 @@ class ParameterFileBuilder(TreeBuilder):
     """
 
     def __init__(self, source: SourceFile) -> None:
-        super().__init__(source)
+        super().__init__(source, resolve_parameter)
         self._documents: list[Tree] = []
 
     def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
@@ -112,9 +112,6 @@ class ParameterFileBuilder(TreeBuilder):
             elif event.tag != _STRING_TAG:
                 value = self._plain(text, span)
         return Scalar(value, span, verbatim, offset)
-
-    def _resolve(self, text: str) -> ScalarValue:
-        return resolve_parameter(text)
 
     def _key(self, scalar: Scalar, event: yaml.ScalarEvent, _: object) -> Scalar | None:
         if not event.value:

@@ -47,6 +47,18 @@ def resolve_plain(text: str) -> ScalarValue:
     return _float(text) if _FLOAT.fullmatch(text) else text
 
 
+def resolve_any_number(text: str) -> ScalarValue:
+    """Return the same as :func:`resolve_plain`; numbers need not be finite, as in messages."""
+    if _NOT_FINITE.fullmatch(text):
+        return float(text.replace(".", ""))
+    return resolve_plain(text)
+
+
+def text_of_not_finite(value: float) -> str:
+    """Return NaN or an infinity as YAML writes it."""
+    return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+
+
 def _integer(digits: str, base: int) -> int:
     # The length first: int() takes quadratic time, and refuses more than 4300 digits.
     if len(digits) > MAX_NUMBER_LENGTH:

@@ -229,7 +229,7 @@ def _message(name: str, value: Any, kind: str) -> ParameterMessage:
             return Parameter(name, value=value).to_parameter_msg()
         declared = Parameter.Type[kind.upper()]
         return Parameter(name, declared, _converted(value, kind)).to_parameter_msg()
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError, AssertionError) as error:
         raise ParameterRejectedError(
             f"parameter '{name}' has type {kind}, got {value!r}"
         ) from error

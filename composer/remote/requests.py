@@ -61,11 +61,14 @@ class ServiceCaller:
     def call_once(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
         """Return the response to a request that is sent only once. Raises NoResponseError."""
         client = self._client(service, name)
-        if self._session.wait_for(lambda: client.service_is_ready() or None, deadline):
-            servers = frozenset(map(participant, _servers(self._session, name)))
-            if servers != self._knowing.get(name):
-                wait_until_known(self._session, name, deadline)
-                self._knowing[name] = servers
+        if not self._session.wait_for(lambda: client.service_is_ready() or None, deadline):
+            raise NoResponseError(
+                f"no server of service '{name}' found within {deadline.timeout_s:g} s"
+            )
+        servers = frozenset(map(participant, _servers(self._session, name)))
+        if servers != self._knowing.get(name):
+            wait_until_known(self._session, name, deadline)
+            self._knowing[name] = servers
         return _required(self._call(service, {name: request}, deadline, math.inf), deadline)
 
     def _call(

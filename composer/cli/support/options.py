@@ -170,9 +170,12 @@ Stdin = Annotated[bool, typer.Option("--stdin", help="Read the YAML from standar
 
 
 def yaml_or_stdin(text: str | None, stdin: bool) -> str:
-    """Return the YAML of an argument, of standard input, or an empty map. Raises UsageError."""
+    """Return the YAML of an argument, of standard input, or an empty map. Raises UsageError.
+
+    Standard input may end with the marker that 'compose topic echo' prints after a message.
+    """
     if not stdin:
         return "{}" if text is None else text
     if text is not None:
         raise UsageError("the YAML is given as an argument or with --stdin, not both")
-    return sys.stdin.read()
+    return sys.stdin.read().rstrip().removesuffix("\n---")

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from composer.diagnostics import suggestion
 from composer.document import parse_document
+from composer.document.scalars import resolve_any_number
 from composer.expressions import EvaluationError
 from composer.interfaces import Interfaces
 from composer.interfaces.index import similar_interface
@@ -76,12 +77,15 @@ def compile_content(text: str, message_type: Any, what: str) -> Build:
     ``{expressions}`` are evaluated for each message. This and the returned function raise
     InvalidValueError.
     """
-    tree, diagnostics = parse_document(SourceFile(what, text.strip() or "{}"))
-    if tree is None or diagnostics:
-        reasons = "; ".join(item.message for item in diagnostics)
+    source = SourceFile(what, text.strip() or "{}")
+    tree, diagnostics = parse_document(source, resolve_any_number)
+    reasons = "; ".join(item.message for item in diagnostics)
+    if tree is None:
         raise InvalidValueError(
             f"{what} is not a YAML map: {reasons}", "write a map, such as '{data: hello}'"
         )
+    if diagnostics:
+        raise InvalidValueError(f"{what}: {reasons}")
     template, problems = compile_template(tree)
     if template is None or problems:
         raise InvalidValueError(f"{what}: " + "; ".join(problem.message for problem in problems))
@@ -93,8 +97,10 @@ def compile_content(text: str, message_type: Any, what: str) -> Build:
     def build_checked(scope: Mapping[str, Any]) -> Any:
         try:
             return build(scope)
-        except (MessageError, EvaluationError) as error:
-            raise InvalidValueError(f"{what}: {error}", getattr(error, "hint", None)) from error
+        except MessageError as error:
+            raise InvalidValueError(str(error), error.hint) from error
+        except EvaluationError as error:
+            raise InvalidValueError(f"{what}: {error}") from error
 
     return build_checked
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import math
 
 import pytest
 import yaml
@@ -8,7 +9,7 @@ import yaml
 from composer.cli.commands.ros.topic.message_format import truncated
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
-from composer.cli.support.output.results import as_yaml
+from composer.cli.support.output.results import as_json, as_yaml
 from composer.cli.support.output.terminal import columns
 from tests.cli.compose import compose
 
@@ -18,6 +19,11 @@ def test_yaml_output_round_trips(value: object) -> None:
     text = as_yaml(value)
     assert yaml.safe_load(text) == value
     assert not text.endswith("\n")
+
+
+def test_numbers_that_json_lacks_are_strings() -> None:
+    values = {"ranges": [1.5, math.inf, -math.inf, math.nan]}
+    assert as_json(values) == '{"ranges": [1.5, ".inf", "-.inf", ".nan"]}'
 
 
 def test_long_lists_and_strings_are_truncated() -> None:
@@ -38,7 +44,9 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("sys.stdin", io.StringIO("data: hello\n"))
     assert yaml_or_stdin(None, stdin=False) == "{}"
     assert yaml_or_stdin("{x: 1}", stdin=False) == "{x: 1}"
-    assert yaml_or_stdin(None, stdin=True) == "data: hello\n"
+    assert yaml_or_stdin(None, stdin=True) == "data: hello"
+    monkeypatch.setattr("sys.stdin", io.StringIO("data: hello\n---\n"))  # of 'topic echo --once'
+    assert yaml_or_stdin(None, stdin=True) == "data: hello"
     with pytest.raises(UsageError, match="not both"):
         yaml_or_stdin("{x: 1}", stdin=True)
 

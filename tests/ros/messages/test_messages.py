@@ -17,6 +17,7 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Bool, Byte, Float64, Header, Int8, String, UInt64
 
 from composer.document import parse_bytes
+from composer.remote.messages.values import InvalidValueError, build_message
 from composer.runtime.ros.messages import (
     MessageError,
     compile_message,
@@ -60,6 +61,13 @@ def message(text: str, kind: Any, **scope: Any) -> Any:
 )
 def test_values_become_fields(text: str, kind: Any, expected: Any) -> None:
     assert message(text, kind, x=7) == expected
+
+
+def test_numbers_of_messages_need_not_be_finite() -> None:
+    built = build_message("{position: [.inf, -.inf, .nan]}", JointState, "the message")
+    assert [str(item) for item in built.position] == ["inf", "-inf", "nan"]
+    with pytest.raises(InvalidValueError, match="takes an integer, not float nan"):
+        build_message("{sec: .nan}", Time, "the message")
 
 
 def test_nested_messages_keep_the_defaults_of_other_fields() -> None:

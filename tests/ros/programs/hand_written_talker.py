@@ -51,6 +51,7 @@ class Talker(Node):
         )
         self.declare_parameter("name", "robot")
         self.declare_parameter("gains", [1.0, 2.0])
+        self.declare_parameter("counts", [1, 2])
         self.declare_parameter("limits.reach", 1.0)
         self.declare_parameter("note", "old", ParameterDescriptor(dynamic_typing=True))
 

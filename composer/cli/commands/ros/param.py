@@ -170,7 +170,14 @@ def get(
     write(as_json(value) if json else as_yaml(value))
 
 
-@app.command("set", epilog=examples("compose param set planner max_velocity 0.5"))
+@app.command(
+    "set",
+    epilog=examples(
+        "compose param set planner max_velocity 0.5",
+        "compose param set camera offset -1",
+    ),
+    context_settings={"ignore_unknown_options": True},  # negative numbers are not options
+)
 def set_value(
     node: Node,
     name: Name,
@@ -185,7 +192,7 @@ def set_value(
     """
     with _parameters(node, timeout) as parameters:
         (described,) = parameters.describe([name])
-        values_set = parameters.set({name: value if described.type == "string" else _yaml(value)})
+        values_set = parameters.set({name: _value(described.type, value)})
     _print_values(parameters.node, values_set, json)
 
 
@@ -223,7 +230,7 @@ def describe(
     if json:
         write(as_json(described[0] if len(described) == 1 else described, indent=2))
         return
-    tables = (columns([(f"{key}:", str(facts[key])) for key in facts]) for facts in described)
+    tables = (columns([(f"{key}:", _shown(facts[key])) for key in facts]) for facts in described)
     write("\n\n".join(tables))
 
 
@@ -268,6 +275,21 @@ def _print_values(node: str, values: dict[str, Any], json: bool) -> None:
         write(lines(f"{node} {name}: {as_json(value)}" for name, value in values.items()))
 
 
+def _value(kind: str, text: str) -> Any:
+    """Return a value for a type of parameters. Raises UsageError."""
+    if kind == "string":
+        return text
+    if kind not in ("bool", "integer", "double"):
+        return _yaml(text)
+    from composer.document.parameter_files import resolve_parameter
+    from composer.document.scalars import NumberRefused
+
+    try:
+        return resolve_parameter(text)
+    except NumberRefused as error:
+        raise UsageError(f"the number {error}") from error
+
+
 def _yaml(text: str) -> Any:
     import yaml
 
@@ -297,6 +319,10 @@ def _values_for(node: str, sections: ParameterFiles, declared: Iterable[str]) ->
 
     given = sections.given(node, frozenset(declared))
     return {name: plain(entry.value) for name, entry in given.items()}
+
+
+def _shown(value: Any) -> str:
+    return value if isinstance(value, str) else as_json(value)
 
 
 def _facts(found: ParameterDescription) -> dict[str, Any]:

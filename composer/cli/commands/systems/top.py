@@ -67,13 +67,14 @@ def top(
     since the start: 'late' is how late a timer is called (99th percentile), 'over' counts calls
     that took longer than their budget_ms, and 'dropped' counts messages dropped from full queues.
     """
+    from composer.cli.support.output.callback_tables import SortKey
+
+    if sort not in list(SortKey):
+        raise UsageError(f"cannot sort by '{sort}'", hint=f"expected {_SORT_KEYS}")
     name = None if system is None else running_system_name(system)
     with ros_session("compose top", timeout) as (session, deadline):
-        from composer.cli.support.output.callback_tables import SortKey
         from composer.remote.systems.managers import Systems
 
-        if sort not in list(SortKey):
-            raise UsageError(f"cannot sort by '{sort}'", hint=f"expected {_SORT_KEYS}")
         systems = Systems(session, deadline, callbacks=True)
         found = systems.only() if name is None else systems.find(name)
         follower = _Follower(session, systems, systems.report(found))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,8 +32,29 @@ def as_yaml(value: Any, *, one_line: bool = False) -> str:
 
 
 def as_json(value: Any, *, indent: int | None = None) -> str:
-    """Return plain data as JSON; one line unless ``indent`` is given."""
-    return escape_json(json.dumps(value, ensure_ascii=False, indent=indent))
+    """Return plain data as JSON; one line unless ``indent`` is given.
+
+    Numbers that JSON lacks become strings, as YAML writes them: ``".nan"``, ``"-.inf"``.
+    """
+    try:
+        text = json.dumps(value, ensure_ascii=False, indent=indent, allow_nan=False)
+    except ValueError:
+        text = json.dumps(_with_json_numbers(value), ensure_ascii=False, indent=indent)
+    return escape_json(text)
+
+
+def _with_json_numbers(value: Any) -> Any:
+    from composer.document.scalars import text_of_not_finite
+
+    match value:
+        case float() if not math.isfinite(value):
+            return text_of_not_finite(value)
+        case dict():
+            return {key: _with_json_numbers(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_with_json_numbers(item) for item in value]
+        case _:
+            return value
 
 
 def print_names(
