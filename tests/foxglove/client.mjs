@@ -39,6 +39,7 @@ client.on("advertiseServices", (found) => {
   found.forEach((service) => services.set(service.name, service));
   emit("advertiseServices", found);
 });
+client.on("unadvertiseServices", (ids) => emit("unadvertiseServices", ids));
 client.on("message", ({ subscriptionId, timestamp, data }) => {
   const { topic, reader } = readers.get(subscriptionId);
   emit("message", { subscription: subscriptionId, topic, timestamp, value: reader.readMessage(data) });
@@ -77,6 +78,9 @@ const commands = {
   },
   watch({ names }) {
     client.subscribeParameterUpdates(names);
+  },
+  unwatch({ names }) {
+    client.unsubscribeParameterUpdates(names);
   },
   graph() {
     client.subscribeConnectionGraph();

@@ -12,15 +12,19 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from tests.programs import require_package
 from tests.ros.support.commands import output_of
 from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.foxglove import FOLDER, FoxgloveClient, foxglove
-from tests.ros.support.in_process import wait_until
+from tests.ros.support.in_process import Peer, wait_until
 
 PLANNER, CONTROLLER = "/planning/planner", "/control/motor_controller"
 SPEED = f"{PLANNER}.max_velocity"
+#: Numbers of requests, so that no older response is taken for the one to a request.
+READS = itertools.count()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -91,6 +95,32 @@ def test_messages_from_before_the_subscription(client: FoxgloveClient) -> None:
     assert client.message("/rosout", lambda value: value["msg"])["value"]["level"] >= 10
 
 
+def test_a_topic_that_appears_later_and_goes(client: FoxgloveClient, peer: Peer) -> None:
+    publisher = peer.node.create_publisher(String, "/lab/late", 10)
+    channel = client.has("/lab/late")
+    first = _received(client, publisher, "first")
+    client.do("unsubscribe", subscription=first)
+    wait_until(lambda: not publisher.get_subscription_count(), "the end of the subscription")
+    publisher.publish(String(data="missed"))
+    third = _received(client, publisher, "third")
+    assert third != first
+    messages = [data for event, data in client.events if event == "message"]
+    received = [item["value"]["data"] for item in messages if item["topic"] == "/lab/late"]
+    assert received == ["first", "third"]
+    client.do("unsubscribe", subscription=third)
+    peer.run(lambda: peer.node.destroy_publisher(publisher))
+    client.until("unadvertise", lambda ids: channel in ids)
+
+
+def _received(client: FoxgloveClient, publisher: Any, text: str) -> int:
+    """Publish a message for the client; return the subscription that it has got it by."""
+    client.do("subscribe", topic="/lab/late")
+    wait_until(publisher.get_subscription_count, "the subscription")
+    publisher.publish(String(data=text))
+    message = client.message("/lab/late", lambda value: value["data"] == text)
+    return int(message["subscription"])
+
+
 def test_a_message_of_the_client_is_published(client: FoxgloveClient) -> None:
     client.do("advertise", topic="/lab/in", schemaName="std_msgs/String")
     channel = client.until("advertised")
@@ -120,6 +150,38 @@ def test_parameters_are_set_and_followed(client: FoxgloveClient) -> None:
     assert _parameters(client, "back")[SPEED]["value"] == 1
 
 
+def test_only_watched_parameters_are_followed(client: FoxgloveClient, peer: Peer) -> None:
+    period = f"{PLANNER}.sample_period_ms"
+
+    def change(name: str, value: float) -> None:
+        assert peer.set_parameter(PLANNER, name.rpartition(".")[2], value) == ""
+
+    def arrives(name: str, value: float) -> None:
+        client.until("parameterValues", lambda data: {name: value}.items() <= _values(data).items())
+
+    client.do("unwatch", names=[])
+    client.do("watch", names=[SPEED])
+    _read(client, {SPEED}, SPEED)  # the client has been served up to here
+    change(period, 110.0)
+    change(SPEED, 2.25)
+    arrives(SPEED, 2.25)
+    client.do("unwatch", names=[SPEED])
+    client.do("watch", names=[period])
+    _read(client, {SPEED}, SPEED)
+    change(SPEED, 2.75)
+    change(period, 120.0)
+    arrives(period, 120.0)
+    followed = [_values(data) for event, data in client.events if event == "parameterValues"]
+    assert {period: 110.0} not in followed
+    assert {SPEED: 2.75} not in followed
+    change(SPEED, 1.0)
+    change(period, 100.0)
+
+
+def _values(data: Any) -> dict[str, Any]:
+    return {item["name"]: item.get("value") for item in data["parameters"]}
+
+
 def test_a_refused_parameter_keeps_its_value(client: FoxgloveClient) -> None:
     _read(client, {SPEED}, SPEED)
     client.do("set", parameters=[{"name": SPEED, "value": 1e9}], id="refused")
@@ -133,11 +195,10 @@ def test_a_refused_parameter_keeps_its_value(client: FoxgloveClient) -> None:
 
 def _read(client: FoxgloveClient, wanted: set[str], *names: str) -> dict[str, Any]:
     """Read parameters, of all nodes without names, until all that are wanted are found."""
-    identifiers = (f"read {number} {sorted(wanted)}" for number in itertools.count())
     found: dict[str, Any] = {}
 
     def are_found() -> bool:
-        identifier = next(identifiers)
+        identifier = f"read {next(READS)}"
         client.do("get", names=names, id=identifier)
         found.update(_parameters(client, identifier))
         return wanted <= found.keys()
@@ -170,6 +231,19 @@ def _called(client: FoxgloveClient, name: str, **request: Any) -> Any:
 
     wait_until(is_answered, f"a response of {name}")
     return responses[0]["value"]
+
+
+def test_a_call_that_fails(client: FoxgloveClient, peer: Peer) -> None:
+    service = peer.node.create_service(Trigger, "/lab/brief", lambda _, response: response)
+    found = client.until("advertiseServices", lambda found: _named(found, "/lab/brief"))
+    number = next(item["id"] for item in found if item["name"] == "/lab/brief")
+    assert _called(client, "/lab/brief") == {"success": False, "message": ""}
+    peer.run(lambda: peer.node.destroy_service(service))
+    client.until("unadvertiseServices", lambda ids: number in ids)
+    client.do("call", name="/lab/brief", request={})
+    failure = client.until("serviceCallFailure", lambda data: data["serviceId"] == number)
+    assert failure["message"] == f"there is no service {number}"
+    assert _called(client, "/lab/add", data=True)["success"]
 
 
 class Graph:

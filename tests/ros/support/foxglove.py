@@ -70,9 +70,14 @@ class FoxgloveClient:
                 raise AssertionError(f"no such {event}, last: {self._last()}") from None
             self.events.append((content["event"], content.get("data")))
 
-    def has(self, topic: str) -> None:
-        """Wait until a topic is advertised."""
-        self.until("advertise", lambda found: any(item["topic"] == topic for item in found))
+    def has(self, topic: str) -> int:
+        """Wait until a topic is advertised; return the id of its channel."""
+
+        def channels(found: Any) -> list[Any]:
+            return [item["id"] for item in found if item["topic"] == topic]
+
+        identifier: int = channels(self.until("advertise", channels))[0]
+        return identifier
 
     def message(
         self,
