@@ -109,28 +109,6 @@ def test_the_system_and_other_programs_discover_each_other(system: Running, port
         assert other.ask() == (0, ["observer"])
 
 
-@pytest.mark.soak
-def test_a_killed_server_is_replaced(system: Running, port: int) -> None:
-    with observing("/move", *NODES, environment=environment(port)) as before:
-        before.wait_until_ready()
-        (pid,) = servers(port)
-        os.kill(pid, signal.SIGKILL)
-        system.wait_for("has ended by signal 9; the next one starts in 6 s")
-        count, _ = before.ask()
-        until_s = time.monotonic() + PATIENCE_S
-        while before.ask()[0] < count + 20:  # a second of messages
-            assert time.monotonic() < until_s
-        assert servers(port) == []
-        system.wait_for("is started again")
-        (successor,) = servers(port)
-        assert successor != pid
-        with observing("/move", *NODES, environment=environment(port)) as after:
-            after.wait_until_ready()
-            count, _ = after.ask()
-            while after.ask()[0] == count:
-                assert time.monotonic() < until_s
-
-
 def test_the_server_ends_with_the_system(system: Running, port: int) -> None:
     (pid,) = servers(port)
     ended = system.log.read_text().count("has ended")
@@ -162,6 +140,38 @@ def test_a_system_uses_a_server_that_does_not_end_with_it(port: int, tmp_path: P
         server.communicate(timeout=PATIENCE_S)
     assert server.returncode == 0
     assert servers(port) == []
+
+
+# The tests from here on start systems of their own: that of the module has ended by now, or was not
+# started if only these are run.
+
+
+@pytest.mark.soak
+def test_a_killed_server_is_replaced(port: int, shared_domain_id: int, tmp_path: Path) -> None:
+    with (
+        running(tmp_path / "log.txt", str(written(tmp_path, port))) as system,
+        observing("/move", *NODES, environment=environment(port)) as before,
+    ):
+        system.wait_for("3 of 3 nodes active")
+        before.wait_until_ready()
+        (pid,) = servers(port)
+        os.kill(pid, signal.SIGKILL)
+        system.wait_for("has ended by signal 9; the next one starts in 6 s")
+        count, _ = before.ask()
+        until_s = time.monotonic() + PATIENCE_S
+        while before.ask()[0] < count + 20:  # a second of messages
+            assert time.monotonic() < until_s
+        assert servers(port) == []
+        system.wait_for("is started again")
+        (successor,) = servers(port)
+        assert successor != pid
+        with observing("/move", *NODES, environment=environment(port)) as after:
+            after.wait_until_ready()
+            count, _ = after.ask()
+            until_s = time.monotonic() + PATIENCE_S
+            while after.ask()[0] == count:
+                assert time.monotonic() < until_s
+        assert system.stop()[0] == 0
 
 
 @pytest.mark.soak
