@@ -22,9 +22,11 @@ from composer.model import PortKind
 #: ones: what is measured must not change the layout.
 STATE_PLACEHOLDER = "unconfigured"
 RATE_PLACEHOLDER_HZ = 1111.0
+#: Stands where the page writes the process of an executor.
+PROCESS_PLACEHOLDER = "pid 4194304 · 10 restarts"
 _NODE = "node:"
 #: Views without a direction of their own.
-_TURNED = (View.NODES, View.CONNECTIONS)
+_TURNED = (View.NODES, View.CONNECTIONS, View.DEPLOYMENT)
 
 
 def live_scene(snapshot: Snapshot) -> Scene:
@@ -57,6 +59,8 @@ def picture(scene: Scene, view: View, page: Size) -> dict[str, Any]:
     ``page`` is the size of its place in pixels. All texts in the fragment are escaped.
     """
     graph = build_graph(scene, view)
+    if view is View.DEPLOYMENT:
+        graph = replace(graph, clusters=tuple(map(_with_place_for_process, graph.clusters)))
     directions = [graph.direction]
     if view in _TURNED:
         directions = [Direction.RIGHT, Direction.DOWN][:: 1 if page.width >= page.height else -1]
@@ -68,7 +72,20 @@ def picture(scene: Scene, view: View, page: Size) -> dict[str, Any]:
         "height": layout.size.height,
         "svg": "\n".join((markers(), *contents(graph, layout))),
         "things": {thing.key: _facts(thing) for thing in _things(graph)},
+        "executors": _nodes_by_executor(graph) if view is View.DEPLOYMENT else {},
     }
+
+
+def _with_place_for_process(cluster: Cluster) -> Cluster:
+    return replace(cluster, label=f"{cluster.label} · {PROCESS_PLACEHOLDER}")
+
+
+def _nodes_by_executor(graph: Graph) -> dict[str, list[str]]:
+    """Return the full names of the nodes in each frame, by its key."""
+    found: dict[str, list[str]] = {}
+    for vertex in graph.vertices:
+        found.setdefault(vertex.cluster, []).append(vertex.key.removeprefix(_NODE))
+    return found
 
 
 def _things(graph: Graph) -> Iterable[Cluster | Vertex | Edge]:

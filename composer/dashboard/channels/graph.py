@@ -222,6 +222,8 @@ def _state(node: NodeReport) -> dict[str, Any]:
         "restarts": node.restarts,
         "held_down": node.held_down,
         "last_error": node.last_error,
+        "pid": node.pid,
+        "host": node.host,
     }
 
 

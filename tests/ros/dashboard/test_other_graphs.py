@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from composer.runtime.process.instance_lock import local_systems
 from tests.ros.support.commands import hand_written, output_of
 from tests.ros.support.dashboard import dashboard
 from tests.ros.support.pages import opened, visit
@@ -35,6 +38,14 @@ connections:
   - {topic: /burst, from: source.burst, to: sink.burst}
 chains:
   through: {through: [source.burst, sink.last], latency_ms: 10000}
+"""
+SPLIT = """
+system: split
+lifecycle: {on_failure: restart, restart: {backoff_ms: 100}}
+processes: {other: {nodes: [killed]}}
+nodes:
+  killed: {timers: {tick: {period_ms: 500, log: tick}}}
+  own: {timers: {tick: {period_ms: 500, log: tick}}}
 """
 SOURCE = """
 from composer.behavior import Behavior
@@ -85,6 +96,24 @@ def test_what_the_pipeline_does_not_have(dropping: Page) -> None:
     expect(page, "[data-name=gear] .declared", r"^declared 1 at dropping\.yaml:\d+:\d+$")
     assert output_of("param", "get", "/source", "mode").strip().endswith("fast, very")
     assert output_of("param", "get", "/source", "gear").strip().endswith("3")
+
+
+def test_the_deployment_shows_processes_and_restarts(
+    browser: Browser, tmp_path: Path, ros_domain_id: int
+) -> None:
+    path = tmp_path / "split.yaml"
+    path.write_text(SPLIT, encoding="utf-8")
+    with RunningSystem(str(path)) as system:
+        system.wait_for("2 of 2 nodes active")
+        with dashboard(str(path)) as server, opened(browser, server.address) as page:
+            page.goto("/graph?view=deployment")
+            running = page.locator('.world .cluster[data-state="active"] text')
+            expect(page, ".cluster text", f"^default: events · pid {system.process.pid}$")
+            running.filter(has_text=re.compile(r"^process other · pid \d+$")).wait_for()
+            killed = local_systems()["/split/other"]
+            os.kill(int(killed), signal.SIGKILL)
+            restarted = re.compile(rf"^process other · pid (?!{killed} )\d+ · [1-9]\d* restarts?$")
+            running.filter(has_text=restarted).wait_for()
 
 
 def test_a_graph_without_a_system(browser: Browser, ros_domain_id: int) -> None:

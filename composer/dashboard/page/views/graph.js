@@ -21,7 +21,7 @@ const VIEWS = [
   ["nodes", "Nodes"],
   ["connections", "Ports"],
   ["lifecycle", "Bring-up", true],
-  ["deployment", "Executors", true],
+  ["deployment", "Deployment", true],
 ];
 
 export function createView(app) {
@@ -104,7 +104,7 @@ export function createView(app) {
     const svg = s("svg", { class: "picture", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
     canvas.replaceChildren(svg);
     picture = readPicture(canvas);
-    overlay = createOverlay(picture, things);
+    overlay = createOverlay(picture, things, data.executors);
     viewport = createViewport(picture, createZoomLevels(picture));
     viewport.fit();
     listenToItems(picture, selection, viewport);

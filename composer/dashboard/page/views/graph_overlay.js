@@ -11,13 +11,19 @@ import { kindOfState, labelOfState, stateShape } from "../icons.js";
 /** Stand where a state and a rate are to be written: see pictures.py. */
 const STATE_PLACEHOLDER = "unconfigured";
 const RATE_PLACEHOLDER = "1110 Hz";
+const PROCESS_PLACEHOLDER = / · pid 4194304 .*$/;
 const SHAPE_SIZE = 12;
 const INSET = 5;
 
-export function createOverlay(picture, things) {
+/** `executors` are the full names of the nodes in each frame of the deployment, by its key. */
+export function createOverlay(picture, things, executors) {
   const nodes = new Map();
   const rates = new Map();
   const drops = new Map();
+  const frames = picture.frames.filter(({ namespace }) => executors[namespace]).map(({ namespace, element }) => {
+    const text = element.querySelector("text");
+    return { element, text, label: text.textContent.replace(PROCESS_PLACEHOLDER, ""), nodes: executors[namespace] };
+  });
 
   for (const item of picture.items.values()) {
     const texts = [...item.element.querySelectorAll("text")];
@@ -67,6 +73,12 @@ export function createOverlay(picture, things) {
     if (label) setText(label, total > 0 ? `${total} dropped` : "");
   }
 
+  function showProcesses({ element, text, label, nodes }, live) {
+    const found = processesOf(nodes.map((name) => live.nodes[name]).filter(Boolean));
+    setText(text, [label, ...found.words].join(" · "));
+    element.dataset.state = found.state;
+  }
+
   function rateOf(key, live) {
     if (live.edges[key]?.rate_hz !== undefined) return live.edges[key].rate_hz;
     const topic = things[key]?.channel;
@@ -83,6 +95,7 @@ export function createOverlay(picture, things) {
         const node = live.nodes[things[key]?.node];
         if (node) showState(entry, node.state);
       }
+      for (const frame of frames) showProcesses(frame, live);
       for (const [key, text] of rates) {
         const rate = rateOf(key, live);
         setText(text, rate === null ? "" : hertz(rate));
@@ -94,4 +107,18 @@ export function createOverlay(picture, things) {
       }
     },
   };
+}
+
+/** Return what runs these nodes, in words, and its state: that of processes with external nodes is not known. */
+function processesOf(nodes) {
+  const pids = new Set(nodes.map(({ pid }) => pid).filter(Boolean));
+  const restarts = nodes.reduce((sum, node) => sum + (node.restarts ?? 0), 0);
+  const words = restarts === 0 ? [] : [restarts === 1 ? "1 restart" : `${restarts} restarts`];
+  const isWrong = nodes.some((node) => node.held_down);
+  if (pids.size > 0) {
+    const running = pids.size === 1 ? `pid ${[...pids][0]}` : `${pids.size} running`;
+    return { words: [running, ...words], state: isWrong ? "wrong" : "active" };
+  }
+  if (nodes.some(({ state }) => state === "active")) return { words, state: "unknown" };
+  return { words: ["not running", ...words], state: isWrong ? "wrong" : "unconfigured" };
 }
