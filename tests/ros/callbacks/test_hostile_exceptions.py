@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
-from rclpy.action import ActionClient
 from std_srvs.srv import Trigger
 
 from tests.ros.support.in_process import Peer, finished, running, wait_until
@@ -114,9 +113,7 @@ def test_whatever_a_handler_raises_is_counted_and_answered(
                 assert not response.success
                 assert reason in response.message
             assert peer.call(Trigger, service).success
-        client = ActionClient(peer.node, Navigate, "/drive")
-        wait_until(client.server_is_ready)
-        peer.wait_until_known("/hostile")
+        client = peer.action_client(Navigate, "/drive")
         for number in range(7):
             goal = Navigate.Goal(max_velocity=float(number))
             handle = finished(peer.run(partial(client.send_goal_async, goal)))

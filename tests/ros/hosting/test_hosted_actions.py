@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
-from rclpy.action import ActionClient
 
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 from tests.ros.support.simulator import Simulator
@@ -35,8 +34,7 @@ def test_goals_are_executed_while_the_node_is_active(
         wait_until(lambda: sender.statuses)
         assert sender.statuses == [GoalStatus.STATUS_SUCCEEDED]
         assert sender.feedback == 3
-        client = ActionClient(peer.node, Navigate, "/go")
-        assert client.wait_for_server(10.0)
+        client = peer.action_client(Navigate, "/go")
         system.change("navigator", "deactivate")
         goal = Navigate.Goal()
         handle = finished(peer.run(lambda: client.send_goal_async(goal)))
@@ -52,8 +50,7 @@ def test_a_running_goal_is_canceled_when_the_node_leaves_active(tmp_path: Path, 
       navigator: {{class: "{CLASSES}:Navigator", executor: pool}}
     """
     with running(text, tmp_path) as system:
-        client = ActionClient(peer.node, Navigate, "/navigate")
-        assert client.wait_for_server(10.0)
+        client = peer.action_client(Navigate, "/navigate")
         goal = Navigate.Goal()
         goal.target.x = 1000.0
         handle = finished(peer.run(lambda: client.send_goal_async(goal)))

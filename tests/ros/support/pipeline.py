@@ -12,7 +12,6 @@ from composer_interfaces.action import Navigate
 from composer_interfaces.srv import PlanTrajectory
 from geometry_msgs.msg import Point, Twist
 from nav_msgs.msg import Odometry, Path
-from rclpy.action import ActionClient
 
 from tests.ros.support.system_process import ExternalNode
 
@@ -70,8 +69,7 @@ def _wait_for_plan(
 
 def check_the_navigation(external: ExternalNode) -> None:
     """Check a goal that the robot reaches from the origin, a second goal, and a canceled one."""
-    client = ActionClient(external.node, Navigate, "/navigate")
-    external.spin_until(client.server_is_ready)
+    client = external.action_client(Navigate, "/navigate")
     goal = Navigate.Goal(target=Point(x=0.0, y=1.0), max_velocity=1.0)
     outcome = external.result(external.result(client.send_goal_async(goal)).get_result_async())
     assert outcome.status == GoalStatus.STATUS_SUCCEEDED

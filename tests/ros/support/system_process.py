@@ -14,13 +14,14 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from tests.ros.support.forked import ForkedCommand
-from tests.ros.support.service_calls import ServiceCall
+from tests.ros.support.service_calls import ServiceClients
 
 T = TypeVar("T")
 
@@ -128,6 +129,7 @@ class ExternalNode:
         self.node = Node("external_node", context=context)
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
+        self._services = ServiceClients(self.node, lambda condition, _: self.spin_until(condition))
 
     def close(self) -> None:
         """Leave the ROS graph."""
@@ -160,13 +162,15 @@ class ExternalNode:
         return future.result()
 
     def call(self, service_type: Any, name: str, request: Any) -> Any:
-        """Call a service and return its response; see :class:`.ServiceCall`."""
-        call = ServiceCall(self.node, service_type, name, request)
-        try:
-            self.spin_until(call.is_done)
-            return call.result()
-        finally:
-            call.close()
+        """Call a service and return its response; see :class:`.ServiceClients`."""
+        return self._services.call(service_type, name, request)
+
+    def action_client(self, kind: Any, name: str) -> ActionClient:
+        """Return a client whose responses are not lost."""
+        client = ActionClient(self.node, kind, name)
+        self.spin_until(client.server_is_ready)
+        self._services.wait_until_acquainted(f"{name}/_action/send_goal")
+        return client
 
     def state(self, node: str) -> str:
         """Return the label of a node's lifecycle state."""

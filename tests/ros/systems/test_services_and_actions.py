@@ -58,18 +58,8 @@ def test_the_generic_node_types(external: ExternalNode) -> None:
 
 
 def _navigate(external: ExternalNode, target: Point) -> tuple[list[float], Any]:
-    client = ActionClient(external.node, Navigate, "/navigate")
-    external.spin_until(client.server_is_ready)
-    # Feedback sent before discovery of the subscription is lost, and the client cannot wait for
-    # discovery. Repeat the goal until feedback arrives.
+    client = external.action_client(Navigate, "/navigate")
     feedback: list[float] = []
-
-    def receives_feedback() -> bool:
-        external.result(_send(external, client, target, feedback).get_result_async())
-        return bool(feedback)
-
-    external.spin_until(receives_feedback)
-    feedback = []
     goal = _send(external, client, target, feedback)
     # Request the result last, since rclpy then drops pending feedback.
     external.spin_until(lambda: len(feedback) == 10)
