@@ -52,8 +52,11 @@ class Detector(Behavior):
         found.publish(found.message_type(data=f"found {message.data}"))
 
 class Arm(Behavior):
+    is_held = False
+
     async def on_deactivate(self):
-        await self.clock.sleep(0.3)
+        while self.is_held:
+            await self.clock.sleep(0.01)
 """
 
 

@@ -64,13 +64,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
 
             moves.clear()
-            members[1].send_signal(signal.SIGSTOP)
-            wait_until(lambda: system.node("arm").state == "deactivating", "the pause")
-            failed = system.reported(NodeFailed)[-1]
-            assert failed.node == "/lab/detector"
-            assert failed.reason == "process 'acting' has not reported for 5 s"
-            members[1].send_signal(signal.SIGCONT)  # it returns before the pause is complete
-            wait_until(lambda: "/lab/arm inactive" in system.states()[-3:], "the end of the pause")
+            stop_until_the_pause(members[1], system, peer)
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
             assert not moves  # it was active all the time
             assert system.node("camera").activations == 2
@@ -78,8 +72,29 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     finally:
         for member in members:
             member.send_signal(signal.SIGINT)
-        codes = [member.wait(20) for member in members]
+        codes = [member.wait(PATIENCE_S) for member in members]
     assert codes == [0, 0]
+
+
+def stop_until_the_pause(
+    member: subprocess.Popen[bytes], system: RunningSystem, peer: Peer
+) -> None:
+    """Stop the process of the detector; let it return before the pause is complete."""
+    reports = peer.listen(DiagnosticArray, "/lab/robot/acting/manager/state", STATE_QOS)
+    wait_until(lambda: reports, "a report")
+    changes = len(system.states("/lab/arm"))
+    system.behavior("arm").is_held = True
+    member.send_signal(signal.SIGSTOP)
+    wait_until(lambda: system.node("arm").state == "deactivating", "the pause")
+    failed = system.reported(NodeFailed)[-1]
+    assert failed.node == "/lab/detector"
+    assert failed.reason == "process 'acting' has not reported for 5 s"
+    reports.clear()
+    member.send_signal(signal.SIGCONT)
+    wait_until(lambda: reports, "its return")
+    system.behavior("arm").is_held = False
+    wait_until(lambda: system.states("/lab/arm")[changes:], "the end of the pause")
+    assert system.states("/lab/arm")[changes] == "/lab/arm inactive"
 
 
 def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:

@@ -15,11 +15,13 @@ import pytest
 from tests.ros.support.commands import (
     PATIENCE_S,
     Running,
+    code_of_end,
     compose,
-    output_of,
+    listed,
     running,
     start,
 )
+from tests.ros.support.in_process import wait_until
 from tests.ros.support.observers import observing
 
 SYSTEM = """
@@ -88,9 +90,12 @@ def servers(port: int) -> list[int]:
 
 # The first test, as commands wait for the killed programs of others.
 def test_commands_discover_it_without_settings(system: Running) -> None:
-    assert "/robot/sensing: running, 1 of 1 nodes active" in output_of("ps")
-    assert "data: go" in output_of("topic", "echo", "/move", "--once")
-    assert output_of("topic", "info", "/move").count("count: 1") >= 1
+    for part, *command in (
+        ("/robot/sensing: running, 1 of 1 nodes active", "ps"),
+        ("data: go", "topic", "echo", "/move", "--once"),
+        ("count: 1", "topic", "info", "/move"),
+    ):
+        assert part in listed((part,), *command)
 
 
 def test_the_system_and_other_programs_discover_each_other(system: Running, port: int) -> None:
@@ -101,10 +106,13 @@ def test_the_system_and_other_programs_discover_each_other(system: Running, port
         observing("/move", environment=environment()) as other,
     ):
         client.wait_until_ready()
-        count, names = client.ask()
-        while count == 0:
-            count, names = client.ask()
-        assert [name for name in names if name != "observer"] == ALL
+        known: list[str] = []
+
+        def knows_all() -> bool:
+            count, known[:] = client.ask()
+            return count > 0 and [name for name in known if name != "observer"] == ALL
+
+        wait_until(knows_all, "messages and all nodes")
         other.wait_until_ready()
         assert other.ask() == (0, ["observer"])
 
@@ -113,8 +121,8 @@ def test_the_server_ends_with_the_system(system: Running, port: int) -> None:
     (pid,) = servers(port)
     ended = system.log.read_text().count("has ended")
     code, _, log = system.stop()
-    assert code == 0, log
-    assert not Path("/proc", str(pid)).exists()
+    assert code == code_of_end(log), log
+    wait_until(lambda: not Path("/proc", str(pid)).exists(), "the end of the server")
     assert log.count("has ended") == ended  # not reported as a failure
 
 
@@ -123,23 +131,21 @@ def test_a_system_uses_a_server_that_does_not_end_with_it(port: int, tmp_path: P
     assert compose("discovery-server", path, "--ready").returncode == 1
     server = start("discovery-server", str(path))
     try:
-        until_s = time.monotonic() + PATIENCE_S
-        while compose("discovery-server", path, "--ready").returncode:
-            assert time.monotonic() < until_s
+        listed((), "discovery-server", str(path), "--ready")
         running_now = servers(port)
         assert len(running_now) == 1
         assert "runs already\n" in compose("discovery-server", path).stderr
         with running(tmp_path / "log.txt", str(path)) as run:
             run.wait_for("3 of 3 nodes active")
             code, _, log = run.stop()
-        assert code == 0
+        assert code == code_of_end(log), log
         assert f"discovery server 127.0.0.1:{port} runs already, and is used" in log
         assert servers(port) == running_now
     finally:
         server.send_signal(signal.SIGINT)
         server.communicate(timeout=PATIENCE_S)
     assert server.returncode == 0
-    assert servers(port) == []
+    wait_until(lambda: not servers(port), "the end of the server")
 
 
 # The tests from here on start systems of their own: that of the module has ended by now, or was not

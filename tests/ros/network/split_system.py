@@ -128,9 +128,17 @@ class UpOnHosts:
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the command, not to its children."""
-        found = self._system.console.processes("--hosts")
-        (pid,) = (pid for pid, words in found.items() if "nsenter" not in words)
-        self._system.console.check("kill", f"-{number.value}", str(pid))
+
+        def is_sent() -> bool:  # it may not have started yet, or have ended meanwhile
+            if self.process.poll() is not None:
+                return True
+            found = self._system.console.processes("--hosts")
+            pids = [pid for pid, words in found.items() if "nsenter" not in words]
+            # A child that has just been forked has the same command line.
+            kill = ("kill", f"-{number.value}", str(min(pids, default=0)))
+            return bool(pids) and self._system.console.run(*kill).returncode == 0
+
+        wait_until(is_sent, "no process to send the signal to")
 
     def kill(self) -> None:
         """Kill the command, not its children; wait until it has ended."""
@@ -138,11 +146,17 @@ class UpOnHosts:
         self.process.wait(PATIENCE_S)
 
     def stop(self) -> int:
-        """End it as Ctrl-C does; return the exit code."""
+        """End it as Ctrl-C does, and check that no process is left; return the exit code."""
         self.signal(signal.SIGINT)
         code = self.process.wait(PATIENCE_S)
         self._reader.join(PATIENCE_S)
+        wait_until(lambda: not self._system.all_processes(), "processes are left")
         return code
+
+    @property
+    def output(self) -> str:
+        """The output so far."""
+        return "\n".join(self.lines)
 
     def _read(self) -> None:
         assert self.process.stdout is not None

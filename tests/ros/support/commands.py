@@ -66,6 +66,14 @@ class Running:
         return self.process.returncode, out, self.log.read_text()
 
 
+def code_of_end(output: str) -> int:
+    """Return the exit code of a system over several processes that was told to stop.
+
+    If the machine does not run one of them for a second, its nodes are not moved in time.
+    """
+    return int(" is stuck and did not " in output or "no time left" in output)
+
+
 @contextmanager
 def running(log: Path, *arguments: str) -> Iterator[Running]:
     run = Running(log, *arguments)

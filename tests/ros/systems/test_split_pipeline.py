@@ -24,7 +24,15 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.remote.systems.local_queries import local_report
 from composer.runtime.process.instance_lock import local_systems
-from tests.ros.support.commands import COMPOSE, compose, output_of
+from tests.ros.support.commands import (
+    COMPOSE,
+    code_of_end,
+    compose,
+    listed,
+    output_of,
+    repeated,
+    repeated_until,
+)
 from tests.ros.support.dashboard import browser, dashboard
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.pipeline import (
@@ -47,6 +55,9 @@ CONTROLLER = "{type: motor_controller, "
 WAITING = "{type: motor_controller, parameters: {waypoints: []}, "
 ROUNDS = 50
 SOAK_PATIENCE_S = 120.0  # hundreds of starts, one of them while the computer does something else
+#: The number of looks at the graph without a change: more than a second, in which a busy machine
+#: may not run a process.
+STABLE = 30
 
 Graph = frozenset[tuple[str, ...]]
 
@@ -81,7 +92,7 @@ def split(path: Path, one_process: Graph, shared_domain_id: int) -> Iterator[Run
     with RunningSystem(str(path)) as system:
         system.wait_for("3 of 3 nodes active")
         yield system
-        assert system.stop()[0] == 0
+        assert system.stop()[0] == code_of_end(system.output)
     wait_until(lambda: not processes_of(path), "the end of all processes")
 
 
@@ -116,7 +127,8 @@ def stable_graph(observer: ExternalNode) -> Graph:
 
     def is_stable() -> bool:
         seen.append(graph_of(observer.node))
-        return len(seen) > 10 and len(set(seen[-10:])) == 1 and bool(seen[-1])
+        last = seen[-STABLE:]
+        return len(last) == STABLE and len(set(last)) == 1 and bool(last[-1])
 
     observer.spin_until(is_stable)
     return seen[-1]
@@ -150,10 +162,9 @@ def is_up(path: Path) -> bool:
 def test_the_ros_graph_is_that_of_one_process(
     split: RunningSystem, one_process: Graph, external: ExternalNode
 ) -> None:
-    external.spin_until(lambda: graph_of(external.node) >= one_process)
+    external.spin_until(lambda: graph_of(external.node) == one_process)
     assert stable_graph(external) == one_process
-    for full_name in NODES:
-        assert names_of(external).count(full_name) == 1
+    external.spin_until(lambda: all(names_of(external).count(name) == 1 for name in NODES))
 
 
 def names_of(external: ExternalNode) -> list[str]:
@@ -176,13 +187,16 @@ def check_a_drive(external: ExternalNode) -> None:
     external.spin_until(lambda: bool(commands))
     odometry.clear()
     commands.clear()
-    waypoints = f"[{start.x + 2.0}, {start.y}]"
-    assert compose("param", "set", "motor_controller", "waypoints", waypoints).returncode == 0
+    set_waypoints(f"[{start.x + 2.0}, {start.y}]")
     external.spin_until(
         lambda: bool(odometry) and odometry[-1].pose.pose.position.x > start.x + 1.9
     )
-    assert compose("param", "set", "motor_controller", "waypoints", "[]").returncode == 0
+    set_waypoints("[]")
     check_the_drive(commands, odometry, line_m=start.y)
+
+
+def set_waypoints(waypoints: str) -> None:
+    listed((), "param", "set", "motor_controller", "waypoints", waypoints)
 
 
 def check_the_measured_processes(path: Path) -> None:
@@ -192,7 +206,9 @@ def check_the_measured_processes(path: Path) -> None:
 
         def is_measured(data: Any) -> bool:
             found = {node["name"]: node for node in data["nodes"]}
-            return all((found.get(name, {}).get("usage") or {}).get("threads") for name in NODES)
+            counts = [(item.get("process") or {}).get("processes") for item in data["systems"]]
+            usages = [found.get(name, {}).get("usage") or {} for name in NODES]
+            return counts == [len(owners)] and all(usage.get("threads") for usage in usages)
 
         data = page.until(page.subscribe("nodes"), is_measured)
     pids = local_systems()
@@ -200,8 +216,7 @@ def check_the_measured_processes(path: Path) -> None:
     for name, owner in zip(NODES, owners, strict=True):
         place = [found[name][key] for key in ("system", "host", "pid")]
         assert place == ["/pipeline", socket.gethostname(), pids[owner]]
-    (system,) = data["systems"]
-    assert (system["name"], system["process"]["processes"]) == ("/pipeline", 3)
+    assert data["systems"][0]["name"] == "/pipeline"
 
 
 def check_the_drawn_processes() -> None:
@@ -210,8 +225,8 @@ def check_the_drawn_processes() -> None:
     found: dict[str, Any] = {}
 
     def is_whole() -> bool:  # a command that has just started may not know all nodes yet
-        drawn = output_of("graph", "--live", "--view", "deployment", "-f", "json", "--measure", "0")
-        found.update(json.loads(drawn))
+        words = ("graph", "--live", "--view", "deployment", "-f", "json", "--measure", "0")
+        found.update(json.loads(listed((), *words)))
         vertices = {each["key"].removeprefix("node:"): each for each in found["vertices"]}
         return owners.keys() <= vertices.keys() and all(
             vertices[node]["label"] == [node, "active"] for node in NODES
@@ -230,31 +245,47 @@ def check_the_drawn_processes() -> None:
 
 def test_commands_for_the_system_include_all_processes(split: RunningSystem, path: Path) -> None:
     for command, state in (("pause", "inactive"), ("resume", "active"), ("reset", "unconfigured")):
-        assert compose(command, "pipeline").returncode == 0
-        assert states_of_all() == {state}
-    assert compose("up", "pipeline").returncode == 0
-    callbacks = json.loads(output_of("top", "pipeline", "--json", "--once"))["callbacks"]
-    assert {callback["node"] for callback in callbacks} == set(NODES)
-    rates = {callback["name"]: callback["calls_hz"] for callback in callbacks}
-    assert rates["step"] > 5.0  # of another process
-    (listed,) = (
-        system["nodes"]
-        for system in json.loads(output_of("ps", "--json"))["systems"]
-        if system["name"] == "/pipeline"
-    )
-    assert all(node["callbacks"] for node in listed)
-    listed = json.loads(output_of("ps", "pipeline", "--json"))["systems"][0]["nodes"]
-    assert {node["node"]: node["process"] for node in listed} == dict(
-        zip(NODES, ("sensing", "planning", ""), strict=True)
-    )
-    assert all(node["callbacks"] for node in listed)
+        listed((), command, "pipeline")
+        wait_until(lambda expected={state}: states_of_all() == expected, command)
+    listed((), "up", "pipeline")
+    top = ("top", "pipeline", "--json", "--once")
+    assert shows_all_callbacks(repeated_until(shows_all_callbacks, *top))
+    for words in (("ps", "--json"), ("ps", "pipeline", "--json")):
+        assert lists_all_callbacks(repeated_until(lists_all_callbacks, *words))
     check_the_drawn_processes()
     check_the_measured_processes(path)
-    assert compose("diff", path).stderr == "pipeline: runs as declared\n"
-    assert "/planning/planner active" in output_of("logs", "--system", "pipeline", "planner")
+    as_declared = "pipeline: runs as declared\n"
+    done = repeated(lambda done: done.stderr == as_declared, "diff", path)
+    assert done.stderr == as_declared
+    line = "/planning/planner active"
+    assert line in listed((line,), "logs", "--system", "pipeline", "planner")
     assert "subgraph" in output_of("graph", path, "--view", "deployment", "--format", "mermaid")
     for command in (("restart", "planner"), ("up", "pipeline")):
         check_that_a_node_comes_back(path, command)
+
+
+def shows_all_callbacks(text: str) -> bool:
+    """Return whether ``top`` shows the callbacks of all processes, and how often they run."""
+    callbacks = json.loads(text)["callbacks"]
+    rates = {callback["name"]: callback["calls_hz"] for callback in callbacks}
+    # The timer 'step' is in another process.
+    return {callback["node"] for callback in callbacks} == set(NODES) and rates.get(
+        "step", 0.0
+    ) > 5.0
+
+
+def lists_all_callbacks(text: str) -> bool:
+    """Return whether ``ps`` shows the nodes of all processes, with their callbacks."""
+    nodes = [
+        node
+        for system in json.loads(text)["systems"]
+        if system["name"] == "/pipeline"
+        for node in system.get("nodes", ())
+    ]
+    processes = dict(zip(NODES, ("sensing", "planning", ""), strict=True))
+    return {node["node"]: node["process"] for node in nodes} == processes and all(
+        node["callbacks"] for node in nodes
+    )
 
 
 def check_that_a_node_comes_back(path: Path, command: Sequence[str]) -> None:
@@ -263,16 +294,14 @@ def check_that_a_node_comes_back(path: Path, command: Sequence[str]) -> None:
     shut_down = ("lifecycle", "set", "planner", "--to", "finalized")
     wait_until(lambda: compose(*shut_down).returncode == 0, "a command that discovers the node")
     wait_until(lambda: "finalized" in states_of_all(), "the report of its state")
-    run = compose(*command)
-    assert run.returncode == 0, run.stderr
+    listed((), *command)
     wait_until(lambda: is_up(path), "all nodes")
     assert local_systems() == pids
 
 
 def states_of_all() -> set[str]:
     report = local_report("/pipeline", 5.0)
-    assert report is not None
-    return {node.state for node in report.nodes}
+    return {node.state for node in report.nodes} if report else set()
 
 
 def test_killed_processes_are_replaced(split: RunningSystem, path: Path) -> None:
@@ -322,7 +351,7 @@ def test_any_process_is_killed_fifty_times(
         external.spin_until(lambda: sorted(set(NODES) & set(names_of(external))) == sorted(NODES))
         external.spin_until(lambda: all(names_of(external).count(n) == 1 for n in NODES), 60.0)
         for name in sorted(runs):  # the coordinating one first
-            assert runs[name].stop()[0] == 0
+            assert runs[name].stop()[0] == code_of_end(runs[name].output)
     wait_until(lambda: not processes_of(path), "the end of all processes")
 
 
