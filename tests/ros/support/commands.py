@@ -23,7 +23,7 @@ PYTHON = (
 #: A new interpreter, for tests of how it starts or ends; the functions below fork.
 COMPOSE = (*PYTHON, "-m", "composer")
 PROGRAMS = Path(__file__).parents[1] / "programs"
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 @contextmanager
@@ -67,7 +67,7 @@ class Running:
 
 
 def code_of_end(output: str) -> int:
-    """Return the exit code of a system over several processes that was told to stop.
+    """Return the exit code of a system over several processes that was stopped.
 
     If the machine does not run one of them for a second, its nodes are not moved in time.
     """

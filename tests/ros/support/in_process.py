@@ -47,7 +47,7 @@ from tests.ros.support.leaving import leave
 from tests.ros.support.service_calls import Call, ServiceClients, servers_of
 
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 _ENDS_WITHIN_S = 6.0
 _GOALS = {
     "configure": "inactive",

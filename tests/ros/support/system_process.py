@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 class RunningSystem:
