@@ -34,6 +34,8 @@ _DURING = {
     "shutdown": "shuttingdown",
 }
 _TRANSITIONS = {state: transition for transition, state in _DURING.items()}
+#: What the events of a node may name as its new state.
+_LABELS = {*PRIMARY_STATES, *_TRANSITIONS, "errorprocessing"}
 _AVAILABLE: dict[str, Mapping[str, int]] = {
     UNCONFIGURED: {
         "configure": Transition.TRANSITION_CONFIGURE,
@@ -231,8 +233,8 @@ class OutsideNode(ABC):
 
     def _on_event(self, start: str, goal: str) -> None:
         """Follow a transition that another tool has requested from the node itself."""
-        if self._lock.is_held or self._state == FINALIZED:
-            return
+        if self._lock.is_held or self._state == FINALIZED or goal not in _LABELS:
+            return  # the last one, if another program publishes on the topic
         self._external_transition = _TRANSITIONS.get(start, self._external_transition)
         self._state = goal
         if goal not in PRIMARY_STATES or not self._external_transition:
