@@ -55,7 +55,7 @@ def _encoded(root: Path, files: Mapping[str, str]) -> dict[Path, bytes]:
 
 def _has_text(path: Path, text: str) -> bool:
     try:
-        return path.read_text(encoding="utf-8") == text
+        return path.is_file() and path.read_text(encoding="utf-8") == text
     except (OSError, ValueError):
         return False
 
@@ -64,6 +64,8 @@ def _write(files: Mapping[Path, bytes], *, replace: bool) -> None:
     """Write files and their folders, all or none. Raises CommandError."""
     for path in files:
         with _errors_of(path):
+            if path.exists() and not path.is_file():  # a folder, or a device such as /dev/null
+                raise CommandError(f"cannot write '{path}': it is not a regular file")
             if not replace and path.exists():
                 raise FileExistsError
     # At the end, first the files of before are restored, if it has failed.

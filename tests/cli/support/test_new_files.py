@@ -65,14 +65,24 @@ def test_exports_replace_all_files_or_none(
 
             patch.setattr(Path, "replace", fails)
         else:
-            (tmp_path / "third").mkdir()
-            before["third/"] = ""
-        with pytest.raises(CommandError, match=r"cannot write '.*third': (No space|Is a dir)"):
+            (tmp_path / "sub").write_text("in the way")
+            before = contents(tmp_path)
+        with pytest.raises(CommandError, match=r"cannot write '.*: (No space|Not a dir)"):
             write_exports(tmp_path, files, replace=True)
     assert contents(tmp_path) == before
     if step == "place":
         write_exports(tmp_path, files, replace=True)
         assert contents(tmp_path) == {**files, "sub/": ""}
+
+
+@pytest.mark.parametrize("replace", [False, True])
+def test_folders_and_devices_are_not_replaced(tmp_path: Path, replace: bool) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "device").symlink_to("/dev/zero")  # endless if it is read
+    for name in ("folder", "device"):
+        with pytest.raises(CommandError, match=f"{name}': it is not a regular file"):
+            write_exports(tmp_path, {"first": "new", name: "new"}, replace=replace)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["device", "folder"]
 
 
 def test_an_interface_package_stays_if_it_cannot_be_replaced(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -36,6 +37,17 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+#: The host and the path of an image, and a tag or a digest.
+_IMAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._/:-]*(@[A-Za-z0-9:]+)?")
+
+
+def _image_name(text: str | None) -> str | None:
+    """Return the value of --image. Raises typer.BadParameter."""
+    if text is not None and not _IMAGE.fullmatch(text):
+        raise typer.BadParameter(f"'{text}' is not the name of an image.")
+    return text
+
+
 NewFolder = Annotated[
     Path | None,
     typer.Option(
@@ -62,6 +74,7 @@ Image = Annotated[
     typer.Option(
         "--image",
         metavar="NAME",
+        callback=_image_name,
         help="The name of the image, as in registry.local/robot:1.2.",
         show_default="that of the system",
     ),
