@@ -28,6 +28,7 @@ from composer.cli.support.system_arguments import complete_system, runnable_syst
 
 if TYPE_CHECKING:
     from composer.doctor.result import CheckResult, Level
+    from composer.loading import LoadResult
     from composer.model import System
 
 EPILOGS = {
@@ -81,7 +82,9 @@ def doctor(
         require_hosts("compose doctor --hosts")
     results = []
     declared = None if system is None else runnable_system(system, only_errors=True).system
-    elsewhere = _check_hosts(system, timeout) if hosts and system is not None else ()
+    # Loaded before the checks: they take seconds, and their results would be lost.
+    loaded = load_for_hosts(system) if hosts and system is not None else None
+    elsewhere = () if loaded is None else _check_hosts(loaded, timeout)
     for result in chain(_check_all(declared, timeout), elsewhere):
         results.append(result)
         if not json:
@@ -94,9 +97,9 @@ def doctor(
         raise typer.Exit(FAILED)
 
 
-def _check_hosts(text: str, timeout: float) -> Iterator[CheckResult]:
+def _check_hosts(loaded: tuple[LoadResult, System, Path], timeout: float) -> Iterator[CheckResult]:
     """Check the other computers of a system, while its discovery server runs."""
-    result, system, relative = load_for_hosts(text)
+    result, system, relative = loaded
     from composer.doctor.hosts import check_hosts
     from composer.hosts.start import remote_processes
 
