@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from composer.analysis.hosted_classes import is_rclpy_node
 from composer.behavior_source import (
     BehaviorSource,
     Function,
@@ -118,6 +119,11 @@ def _check(source: BehaviorSource, text: str, folder: Path) -> None:
         raise ClassNotFound(
             f"the source of '{text}' cannot be read: it is compiled or made at run time",
             "use --construct to run its constructor",
+        )
+    if source.complete and not is_rclpy_node(source):
+        raise ClassNotFound(
+            f"class '{name}' is not derived from rclpy's Node",
+            "a class without ROS is the 'behavior' of a node type: 'compose new node' creates one",
         )
 
 

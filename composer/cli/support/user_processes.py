@@ -18,10 +18,11 @@ from composer.cli.support.output.terminal import say
 _OWN_EXCEPTION = re.compile(r"^composer\.[\w.]+: ")
 
 
-def run_user_process(module: str, arguments: Sequence[str], timeout_s: float) -> str:
+def run_user_process(what: str, module: str, arguments: Sequence[str], timeout_s: float) -> str:
     """Run a module of the composer; return what it writes to the file that is its first argument.
 
-    Raises CommandError with the last line of its output if it fails, or takes too long.
+    ``what`` describes it in errors, as in "constructing 'driver:Driver'". Raises CommandError with
+    the last line of its output if it fails or takes too long.
     """
     with tempfile.TemporaryDirectory(prefix="compose-") as folder:
         report = Path(folder, "report")
@@ -42,13 +43,13 @@ def run_user_process(module: str, arguments: Sequence[str], timeout_s: float) ->
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
             raise CommandError(
-                f"it did not end within {timeout_s:g} s",
-                hint="a constructor must not wait or spin; --timeout sets another limit",
+                f"{what} did not end within {timeout_s:g} s",
+                hint="its code must not wait or spin; --timeout sets another limit",
             ) from None
         if process.returncode != 0 or not report.is_file():
             if os.environ.get("COMPOSE_DEBUG"):
                 say(shown.rstrip())
             last = shown.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
             text = _OWN_EXCEPTION.sub("", last[0])
-            raise CommandError(text, hint="its process failed; COMPOSE_DEBUG=1 shows the output")
+            raise CommandError(f"{what} failed: {text}", hint="COMPOSE_DEBUG=1 shows its output")
         return report.read_text(encoding="utf-8")

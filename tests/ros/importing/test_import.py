@@ -92,9 +92,9 @@ def test_a_constructor_that_fails_or_waits_is_reported(
         ("import", "class", "bad:Waits", "--construct", "--timeout", "3"),
         ("import", "class", "bad:Other", "--construct"),
     )
-    assert fails.startswith("compose: ValueError: no map\n")
-    assert waits.startswith("compose: it did not end within 3 s\n")
-    assert other.startswith("compose: TypeError: bad:Other is not derived from rclpy.node.Node\n")
+    assert fails.startswith("compose: constructing 'bad:Fails' failed: ValueError: no map\n")
+    assert waits.startswith("compose: constructing 'bad:Waits' did not end within 3 s\n")
+    assert "TypeError: bad:Other is not derived from rclpy.node.Node\n" in other
 
 
 LAUNCH = """\

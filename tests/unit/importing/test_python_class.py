@@ -113,6 +113,7 @@ clients:
         ("zzz.zzz:Lidar", "no Python module named 'zzz.zzz'", "this folder"),
         ("driver", "'driver' does not name a class", "demo_nodes_py"),
         ("broken:A", "module 'broken' is not Python", None),
+        ("plain:A", "class 'A' is not derived from rclpy's Node", "compose new node"),
     ],
 )
 def test_what_is_not_a_class_is_explained(
@@ -120,6 +121,7 @@ def test_what_is_not_a_class_is_explained(
 ) -> None:
     (tmp_path / "driver.py").write_text(DRIVER, encoding="utf-8")
     (tmp_path / "broken.py").write_text("class A(\n", encoding="utf-8")
+    (tmp_path / "plain.py").write_text("class A:\n    pass\n", encoding="utf-8")
     with pytest.raises(ClassNotFound, match=message) as raised:
         describe_class(text, tmp_path)
     assert hint is None or hint in str(raised.value.hint)

@@ -13,6 +13,7 @@ from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import NewFile, Timeout, examples
 from composer.cli.support.output.terminal import lines, say, write_raw
 from composer.cli.support.ros import require_launch, require_ros, ros_session
+from composer.names import node_name_problem
 
 if TYPE_CHECKING:
     from composer.importing import FoundNode
@@ -32,8 +33,23 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+
+def _node_name(text: str) -> str:
+    """Return a name that a system or a node type can have. Raises typer.BadParameter."""
+    problem = node_name_problem(text)
+    if problem is not None:
+        raise typer.BadParameter(f"the name '{text}' {problem}.")
+    return text
+
+
 SystemToWrite = Annotated[
-    str, typer.Option("--system", metavar="NAME", help="Name of the system that is written.")
+    str,
+    typer.Option(
+        "--system",
+        metavar="NAME",
+        callback=_node_name,
+        help="Name of the system that is written.",
+    ),
 ]
 
 
@@ -128,6 +144,8 @@ def import_class(
     from composer.importing import write_node_type
     from composer.importing.python_class import ClassNotFound, describe_class
 
+    if output is not None:
+        _node_name(output.stem)
     unknown: tuple[str, ...] = ()
     if construct:
         found = _constructed(reference, timeout)
@@ -149,7 +167,8 @@ def _constructed(reference: str, timeout_s: float) -> FoundNode:
     from composer.importing.constructed import describe_constructed
 
     module = "composer.remote.constructed_class"
-    text = run_user_process(module, [reference, str(Path.cwd())], timeout_s)
+    what = f"constructing '{reference}'"
+    text = run_user_process(what, module, [reference, str(Path.cwd())], timeout_s)
     return describe_constructed(reference, json.loads(text))
 
 
@@ -193,7 +212,8 @@ def import_launch(
     from composer.importing.launch_file import describe_launch_file
 
     arguments_of_process = [str(file.absolute()), *given]
-    text = run_user_process("composer.launch.visitor", arguments_of_process, timeout)
+    what = f"evaluating '{file}'"
+    text = run_user_process(what, "composer.launch.visitor", arguments_of_process, timeout)
     found = describe_launch_file(system, str(file), given, json.loads(text))
     if not found.nodes:
         _report_left_out(found.left_out)

@@ -1,0 +1,24 @@
+"""``compose import`` writes no file that would not be valid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.compose import compose
+
+
+def test_names_that_ros_does_not_accept_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("driver.py").write_text("from rclpy.node import Node\nclass Driver(Node):\n    pass\n")
+    for arguments in (
+        ("class", "driver:Driver", "-o", "my driver.yaml"),
+        ("live", "--system", "my driver"),
+    ):
+        done = compose("import", *arguments)
+        assert (done.code, done.out) == (2, "")
+        assert "the name 'my driver' contains a space" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["driver.py"]
