@@ -41,7 +41,7 @@ lifecycle: {{on_failure: restart, restart: {{backoff_ms: 100}}}}
 nodes:
   driver:
     namespace: left
-    executable: {{command: {DRIVER}, arguments: [--fast, 3]}}
+    executable: {{command: {DRIVER}, arguments: [--fast, 3], ready_timeout_ms: 30000}}
     parameters:
       rate: {{type: double, default: 50}}
       gains: {{type: double_array, default: [1, 2.5]}}
@@ -54,7 +54,7 @@ nodes:
     services: {{reset: {{type: std_srvs/srv/Trigger}}}}
     action_servers: {{navigate: {{type: composer_interfaces/action/Navigate}}}}
   camera:
-    executable: {{command: {MANAGED}, lifecycle: managed}}
+    executable: {{command: {MANAGED}, lifecycle: managed, ready_timeout_ms: 30000}}
     publishers: {{words: {{type: std_msgs/msg/String}}}}
   listener:
     lifecycle: {{depends_on: [driver, camera]}}

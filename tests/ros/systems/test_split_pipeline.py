@@ -356,7 +356,7 @@ def test_any_process_is_killed_fifty_times(
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1800)
 def test_every_example_behaves_as_in_one_process() -> None:
     plugin = ("-p", "tests.ros.support.split_examples")
     folder = Path(__file__).parent
