@@ -68,6 +68,8 @@ def system_file(text: str) -> Path:
     """
     from composer.installed_projects import installed_systems
 
+    if not text:
+        raise UsageError("the name of the system is empty")
     path = Path(text)
     if path_exists(path) and not _is_folder(path):
         return path  # the loader reports what is wrong with it
@@ -83,7 +85,9 @@ def system_file(text: str) -> Path:
         raise UsageError(f"'{text}' is a folder, not a system file")
     from composer.diagnostics import nearest
 
-    close = nearest_path(path) or nearest(text, (*own, *installed, *examples))
+    near = nearest_path(path)
+    is_file = near is not None and not _is_folder(near)
+    close = near if is_file else nearest(text, (*own, *installed, *examples))
     listed = "example systems: " + ", ".join(sorted(examples))
     if installed:
         packages = sorted(name for name in installed if "/" in name)

@@ -52,6 +52,16 @@ def test_an_example_is_found_next_to_a_folder_of_its_name(root: Path) -> None:
         system_file("other")
 
 
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [("robt", "did you mean 'robot'?"), ("node", "example systems: "), ("", "None")],
+)
+def test_a_hint_names_no_folder(root: Path, text: str, hint: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        system_file(text)
+    assert str(raised.value.hint).startswith(hint)
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 def test_a_system_of_another_user_is_not_found_by_its_name(root: Path) -> None:
     os.chown(root / "systems" / "robot.yaml", 65534, 65534)
