@@ -106,20 +106,30 @@ class MemberNode(OutsideNode):
             if self._state != FINALIZED or is_outdated():
                 return None
             if self._reported == FINALIZED:
-                with suppress(ProcessUnavailable):
-                    result = self._process.request(self.full_name, CREATE)
-                    try:
-                        await self._wait_for(result)
-                    finally:
-                        result.cancel()
-                    response = result.result()
-                    if not response.successful:
-                        return f"cannot be created again: {response.reason}"
+                try:
+                    problem = await self._request_creation()
+                except ProcessUnavailable as error:
+                    problem = str(error) if self._reported == FINALIZED else ""
+                if problem:
+                    return f"cannot be created again: {problem}"
             self._reported = self._state = UNCONFIGURED
             self._is_moving = self._has_failed = False
             return None
         finally:
             self._lock.release()
+
+    async def _request_creation(self) -> str:
+        """Return why the process cannot create the node again; empty if it has.
+
+        Raises ProcessUnavailable.
+        """
+        result = self._process.request(self.full_name, CREATE)
+        try:
+            await self._wait_for(result)
+        finally:
+            result.cancel()
+        response = result.result()
+        return "" if response.successful else str(response.reason)
 
     async def _work(self, transition: str) -> None:
         try:

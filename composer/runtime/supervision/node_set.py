@@ -233,7 +233,7 @@ class NodeSet:
             return None
         if isinstance(node, MemberNode):
             created = node.loop.run_task(node.create_again(is_outdated))
-            if not node.loop.wait_for(created, _RECREATED_WITHIN_S):
+            if not node.loop.wait_for(created, node.transition_timeout_s):
                 created.cancel()
                 return "cannot be created again: its process does not respond"
             return created.result()
