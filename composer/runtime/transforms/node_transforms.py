@@ -89,6 +89,7 @@ class NodeTransforms:
         """Wait for a transform up to the timeout, and return it."""
         future: Future[Any] = Future()
         buffer, stamp_ns = self._buffer, _time(stamp)
+        until_s = monotonic() + timeout_ms / 1000.0
         if buffer is None:
             future.set_exception(self._refusal())
             return future
@@ -105,11 +106,12 @@ class NodeTransforms:
             error = buffer.explained(found, target, source)
             return type(error)(f"{error} (after {timeout_ms:g} ms)")
 
-        buffer.add_waiting(look_up)
-        future.add_done_callback(lambda _: buffer.remove_waiting(look_up))
-        look_up()
+        look_up()  # raises for arguments that are not names, which must not be looked up again
         if not future.done():
-            until_s = monotonic() + timeout_ms / 1000.0
+            buffer.add_waiting(look_up)
+            future.add_done_callback(lambda _: buffer.remove_waiting(look_up))
+            look_up()  # it may have arrived since the first time
+        if not future.done():
             self._context.gate.pending.add(future, until_s, missing)
         return future
 

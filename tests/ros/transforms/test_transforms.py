@@ -332,6 +332,10 @@ def check_messages(other: Any) -> None:
         other.transforms.lookup("map", "laser", stamp=1.0)
     with pytest.raises(TypeError, match="cannot transform Odometry; transform one of PointStamped"):
         other.transforms.transform(Odometry(header=point.header), "map")
+    for wrong in ({"target": ["lasr"]}, {"target": "lasr", "timeout_ms": "soon"}):
+        with pytest.raises(TypeError):
+            other.transforms.wait(source="laser", **wrong)
+    assert not other.transforms._buffer._waiting
 
 
 def test_the_buffer_is_emptied_when_simulated_time_goes_back(tmp_path: Path, peer: Peer) -> None:
