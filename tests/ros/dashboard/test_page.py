@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, WebSocketRoute
 
 pytestmark = pytest.mark.browser
-PLANNER = "/planning/planner"
+PLANNER, CONTROLLER = "/planning/planner", "/control/motor_controller"
 
 
 def node(name: str) -> str:
@@ -141,6 +141,18 @@ def test_a_node_is_restarted_by_click(view: Page, peer: Peer) -> None:
     wait_until(lambda: [event.goal_state.label for event in events if ends(event)] == passed)
     expect_text(detail(view).locator(".state"), "^active")
     assert sorted(buttons(view)) == sorted([*legal_transitions(peer, PLANNER), "restart"])
+
+
+def test_a_node_that_is_shut_down_is_created_again(view: Page) -> None:
+    view.goto(f"/nodes{CONTROLLER}")
+    view.click("button[data-transition=shutdown]")
+    expect_text(view.locator("dialog"), "Only a restart makes it usable again")
+    view.click("dialog >> button:text-is('Shutdown')")
+    expect_text(detail(view).locator(".state"), "^finalized")
+    assert buttons(view) == ["restart"]
+    view.click("button[data-transition=restart]")
+    expect_text(detail(view).locator(".state"), "^active")
+    expect_text(view.locator(".activity"), "running · 3 of 3 active")
 
 
 def ends(event: TransitionEvent) -> bool:

@@ -37,9 +37,10 @@ def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]
     try:
         page.goto(f"{address.origin}/?token={address.token}")
         yield page
-        assert complaints == []
+        assert not complaints, complaints
         own = (address.origin, f"ws://{address.host}/ws", f"blob:{address.origin}")
-        assert [url for url in requests if not url.startswith(own)] == []
+        foreign = [url for url in requests if not url.startswith(own)]
+        assert not foreign, foreign
     finally:
         context.close()
 

@@ -131,7 +131,7 @@ export function createNodeDetail(app) {
     const text = `${label[0].toUpperCase()}${label.slice(1)}`;
     const pressed = button(text, () => attempt(pressed, async () => {
       const dependents = LOWERING.includes(label) ? activeDependents(node) : [];
-      const answer = await answerTo(`${text} ${node}?`, text, dependents, isFinal);
+      const answer = await answerTo(`${text} ${node}?`, text, node, dependents, isFinal);
       if (answer === null) return;
       const extra = answer === "all" ? { dependents: true } : {};
       const { outcomes } = await app.connection.request(op, { node, ...args, ...extra });
@@ -140,14 +140,19 @@ export function createNodeDetail(app) {
     return pressed;
   }
 
-  async function answerTo(question, text, dependents, isFinal) {
-    const final = isFinal ? "A node that is shut down cannot be used again." : "";
+  async function answerTo(question, text, node, dependents, isFinal) {
+    const final = isFinal ? finalOf(node) : "";
     if (dependents.length > 0) {
       const hint = [`Active nodes depend on it: ${dependents.join(", ")}.`, final].filter(Boolean).join(" ");
       return asked(question, { hint, answers: [["Only this node", "one"], ["With dependents", "all"]] });
     }
     if (!isFinal || (await confirmed(question, { verb: text, hint: final }))) return "one";
     return null;
+  }
+
+  function finalOf(node) {
+    const { system } = app.nodes.nodes.find((one) => one.name === node);
+    return system ? "Only a restart makes it usable again." : "A node that is shut down cannot be used again.";
   }
 
   /** The active nodes that wait for this one, directly or through others. */
