@@ -103,10 +103,11 @@ class Systems:
         """Return the full name of a running system. Raises NotFoundError."""
         found = _matches(name, local_systems())
         if not found:
-            known = self._session.wait_until_settled(self.discover, self._deadline)
+            discovered = self._session.wait_until_settled(self.discover, self._deadline)
+            known = sorted({*local_systems(), *discovered})
             found = _matches(name, known)
         if not found:
-            error = not_found_error("running system", name, (*local_systems(), *known))
+            error = not_found_error("running system", name, known)
             none = "no system is running: start one with 'compose run'"
             raise NotFoundError(str(error), error.hint if known else none)
         if len(found) > 1:

@@ -60,6 +60,9 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
         ("topic find String", "a type has three parts"),
         ("topic pub /x std_msgs/msg/String {} --stdin", "not both"),
         ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
+        ("lifecycle set planner", "specify a transition of 'planner'"),
+        ("lifecycle set activate", "specify nodes, or a system with --system"),
+        ("top --sort name", "cannot sort by 'name'"),
     ],
 )
 def test_options_that_exclude_each_other(arguments: str, problem: str) -> None:

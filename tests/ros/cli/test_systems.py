@@ -156,6 +156,7 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
 
 
 def test_commands_to_a_whole_system(robot: Robot) -> None:
+    assert refused("pause", "zebra").endswith("\n  available: /fleet/robot\n")
     assert output_of("pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
     assert robot.states() == dict.fromkeys(robot.states(), "inactive")
     assert output_of("resume", "/fleet/robot") == "/fleet/robot: 2 of 3 nodes active\n"

@@ -246,7 +246,9 @@ def _split(
             raise UsageError("specify a transition, or a state with --to", hint=_EXAMPLE)
         transition = words.pop()
     if system is None and not words:
-        raise UsageError("specify nodes, or a system with --system", hint=_EXAMPLE)
+        if transition is None or transition in _TRANSITIONS:
+            raise UsageError("specify nodes, or a system with --system", hint=_EXAMPLE)
+        raise UsageError(f"specify a transition of '{transition}'", hint=_EXAMPLE)
     if system is not None and words:
         raise UsageError(f"specify nodes or --system, not both (got '{words[0]}')", hint=_EXAMPLE)
     return words, transition
