@@ -62,6 +62,8 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
         ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
         ("lifecycle set planner", "specify a transition of 'planner'"),
         ("lifecycle set activate", "specify nodes, or a system with --system"),
+        ("diff pipeline --for 5", "--for needs --watch"),
+        ("diff pipeline --watch --for 2", "--for 2 is not longer than --grace 2"),
         ("top --sort name", "cannot sort by 'name'"),
     ],
 )

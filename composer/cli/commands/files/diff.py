@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.support.errors import FAILED
+from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import (
     Autostart,
     AutostartOfRun,
@@ -97,6 +97,12 @@ def diff(
 
     Exit code 1 if there are differences.
     """
+    if watch_for is not None and not watch:
+        raise UsageError("--for needs --watch")
+    if watch_for is not None and watch_for <= grace:
+        raise UsageError(
+            f"--for {watch_for:g} is not longer than --grace {grace:g}: nothing would be reported"
+        )
     declared = runnable_system(system, settings=settings or (), namespace=namespace).system
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
