@@ -22,3 +22,14 @@ def test_names_that_ros_does_not_accept_are_refused(
         assert (done.code, done.out) == (2, "")
         assert "the name 'my driver' contains a space" in done.err
     assert [path.name for path in tmp_path.iterdir()] == ["driver.py"]
+
+
+def test_a_module_that_the_new_file_does_not_find_is_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("driver.py").write_text("from rclpy.node import Node\nclass Driver(Node):\n    pass\n")
+    note = "note: the module 'driver' is not found from other/driver.yaml: move it next to"
+    assert note in compose("import", "class", "driver:Driver", "-o", "other/driver.yaml").err
+    done = compose("import", "class", "driver:Driver", "-o", "driver.yaml")
+    assert done.err == "wrote driver.yaml\n"

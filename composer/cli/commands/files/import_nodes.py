@@ -158,6 +158,23 @@ def import_class(
     _write(write_node_type(type_name, found), output)
     if unknown:
         say(lines(["the source does not show:", *(f"  {text}" for text in unknown)]))
+    if output is not None and not _is_found(reference, output):
+        module = reference.partition(":")[0]
+        say(
+            f"note: the module '{module}' is not found from {output}: move it next to that file,"
+            " or into a folder of node types"
+        )
+
+
+def _is_found(reference: str, output: Path) -> bool:
+    """Return whether a node type in the file ``output`` finds the module of a class."""
+    from composer.behavior_source import find_behavior
+    from composer.model import BehaviorReference
+    from composer.source import Located, SourceFile, Span
+
+    span = Span(SourceFile("", reference), 1, 1)
+    located = Located(reference, span)
+    return find_behavior(BehaviorReference(located, output.absolute().parent)).module_found
 
 
 def _constructed(reference: str, timeout_s: float) -> FoundNode:
