@@ -68,10 +68,13 @@ def test_exported_values_are_those_published(view: Page, peer: Peer) -> None:
         exported = {float(row[0]): float(row[column]) for row in rows if row[column]}
         first, last = min(exported), max(exported)
         wait_until(functools.partial(has_until, published[name], last), f"the last of {name}")
-        assert exported == {
-            at: value for at, value in published[name].items() if first <= at <= last
-        }
-        assert len(exported) > 20
+        known = published[name].copy()  # it grows on another thread
+        expected = {at: value for at, value in known.items() if first <= at <= last}
+        # A busy machine may lose messages of best effort, here or there, where they are counted.
+        received = exported.keys() & expected.keys()
+        assert len(received) > 20
+        assert {at: exported[at] for at in received} == {at: expected[at] for at in received}
+        assert expected.keys() <= exported.keys() or view.locator(".plot-panel .drops").is_visible()
 
 
 def group(name: str) -> str:
