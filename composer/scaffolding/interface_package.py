@@ -36,6 +36,10 @@ class InvalidPackage(Exception):
     """The package cannot be completed; the text says why."""
 
 
+class NotForPip(InvalidPackage):
+    """Pip cannot build the package, but colcon can."""
+
+
 @dataclass(frozen=True, slots=True)
 class InterfacePackage:
     """An interface package: its name, and the definitions by their relative paths."""
@@ -44,20 +48,23 @@ class InterfacePackage:
     definitions: Mapping[str, str]
     dependencies: tuple[str, ...]
 
-    def files(self, versions: Mapping[str, str]) -> dict[str, str]:
-        """Return all files of the package.
+    def files(self, versions: Mapping[str, str] | None) -> dict[str, str]:
+        """Return all files of the package. Raises NotForPip.
 
-        ``versions`` are those of the ROS wheels that pip builds against, by ROS package.
+        ``versions`` are those of the ROS wheels that pip builds against, by ROS package; None is
+        for colcon alone.
         """
         template = interfaces_folder()
         wheels = (template / _CMAKE_MODULE).read_text(encoding="utf-8")
-        return {
+        files = {
             **self.definitions,
             "CMakeLists.txt": self._cmake(),
             "package.xml": self._manifest(),
-            "pyproject.toml": self._pyproject(versions),
             _CMAKE_MODULE: wheels,
         }
+        if versions is not None:
+            files["pyproject.toml"] = self._pyproject(versions)
+        return files
 
     def _cmake(self) -> str:
         found = "\n".join(f"find_package({name} REQUIRED)" for name in self.dependencies)
@@ -153,7 +160,7 @@ BUILD_TESTING = "OFF"
             if name in known:
                 continue
             if name not in versions:
-                raise InvalidPackage(
+                raise NotForPip(
                     f"'{self.name}' uses types of '{name}', which pip has not installed"
                 )
             tools.append(f"ros-{name.replace('_', '-')}=={versions[name]}")

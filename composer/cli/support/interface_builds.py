@@ -11,7 +11,12 @@ from pathlib import Path
 
 from composer.cli.support.errors import CommandError
 from composer.cli.support.output.terminal import say
-from composer.scaffolding.interface_package import InvalidPackage, bundled_package, read_package
+from composer.scaffolding.interface_package import (
+    InvalidPackage,
+    NotForPip,
+    bundled_package,
+    read_package,
+)
 
 _WHEEL_PREFIX = "ros-"
 
@@ -26,16 +31,24 @@ def wheel_versions() -> dict[str, str]:
     return found
 
 
-def complete_package(name: str, folder: Path | None, target: Path) -> None:
+def complete_package(name: str, folder: Path | None, target: Path, *, for_pip: bool = True) -> None:
     """Write the complete package to ``target``, which is replaced as a whole. Raises CommandError.
 
-    Without a folder, it is a package of ROS whose definitions come with the composer.
+    Without a folder, it is a package of ROS whose definitions come with the composer. Unless it has
+    to be built with pip, what pip needs may be left out.
     """
     try:
         package = bundled_package(name) if folder is None else read_package(name, folder)
-        _replace_folder(target, package.files(wheel_versions()))
+        try:
+            files = package.files(wheel_versions())
+        except NotForPip as error:
+            if for_pip:
+                hint = f"build it with colcon: compose interfaces build {name} --generate FOLDER"
+                raise CommandError(str(error), hint=hint) from error
+            files = package.files(None)
+        _replace_folder(target, files)
     except InvalidPackage as error:
-        raise CommandError(str(error), hint="with a sourced ROS 2, use --generate") from error
+        raise CommandError(str(error)) from error
     except (OSError, UnicodeDecodeError) as error:
         raise CommandError(f"cannot complete package '{name}': {error}") from error
 

@@ -76,11 +76,12 @@ def build(
     project = Project.at(Path.cwd())
     found = _found(project.interface_folders, packages or [], install=generate is None)
     if generate is not None:
-        if len(found) != 1 or generate.exists():
-            problem = f"'{generate}' exists already" if generate.exists() else "name one package"
-            raise CommandError(problem, hint=f"packages: {', '.join(found)}")
+        if generate.exists():
+            raise CommandError(f"'{generate}' exists already", hint="choose a new folder")
+        if len(found) != 1:
+            raise CommandError("name one package", hint=f"packages: {', '.join(found)}")
         ((name, folder),) = found.items()
-        complete_package(name, folder, generate)
+        complete_package(name, folder, generate, for_pip=False)
         write(lines([f"{name}: {generate}"]))
         return
     for name, folder in found.items():
