@@ -13,10 +13,17 @@ from dataclasses import replace
 from functools import cache
 
 from composer import behavior
-from composer.behavior_source import Function
+from composer.behavior_source import Function, Method
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.bindings import is_class_method, is_static
-from composer.behavior_types.own_classes import fields_of_class, has_fields
+from composer.behavior_types.lineage import PLAIN_BASES, lineage
+from composer.behavior_types.own_classes import (
+    all_fields,
+    constructor_of,
+    is_dataclass,
+    is_enumeration,
+    known_attributes,
+)
 from composer.behavior_types.values import OwnClass
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
@@ -84,7 +91,7 @@ def signature_of(function: Function, *, is_bound: bool, name: str = "") -> Signa
     """
     if is_static(function):
         is_bound = False
-    elif function.decorator_list and not (is_bound and is_class_method(function)):
+    elif not _keeps_signature(function, is_bound=is_bound):
         return None
     arguments = function.args
     positional = [argument.arg for argument in (*arguments.posonlyargs, *arguments.args)]
@@ -107,40 +114,58 @@ def signature_of(function: Function, *, is_bound: bool, name: str = "") -> Signa
     )
 
 
-def constructor(own: OwnClass) -> Signature | None:
-    """Return the parameters of the constructor of a class; None if they are not known.
+_TRANSPARENT = frozenset(
+    {"abc.abstractmethod", "abstractmethod", "final", "override", "typing.override"}
+)
 
-    The class has no bases and decorators, or it is a dataclass or a named tuple.
-    """
-    definition = own.definition
-    if has_fields(own):
-        return _of_fields(own)
-    if definition.node.bases or definition.node.decorator_list or definition.node.keywords:
+
+def _keeps_signature(function: Function, *, is_bound: bool) -> bool:
+    """Return whether the decorators of a function leave its parameters as they are."""
+    if is_bound and is_class_method(function):
+        return True
+    return {dotted(item) for item in function.decorator_list} <= _TRANSPARENT
+
+
+def constructor(own: OwnClass) -> Signature | None:
+    """Return the parameters of the constructor of a class; None if they are not known."""
+    name = own.definition.name
+    if known_attributes(own) is None or is_enumeration(own):
         return None
-    methods = {method.name: method.node for method in definition.methods}
-    if "__new__" in methods:
-        return None
-    found = methods.get("__init__")
-    if "__init__" not in methods:
-        return Signature(definition.name, (), (), frozenset())
-    return signature_of(found, is_bound=True, name=definition.name) if found is not None else None
+    match constructor_of(own):
+        case OwnClass():
+            return _of_fields(own)
+        case (function, _):
+            return signature_of(function, is_bound=True, name=name)
+    has_own = any(method.name == "__new__" for method in _methods(own))
+    is_plain = lineage(own).others <= PLAIN_BASES and not is_dataclass(own)
+    return Signature(name, (), (), frozenset()) if is_plain and not has_own else None
+
+
+def _methods(own: OwnClass) -> Iterator[Method]:
+    for known in lineage(own).classes:
+        yield from known.definition.methods
 
 
 def _of_fields(own: OwnClass) -> Signature | None:
     """Return the parameters that a dataclass or a named tuple has for its fields."""
-    names, required = [], []
-    for field in fields_of_class(own):
+    names: list[str] = []
+    by_name: list[str] = []
+    required: list[str] = []
+    for field in all_fields(own):
+        is_by_name, is_required = field.by_name, field.value is None
         match field.value:
-            case None:
-                required.append(field.name)
             case ast.Call(func=function, keywords=keywords) if dotted(function).endswith("field"):
-                given = {keyword.arg for keyword in keywords}
-                if given & {"init", "kw_only", None}:
+                given = {keyword.arg: keyword.value for keyword in keywords}
+                if {"init", None} & given.keys():
                     return None
-                if not given & {"default", "default_factory"}:
-                    required.append(field.name)
-        names.append(field.name)
-    return Signature(own.definition.name, tuple(names), (), frozenset(required))
+                only = given.get("kw_only")
+                if only is not None:
+                    is_by_name = not isinstance(only, ast.Constant) or bool(only.value)
+                is_required = not {"default", "default_factory"} & given.keys()
+        (by_name if is_by_name else names).append(field.name)
+        required += [field.name] if is_required else []
+    name = own.definition.name
+    return Signature(name, tuple(names), tuple(by_name), frozenset(required))
 
 
 #: Methods whose signature Python does not report.

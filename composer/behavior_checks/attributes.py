@@ -8,10 +8,18 @@ from inspect import isabstract
 from types import FunctionType
 
 from composer.behavior_checks.problems import Kind
+from composer.behavior_source import Module
 from composer.behavior_types.api import members
 from composer.behavior_types.inference import BehaviorTypes
-from composer.behavior_types.own_classes import assigned_from_outside, known_attributes
+from composer.behavior_types.lineage import lineage
+from composer.behavior_types.module_names import module_names
+from composer.behavior_types.own_classes import (
+    assigned_from_outside,
+    is_enumeration,
+    known_attributes,
+)
 from composer.behavior_types.rclpy_api import is_rclpy
+from composer.behavior_types.self_attributes import escapes_from
 from composer.behavior_types.values import (
     ApiValue,
     BuiltinObject,
@@ -20,6 +28,7 @@ from composer.behavior_types.values import (
     ModuleFunction,
     OwnClass,
     OwnMethod,
+    OwnModule,
     OwnObject,
     Parameters,
     Ports,
@@ -95,7 +104,9 @@ def attribute_problem(types: BehaviorTypes, owner: Value, name: str) -> Found | 
         case Collection(python=python) if not isabstract(python) and not hasattr(python, name):
             return Kind.ATTRIBUTE, f"a {python.__name__} has no attribute '{name}'", None
         case OwnClass() | OwnObject():
-            return _of_own_class(owner, name)
+            return _of_own_class(types, owner, name)
+        case OwnModule(module=module):
+            return _of_own_module(types, module, name)
         case OwnMethod() | ModuleFunction():
             return _of_function(owner, name)
         case _:
@@ -146,16 +157,52 @@ def _of_function(owner: OwnMethod | ModuleFunction, name: str) -> Found | None:
     return Kind.ATTRIBUTE, problem, f"call it: {function.name}()"
 
 
-def _of_own_class(owner: OwnClass | OwnObject, name: str) -> Found | None:
+def _of_own_class(types: BehaviorTypes, owner: OwnClass | OwnObject, name: str) -> Found | None:
     own = owner.of if isinstance(owner, OwnObject) else owner
     known = known_attributes(own)
     if known is None or name in known:
         return None
-    if is_rclpy(own.home) and name.startswith("RMW_QOS_POLICY_"):  # an old name of a member
+    if is_rclpy(own.home):
+        if name.startswith("RMW_QOS_POLICY_"):  # an old name of a member
+            return None
+    elif _may_have(types, own, name):
+        return None
+    is_similar = nearest(name, known) is not None
+    if not is_similar and not is_enumeration(own) and _is_passed_on(own):
         return None
     public = [other for other in known if not other.startswith("_")]
     problem = f"'{own.definition.name}' has no attribute '{name}'"
     return Kind.ATTRIBUTE, problem, suggestion(name, public)
+
+
+def _may_have(types: BehaviorTypes, own: OwnClass, name: str) -> bool:
+    """Return whether objects of a class, or of one derived from it, may have an attribute."""
+    classes = types.project_classes
+    if not classes.is_created(own):
+        return True
+    derived = [known_attributes(item) for item in classes.derived(own)]
+    if any(known is None or name in known for known in derived):
+        return True
+    return name in classes.assigned_outside and name in types.set_from_outside
+
+
+def _is_passed_on(own: OwnClass) -> bool:
+    """Return whether an object passes itself to other code, which may set attributes of it."""
+    return any(
+        method.node is not None and escapes_from(method.node, known.home, lambda _: False)
+        for known in lineage(own).classes
+        for method in known.definition.methods
+    )
+
+
+def _of_own_module(types: BehaviorTypes, module: Module, name: str) -> Found | None:
+    known = module_names(module)
+    if known is None or name in known or name in types.project_classes.assigned_outside:
+        return None
+    if name.startswith("__"):
+        return None
+    hint = suggestion(name, [other for other in known if not other.startswith("_")])
+    return Kind.IMPORT, f"module '{module.path.stem}' has no '{name}'", hint
 
 
 def _missing_part(definition: Message | Service | Action, name: str) -> Found | None:

@@ -18,6 +18,7 @@ from composer.behavior_checks.collection_calls import (
     key_problems,
     stored_problems,
 )
+from composer.behavior_checks.declared_keys import key_problems_of
 from composer.behavior_checks.elements import element_problems
 from composer.behavior_checks.fitting import argument_problem
 from composer.behavior_checks.formats import text_problems
@@ -143,6 +144,7 @@ class _FunctionChecker:
                     yield from self._attribute(node)
                 case ast.Subscript():
                     yield from self._index(node)
+                    yield from key_problems_of(node, self.function, self.scope)
                 case ast.Call():
                     yield from calls.problems(node)
                 case ast.Assign(targets=[target], value=value):

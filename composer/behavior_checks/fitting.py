@@ -6,10 +6,13 @@ import ast
 from collections.abc import Callable
 from inspect import isabstract
 
+from composer.behavior_types.lineage import is_derived
+from composer.behavior_types.numpy_types import ARRAY
 from composer.behavior_types.operators import is_byte, is_float, is_integer, is_number, is_text
 from composer.behavior_types.own_classes import is_enumeration, is_named_tuple, is_plain
 from composer.behavior_types.standard_types import NO_SEQUENCES
 from composer.behavior_types.values import (
+    NONE,
     ApiMethod,
     ApiValue,
     Collection,
@@ -39,20 +42,28 @@ def value_problem(
     constant = _constant(node)
     if constant is not None and isinstance(expected, FieldType):
         return _constant_problem(constant, expected, interfaces)
+    is_array = isinstance(expected, FieldType) and expected.is_array
     if isinstance(found, InterfaceClass):
         name = found.definition.name.rpartition("/")[2]
         return f"the class {name} where {_name(expected)} is expected", f"create it: {name}()"
+    if found is NONE and isinstance(node, ast.Call) and isinstance(expected, FieldType | Message):
+        name = ast.unparse(node.func)
+        return f"'{name}' returns nothing, and {_name(expected)} is expected", None
     if isinstance(found, OwnMethod | ModuleFunction):
         name = found.method.name if isinstance(found, OwnMethod) else found.node.name
         return f"the function '{name}' where {_name(expected)} is expected", f"call it: {name}()"
+    is_single = isinstance(expected, Message) or not is_array
+    if found == ARRAY and is_single and isinstance(expected, FieldType | Message):
+        return f"an array of numpy where {_name(expected)} is expected", None
     if isinstance(found, ApiValue):
         return f"{found.class_name} where {_name(expected)} is expected", None
     if isinstance(found, ApiMethod):
         name = found.member.name
         return f"the method '{name}' where {_name(expected)} is expected", f"call it: {name}()"
-    is_array = isinstance(expected, FieldType) and expected.is_array
     is_tuple = isinstance(found, OwnObject) and is_named_tuple(found.of) and not is_array
-    if isinstance(found, OwnObject) and (is_plain(found.of) or is_tuple):
+    is_enum = isinstance(found, OwnObject) and is_enumeration(found.of)
+    is_enum = is_enum and isinstance(expected, Message)
+    if isinstance(found, OwnObject) and (is_plain(found.of) or is_tuple or is_enum):
         return f"a {found.of.definition.name} where {_name(expected)} is expected", None
     if isinstance(found, Collection):
         return _collection_problem(found, expected, interfaces)
@@ -81,8 +92,11 @@ def _collection_problem(
     found: Collection, expected: Value, interfaces: Interfaces
 ) -> tuple[str, str | None] | None:
     """Return why a list, dict and so on does not fit a field."""
-    if isabstract(found.python) or not isinstance(expected, FieldType | Message):
+    if not isinstance(expected, FieldType | Message):
         return None
+    if isabstract(found.python):
+        is_field = isinstance(expected, FieldType)
+        return None if is_field else (f"{shown(found)} where {_name(expected)} is expected", None)
     if isinstance(expected, Message) or not expected.is_array:
         if is_byte(expected) and found.python in (bytes, bytearray):
             return None
@@ -128,6 +142,8 @@ def argument_problem(
         if None in kinds or not kinds or is_same:
             return None
         return f"{shown(found)} where {shown(expected)} is expected"
+    if _are_related(found, expected):
+        return None
     if kind is not None and wanted is not None and kind != wanted:
         return f"{shown(found)} where {shown(expected)} is expected"
     if not isinstance(expected, Collection):
@@ -142,6 +158,13 @@ def argument_problem(
     if expected.python is tuple and isinstance(found, Collection):
         return _tuple_problem(node, found, expected, type_of)
     return None
+
+
+def _are_related(found: Value, expected: Value) -> bool:
+    """Return whether objects of one class may be of the other one."""
+    if not isinstance(found, OwnObject) or not isinstance(expected, OwnObject):
+        return False
+    return is_derived(found.of, expected.of) or is_derived(expected.of, found.of)
 
 
 def _tuple_problem(
@@ -181,7 +204,9 @@ def kind_of(type_: Value) -> str | None:
         kind = None if type_.name in {"byte", "char", "octet", "uint8"} else "collection"
     elif isinstance(type_, OwnMethod | ModuleFunction):
         kind = "function"
-    elif isinstance(type_, OwnObject) and is_enumeration(type_.of, "enum.IntEnum"):
+    elif isinstance(type_, OwnObject) and is_enumeration(
+        type_.of, "enum.IntEnum", "enum.IntFlag", "int"
+    ):
         kind = "number"
     elif isinstance(type_, OwnObject) and is_named_tuple(type_.of):
         kind = "tuple"
@@ -190,6 +215,7 @@ def kind_of(type_: Value) -> str | None:
     return kind
 
 
+_NUMBERS = ("enum.IntEnum", "enum.IntFlag", "int")
 _KINDS: dict[type, str | None] = {
     dict: "dict",
     bytes: "bytes",

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from composer.behavior_checks.arguments import api_signature, constructor, signature_of
+from composer.behavior_checks.arguments import (
+    api_signature,
+    constructor,
+    method_signature,
+    signature_of,
+)
 from composer.behavior_checks.calls import call_problems
 from composer.behavior_checks.collection_calls import method_problems
 from composer.behavior_checks.message_values import ValueChecker
@@ -19,14 +24,17 @@ from composer.behavior_types.api_values import api_parameters
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.hosted import rclpy_function
 from composer.behavior_types.objects import fields_expected
+from composer.behavior_types.own_classes import constructor_of
 from composer.behavior_types.values import (
     ApiMethod,
     ApiValue,
+    BuiltinMethod,
     CollectionMethod,
     InterfaceClass,
     ModuleFunction,
     OwnClass,
     OwnMethod,
+    Value,
 )
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Message, Service
@@ -68,11 +76,15 @@ class CallChecker:
                     yield from self._own_call(node, method.node, home, is_bound=True)
             case ModuleFunction(node=function, home=home, is_bound=is_bound):
                 yield from self._own_call(node, function, home, is_bound=is_bound)
-            case OwnClass() as own:
+            case OwnClass() as own if not self._may_be_derived(node.func, own):
                 parameters = constructor(own)
                 if parameters is not None:
-                    fields = fields_expected(self.scope, own)
+                    fields = self._of_constructor(own)
                     yield from call_problems(node, parameters, self.scope, fields)
+            case BuiltinMethod(python=python, name=name) if python.__module__ == "random":
+                parameters = method_signature(python, name)
+                if parameters is not None:
+                    yield from call_problems(node, parameters, self.scope)
             case CollectionMethod(owner=collection, name=name):
                 yield from method_problems(node, collection, name, self.scope)
             case other:
@@ -88,6 +100,21 @@ class CallChecker:
         if signature is not None:
             expected = annotations_by_name(function, home, self.scope.owner)
             yield from call_problems(node, signature, self.scope, expected)
+
+    def _may_be_derived(self, called: ast.expr, own: OwnClass) -> bool:
+        """Return whether a class method creates what may be of another class: by 'cls(...)'."""
+        is_argument = isinstance(called, ast.Name) and self.scope.is_local(called.id)
+        is_known = constructor_of(own) is not None
+        derived = self.scope.owner.project_classes.derived(own)
+        return is_argument and not (is_known and not derived)
+
+    def _of_constructor(self, own: OwnClass) -> Mapping[str, Value]:
+        """Return the types of the parameters of a constructor, by name."""
+        match constructor_of(own):
+            case (function, defining):
+                return annotations_by_name(function, defining.home, self.scope.owner)
+            case _:
+                return fields_expected(self.scope, own)
 
     def _expected(self, owner: ApiValue, name: str) -> Message | None:
         """Return the message that the first argument of a method of the API must be."""

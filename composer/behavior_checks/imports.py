@@ -6,9 +6,10 @@ import ast
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
+from composer.behavior_checks.module_attributes import module_attributes
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
 from composer.behavior_source.library import is_standard, standard_names
@@ -19,10 +20,10 @@ from composer.behavior_source.modules import (
     module_file,
     relative_module_file,
 )
-from composer.behavior_source.spans import attribute_span, start_span
+from composer.behavior_source.spans import start_span
 from composer.behavior_source.syntax import read_module
-from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import API_NAMES
+from composer.behavior_types.module_names import module_names
 from composer.diagnostics import nearest, suggestion
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
@@ -68,7 +69,7 @@ def import_problems(
                     yield _problem(found, alias.name, alias, module), meant
         elif isinstance(node, ast.ImportFrom):
             yield from checker.imported_from(node)
-    yield from ((problem, None) for problem in _attributes(module))
+    yield from ((problem, None) for problem in module_attributes(module))
 
 
 @dataclass(frozen=True)
@@ -254,26 +255,9 @@ def _is_in_project(path: Path, home: Path, project: Project) -> bool:
 def _names_in(path: Path) -> frozenset[str] | None:
     """Return the names that a file of the project defines; None if it may have others."""
     try:
-        module = read_module(path, shown_path(path))
+        return module_names(read_module(path, shown_path(path)))
     except Unreadable:
         return None
-    return None if module.dynamic else _defined_names(module)
-
-
-@lru_cache(maxsize=128)  # as many as there are modules in memory; those of rclpy are large
-def _defined_names(module: Module) -> frozenset[str]:
-    functions = (
-        item.name
-        for item in walk(module.tree.body)
-        if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-    )
-    stored = (
-        item.id
-        for item in walk(module.tree.body)
-        if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store)
-    )
-    modules = {name.partition(".")[0] for name in module.imports}
-    return frozenset({*functions, *stored, *modules, *module.imports})
 
 
 def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
@@ -300,38 +284,6 @@ def _handles_imports(handler: ast.ExceptHandler) -> bool:
 
 def _is_type_checking(test: ast.expr) -> bool:
     return dotted(test).endswith("TYPE_CHECKING")
-
-
-def _attributes(module: Module) -> Iterator[CodeProblem]:
-    """Check the attributes of the modules of the standard library that a file imports."""
-    aliases = {
-        bound: imported.module
-        for bound, imported in module.imports.items()
-        if not imported.name and "." not in bound and is_standard(imported.module)
-    }
-    if not aliases:
-        return
-    uses: list[tuple[str, ast.Attribute]] = []
-    for node in walk(module.tree.body):
-        match node:
-            case ast.Attribute(value=ast.Name(id=name)) if name in aliases:
-                uses.append((name, node))
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
-                aliases.pop(name, None)  # means something else, at least somewhere
-    for name, node in uses:
-        names = _known_names(aliases[name]) if name in aliases else None
-        if names is not None and node.attr not in names and not node.attr.startswith("__"):
-            message = f"module '{aliases[name]}' has no '{node.attr}'"
-            hint = suggestion(node.attr, names) if nearest(node.attr, names) else None
-            span = attribute_span(node, module.source)
-            yield CodeProblem(Kind.IMPORT, message, span, hint)
-
-
-def _known_names(module: str) -> frozenset[str] | None:
-    try:
-        return standard_names(module)
-    except LookupError:
-        return None
 
 
 def _problem(

@@ -5,6 +5,7 @@ read from the syntax tree. What syntax does not determine (a base class in anoth
 decorator, ``__getattr__``) is marked as unknown, and rules do not report it as missing.
 """
 
+from composer.behavior_source.helpers import Helper, helper_named, links_version
 from composer.behavior_source.lookup import BehaviorSource, find_behavior, imported_from
 from composer.behavior_source.method_body import Call, Function
 from composer.behavior_source.modules import top_package
@@ -17,11 +18,14 @@ __all__ = [
     "Call",
     "Class",
     "Function",
+    "Helper",
     "Method",
     "Module",
     "NearbyModules",
     "find_behavior",
+    "helper_named",
     "imported_from",
+    "links_version",
     "nearby_modules",
     "published_port",
     "top_package",

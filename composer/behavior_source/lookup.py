@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import field
 from pathlib import Path
 
+from composer.behavior_source.helpers import Helper, link
 from composer.behavior_source.modules import (
     Unreadable,
     is_compiled,
@@ -46,7 +47,8 @@ class BehaviorSource:
     ``problem`` is the reason why a module that exists cannot be read, ``problem_span`` its location
     in the module. ``classes`` are the class and its bases, nearest first, each with its module;
     bases that cannot be found are left out. ``own_modules`` are the files of the project that were
-    read: those of the classes, and the modules that they import.
+    read: those of the classes, and the modules that they import. ``broken`` are the modules of the
+    project that are not Python, with the reason and its location.
     """
 
     reference: BehaviorReference
@@ -61,6 +63,7 @@ class BehaviorSource:
     methods: tuple[Method, ...] = ()
     classes: tuple[tuple[Module, Class], ...] = field(default=(), repr=False, compare=False)
     own_modules: tuple[Module, ...] = field(default=(), repr=False, compare=False)
+    broken: tuple[tuple[str, Span], ...] = field(default=(), repr=False, compare=False)
 
     @property
     def own_classes(self) -> Iterator[tuple[Module, Class]]:
@@ -121,6 +124,7 @@ def find_behavior(
         methods=tuple(methods.values()),
         classes=tuple(found for found in classes if found is not None),
         own_modules=tuple(filter(reader.is_own, reader.modules.values())),
+        broken=tuple(reader.broken.values()),
     )
 
 
@@ -135,6 +139,7 @@ class _Reader:
     project: Project
     plain_bases: frozenset[tuple[str, str]]
     modules: dict[Path, Module] = field(default_factory=dict)
+    broken: dict[Path, tuple[str, Span]] = field(default_factory=dict)
 
     def module(self, path: Path) -> Module:
         """Return a module, read once. Raises Unreadable."""
@@ -158,23 +163,37 @@ class _Reader:
             if module.path in seen or not self.is_own(module):
                 continue
             seen.add(module.path)
-            for path in dict.fromkeys(self._helpers_of(module)):
+            found: dict[str, Helper] = {}
+            for bound, name, path in self._helpers_of(module):
                 try:
-                    pending.append(self.module(path))
-                except Unreadable:  # the rule of imports reports what has no other problem
-                    continue
+                    helper = self.module(path)
+                except Unreadable as error:
+                    if error.span is not None and self.project.holds(path):
+                        self.broken[path] = (f"module '{path.stem}' {error}", error.span)
+                    continue  # the rule of imports reports what has no other problem
+                if helper is not module:
+                    found[bound] = Helper(helper, name)
+                pending.append(helper)
+            link(module, found)
 
-    def _helpers_of(self, module: Module) -> Iterator[Path]:
+    def _helpers_of(self, module: Module) -> Iterator[tuple[str, str, Path]]:
+        """Yield the files that a module imports, with the imported name and the bound one.
+
+        The name is "" for a module itself: 'from package import module' is one if there is a file.
+        """
         home = module.path.parent
-        for imported in module.imports.values():
-            names = [imported.module, f"{imported.module}.{imported.name}".strip(".")]
-            for name in names if imported.name else names[:1]:
+        for bound, imported in module.imports.items():
+            names = [(imported.module, imported.name)]
+            if imported.name:
+                names.append((f"{imported.module}.{imported.name}".strip("."), ""))
+            for name, defined in names:
                 if imported.level:
                     path = relative_module_file(name, imported.level, module.path)
                     if path is not None and self.project.holds(path):
-                        yield path
+                        yield bound, defined, path
                 elif name.partition(".")[0] not in sys.stdlib_module_names:
-                    yield from self._local_files(name, home)
+                    for path in self._local_files(name, home):
+                        yield bound, defined, path
 
     def _local_files(self, name: str, home: Path) -> Iterator[Path]:
         for folder in dict.fromkeys((home, self.folder)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from functools import lru_cache
@@ -46,7 +47,7 @@ class Method:
         return not self.keywords and len(self.arguments) - self.optional <= count <= maximum
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Class:
     """A class. ``dynamic`` is true if it may have members that its syntax does not show."""
 
@@ -67,7 +68,7 @@ class Import:
     level: int = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots, so that others can refer to it weakly
 class Module:
     """The top-level definitions and imports of a Python file."""
 
@@ -78,6 +79,8 @@ class Module:
     imports: dict[str, Import]
     assigned: frozenset[str]
     dynamic: bool  # it may have names that its syntax does not show
+    #: The classes and functions that are defined in several places, as in an if and its else.
+    repeated: frozenset[str] = frozenset()
 
     def may_have(self, name: str) -> bool:
         """Return whether ``name`` may exist without a class statement in this file."""
@@ -112,7 +115,13 @@ def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Modul
         imports=imports,
         assigned=frozenset(name.id for item in statements for name in _assigned(item)),
         dynamic="*" in imports or any(_is_getattr(item) for item in statements),
+        repeated=_repeated(statements),
     )
+
+
+def _repeated(statements: Iterable[ast.stmt]) -> frozenset[str]:
+    defined = Counter(item.name for item in statements if isinstance(item, Function | ast.ClassDef))
+    return frozenset(name for name, count in defined.items() if count > 1)
 
 
 def _top_level(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:

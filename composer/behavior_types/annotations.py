@@ -9,8 +9,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from types import GeneratorType
 
 from composer.behavior_source import Module
+from composer.behavior_source.method_body import dotted
+from composer.behavior_types.lineage import class_named
 from composer.behavior_types.names import alias_named, api_class, interface_name, own_name
-from composer.behavior_types.own_classes import class_named
+from composer.behavior_types.numpy_types import numpy_class
 from composer.behavior_types.rclpy_api import rclpy_class
 from composer.behavior_types.values import (
     NONE,
@@ -74,6 +76,8 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
             )
         case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in _TRANSPARENT:
             return annotated(inner, home, node, interfaces)
+        case ast.Subscript(value=ast.Name(id=name)) if own := class_named(name, home):
+            return OwnObject(own)
         case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in _COLLECTIONS:
             types = inner.elts if isinstance(inner, ast.Tuple) else [inner]
             parts = [annotated(item, home, node, interfaces) for item in types]
@@ -93,7 +97,9 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
         case ast.Name(id=name) if (alias := alias_named(name, home)) is not None:
             return annotated(alias, home, node, interfaces)
         case ast.Name() | ast.Attribute():
-            return _named(own_name(annotation, home), node, interfaces)
+            full = own_name(annotation, home)
+            own = class_named(dotted(annotation), home) if not full.startswith("rclpy.") else None
+            return OwnObject(own) if own is not None else _named(full, node, interfaces)
         case _:
             return ANYTHING
 
@@ -127,6 +133,8 @@ def _named(full: str, node: Node, interfaces: Interfaces) -> Value:
     if api is not None:
         ports = node.ports_of(_KINDS[api]) if api in _KINDS else ()
         return ApiValue(api, ports[0] if len(ports) == 1 else None)
+    if full.startswith("numpy."):
+        return numpy_class(full)
     if full.startswith("rclpy."):
         own = rclpy_class(full)
         return OwnObject(own) if own is not None else ANYTHING

@@ -7,22 +7,19 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING
 
-from composer.behavior_source import Module
+from composer.behavior_source import Module, helper_named
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.annotations import annotated
 from composer.behavior_types.bindings import Binding, Bindings, How
 from composer.behavior_types.displays import computed
+from composer.behavior_types.lineage import class_named
 from composer.behavior_types.literals import constant_type, integer_constant
 from composer.behavior_types.members import attribute_of
 from composer.behavior_types.names import (
     constant_named,
     full_name,
     function_named,
-    imported_from,
     interface_name,
-)
-from composer.behavior_types.own_classes import (
-    class_named,
 )
 from composer.behavior_types.rclpy_api import rclpy_value
 from composer.behavior_types.rebinding import joined, with_changes
@@ -37,6 +34,8 @@ from composer.behavior_types.values import (
     Collection,
     InterfaceClass,
     ModuleFunction,
+    OwnClass,
+    OwnModule,
     OwnObject,
     Parameters,
     Ports,
@@ -55,6 +54,8 @@ from composer.interfaces import FieldType, Message
 if TYPE_CHECKING:
     from composer.behavior_types.inference import BehaviorTypes
 
+_SEVERAL = 2
+
 
 @dataclass(slots=True)
 class FunctionTypes:
@@ -64,6 +65,8 @@ class FunctionTypes:
     home: Module
     bindings: Bindings
     arguments: Mapping[str, Value]
+    #: The class of the method, if it is not that of the behavior.
+    of_class: OwnClass | None = None
     _known: dict[int, Value] = field(default_factory=dict)
     _names: dict[str, Value] = field(default_factory=dict)
 
@@ -81,6 +84,9 @@ class FunctionTypes:
         if binding.how is How.ANNOTATION:
             return self.annotated(binding.expression, self.home)
         if binding.how is How.EXCEPTION:
+            own = self.type_of(binding.expression)
+            if isinstance(own, OwnClass):
+                return OwnObject(own)
             return exception_type(self.called_name(binding.expression))
         found = self.type_of(binding.expression)
         if binding.how is How.ELEMENT:
@@ -127,10 +133,18 @@ class FunctionTypes:
             case ast.JoinedStr():
                 return STRING
             case ast.Name(id=name):
-                return self.name(name)
-            case ast.Attribute(value=value, attr=name):
-                found = self._global(dotted(node))
-                return attribute_of(self, self.type_of(value), name) if found is ANYTHING else found
+                caught = self._caught(node)
+                return self.name(name) if caught is None else self.bound(caught)
+            case ast.Attribute(value=value):
+                name = dotted(node)
+                found = self._global(name) if name else ANYTHING
+                if found is ANYTHING and name in self.home.imports:  # import package.module
+                    found = self._of_module(name)
+                return (
+                    attribute_of(self, self.type_of(value), node.attr)
+                    if found is ANYTHING
+                    else found
+                )
             case ast.Call():
                 return result_of(self, node)
             case ast.Await(value=value):
@@ -143,6 +157,18 @@ class FunctionTypes:
                 return self.type_of(value)
             case _:
                 return computed(self, node)
+
+    def _caught(self, node: ast.Name) -> Binding | None:
+        """Return the ``except`` that a name is bound by, if several of them bind it."""
+        bindings = self.bindings.names.get(node.id, ())
+        if len(bindings) < _SEVERAL or any(item.how is not How.EXCEPTION for item in bindings):
+            return None
+        earlier = [
+            item
+            for item in bindings
+            if item.expression is not None and item.expression.lineno <= node.lineno
+        ]
+        return earlier[-1] if earlier else None
 
     def name(self, name: str) -> Value:
         """Return the type of a name."""
@@ -181,23 +207,25 @@ class FunctionTypes:
 
     def _of_module(self, name: str) -> Value:
         """Return the type of a name that the function does not bind."""
-        function = function_named(name, self.home)
+        found = helper_named(name, self.home)
+        return self._global(name) if found is None else self.of_helper(found.module, found.name)
+
+    def of_helper(self, home: Module, name: str) -> Value:
+        """Return the type of what ``name`` means in a file of the project; "" is the file."""
+        if not name:
+            return OwnModule(home)
+        function = function_named(name, home)
         if function is not None:
-            return ModuleFunction(function, self.home)
-        constant = constant_named(name, self.home)
+            return ModuleFunction(function, home)
+        constant = constant_named(name, home)
         if isinstance(constant, ast.Constant):
             return constant_type(constant.value)
+        scope = self.owner.at_module(home)
+        if isinstance(constant, ast.AnnAssign):
+            return scope.annotated(constant.annotation, home)
         if constant is not None:
-            return self.owner.at_module(self.home).type_of(constant)
-        return class_named(name, self.home) or self._of_helper(name) or self._global(name)
-
-    def _of_helper(self, name: str) -> Value | None:
-        """Return a function or class that is imported from another file of the project."""
-        home, original = imported_from(name, self.home, self.owner.source.own_modules)
-        if home is None:
-            return None
-        function = function_named(original, home)
-        return ModuleFunction(function, home) if function else class_named(original, home)
+            return scope.type_of(constant)
+        return class_named(name, home) or scope._global(name)
 
     def _global(self, dotted_name: str) -> Value:
         """Return the type of an imported name."""

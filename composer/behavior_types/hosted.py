@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
-from composer.behavior_source import Method
+from composer.behavior_source import Method, Module
 from composer.behavior_source.method_body import argument
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.bindings import Bindings, nodes_of
@@ -90,14 +90,10 @@ class HostedTypes(BehaviorTypes):
         """Whether the class is a LifecycleNode."""
         return any(own.definition.name == "LifecycleNode" for own in self.bases)
 
-    def parent(self, scope: FunctionTypes) -> Value:
-        """Return the type of ``super()`` in a method of the class, if rclpy has its only base."""
-        for home, known in self.source.classes:
-            if any(self.scopes.get(id(method.node)) is scope for method in known.methods):
-                bases = [rclpy_class(own_name(base, home)) for base in known.node.bases]
-                only = bases[0] if len(bases) == 1 else None
-                return OwnObject(only) if only is not None else ANYTHING
-        return ANYTHING
+    def parent_named(self, base: ast.expr, home: Module) -> Value:
+        """Return the type of ``super()`` for a base class, also for one of rclpy."""
+        own = rclpy_class(own_name(base, home))
+        return OwnObject(own) if own is not None else super().parent_named(base, home)
 
     @cached_property
     def handlers(self) -> Mapping[str, Handler]:
@@ -136,8 +132,7 @@ class HostedTypes(BehaviorTypes):
             if found == self.handlers and lambdas == self.lambdas:
                 return
             self.handlers, self.lambdas = found, lambdas
-            self.scopes.clear()
-            self._known.clear()
+            self.forget()
             del self.assigned
         super().infer()
 

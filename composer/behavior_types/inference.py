@@ -8,12 +8,21 @@ from dataclasses import field
 from functools import cached_property
 
 from composer.behavior_source import BehaviorSource, Function, Method, Module
+from composer.behavior_source.method_body import dotted
 from composer.behavior_types.api import attribute_class
-from composer.behavior_types.bindings import Binding, Bindings, How, bindings_of
+from composer.behavior_types.bindings import (
+    Binding,
+    Bindings,
+    How,
+    bindings_of,
+    is_class_method,
+)
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.handlers import Handler, handlers_of
+from composer.behavior_types.lineage import class_named
 from composer.behavior_types.objects import method_value
-from composer.behavior_types.own_classes import has_fields
+from composer.behavior_types.outside_assignments import set_from_outside
+from composer.behavior_types.project_classes import ProjectClasses, takes_object
 from composer.behavior_types.rebinding import joined, with_changes
 from composer.behavior_types.self_attributes import escapes, self_attributes
 from composer.behavior_types.values import (
@@ -49,7 +58,11 @@ class BehaviorTypes:
     _known: dict[str, Value] = field(default_factory=dict)
     #: The types of attributes that methods of other classes assign, by class and name.
     of_objects: dict[tuple[int, str], Value] = field(default_factory=dict)
+    #: The types of what functions without annotations return, by the id of the function.
+    results: dict[int, Value] = field(default_factory=dict)
+    depth: int = 0
     _at_modules: dict[int, FunctionTypes] = field(default_factory=dict)
+    _functions: dict[int, FunctionTypes] = field(default_factory=dict)
 
     def scope(self, method: Method, home: Module) -> FunctionTypes | None:
         """Return the types within a method; None if its syntax is not known."""
@@ -63,18 +76,46 @@ class BehaviorTypes:
 
     def function(self, node: Function, home: Module, own: OwnClass | None = None) -> FunctionTypes:
         """Return the types within a function, or a method of ``own``, not of the behavior."""
-        bindings = bindings_of(node, is_method=False)
-        arguments: dict[str, Value] = {}
-        positional = (*node.args.posonlyargs, *node.args.args)
-        if own is not None and positional and positional[0].annotation is None:
-            # Other classes may be behaviors as well: the composer sets their attributes.
-            is_plain = not node.decorator_list and has_fields(own)
-            arguments = {positional[0].arg: OwnObject(own)} if is_plain else {}
-        return FunctionTypes(self, home, bindings, arguments)
+        if id(node) not in self._functions:
+            bindings = bindings_of(node, is_method=False)
+            arguments: dict[str, Value] = {}
+            positional = (*node.args.posonlyargs, *node.args.args)
+            if own is not None and positional and positional[0].annotation is None:
+                if takes_object(node):
+                    is_object = self.project_classes.is_object(own)
+                    arguments = {positional[0].arg: OwnObject(own)} if is_object else {}
+                elif is_class_method(node):
+                    arguments = {positional[0].arg: own}
+            self._functions[id(node)] = FunctionTypes(self, home, bindings, arguments, own)
+        return self._functions[id(node)]
 
-    def parent(self, scope: FunctionTypes) -> Value:  # noqa: ARG002 - for HostedTypes
-        """Return the type of ``super()`` in a method."""
-        return ANYTHING
+    @cached_property
+    def project_classes(self) -> ProjectClasses:
+        """How the files of the behavior use their classes."""
+        return ProjectClasses(self.source.own_modules)
+
+    @cached_property
+    def set_from_outside(self) -> frozenset[str]:
+        """The attributes that the files set of objects other than ``self`` and messages."""
+        return frozenset(set_from_outside(self))
+
+    def parent(self, scope: FunctionTypes) -> Value:
+        """Return the type of ``super()`` in a method; ANYTHING with several bases."""
+        own = scope.of_class
+        for home, known in self.source.classes if own is None else ():
+            if any(self.scopes.get(id(method.node)) is scope for method in known.methods):
+                own = OwnClass(known, home)
+        if own is None or len(own.definition.bases) != 1:
+            return ANYTHING
+        derived = self.project_classes.derived(own)
+        if any(len(item.definition.bases) > 1 for item in derived):
+            return ANYTHING
+        return self.parent_named(own.definition.node.bases[0], own.home)
+
+    def parent_named(self, base: ast.expr, home: Module) -> Value:
+        """Return the type of ``super()`` for a base class."""
+        own = class_named(dotted(base), home)
+        return OwnObject(own) if own is not None else ANYTHING
 
     def declared_value(self, call: ast.Call) -> Value:  # noqa: ARG002 - for HostedTypes
         """Return the type of the value of the parameter of rclpy that a call names."""
@@ -120,6 +161,21 @@ class BehaviorTypes:
         for name in self.assigned:
             self.attribute(name)
 
+    def forget(self) -> None:
+        """Forget all types, since those of arguments have become known."""
+        self.scopes.clear()
+        self._known.clear()
+        self.of_objects.clear()
+        self._at_modules.clear()
+        self._functions.clear()
+        self.results.clear()
+
+    def forget_expressions(self) -> None:
+        """Forget the types of expressions, since one rests on an assumption that is wrong."""
+        for scope in (*self.scopes.values(), *self._functions.values()):
+            scope.forget()
+        self.results.clear()
+
     def attribute(self, name: str) -> Value:
         """Return the type of ``self.<name>``."""
         if name not in self._known:
@@ -146,7 +202,10 @@ class BehaviorTypes:
             if method.known and home is not None:
                 return OwnMethod(method, home)
             scope = self.scope(method, home) if home is not None else None
-            return ANYTHING if scope is None else method_value(scope, method.node, scope.home)
+            own = self._class_of(method)
+            return (
+                ANYTHING if scope is None or own is None else method_value(scope, method.node, own)
+            )
         if name in self.assigned:
             return self._joined(name)
         return ANYTHING if method is not None else self.of_base(name)
@@ -171,8 +230,8 @@ class BehaviorTypes:
         self._known[name] = found
         found = joined([(found, How.VALUE)] + [(s.bound(item), item.how) for s, item in computed])
         if found != self._known[name]:
-            for scope in self.scopes.values():
-                scope.forget()
+            self.forget_expressions()
+            self.of_objects.clear()
             return ANYTHING
         return with_changes(found, self._changes(name))
 
@@ -198,8 +257,12 @@ class BehaviorTypes:
         return assigned
 
     def _home(self, method: Method) -> Module | None:
-        found = (home for home, known in self.source.classes if method in known.methods)
-        return next(found, None)
+        own = self._class_of(method)
+        return own.home if own is not None else None
+
+    def _class_of(self, method: Method) -> OwnClass | None:
+        classes = (OwnClass(known, home) for home, known in self.source.classes)
+        return next((own for own in classes if method in own.definition.methods), None)
 
     def arguments_of(self, method: Method) -> Mapping[str, Value]:
         """Return the types of the arguments that the composer passes to a handler."""

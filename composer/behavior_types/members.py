@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer.behavior_source import helper_named
 from composer.behavior_types.api_values import api_member, class_member
+from composer.behavior_types.numpy_types import ARRAY, array_attribute
 from composer.behavior_types.objects import attribute_of_class, attribute_of_object
 from composer.behavior_types.operators import is_text
 from composer.behavior_types.standard_types import element_of
@@ -16,6 +18,7 @@ from composer.behavior_types.values import (
     CollectionMethod,
     InterfaceClass,
     OwnClass,
+    OwnModule,
     OwnObject,
     Parameters,
     Ports,
@@ -60,11 +63,15 @@ def attribute_of(scope: FunctionTypes, owner: Value, name: str) -> Value:
         case Collection():
             return CollectionMethod(owner, name)
         case BuiltinObject(python=python):
-            return BuiltinMethod(python, name)
+            of_array = array_attribute(name) if owner == ARRAY else None
+            return BuiltinMethod(python, name) if of_array is None else of_array
         case OwnObject():
             return attribute_of_object(scope, owner, name)
         case OwnClass():
-            return attribute_of_class(owner, name)
+            return attribute_of_class(scope, owner, name)
+        case OwnModule(module=module):
+            helper = helper_named(name, module)
+            return ANYTHING if helper is None else scope.of_helper(helper.module, helper.name)
         case FieldType() if is_text(owner):
             return CollectionMethod(Collection(str, STRING), name)
         case Message() | FieldType():

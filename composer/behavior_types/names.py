@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
-from collections.abc import Sequence
 from functools import lru_cache
 
 from composer.behavior_source import Module
@@ -62,19 +61,11 @@ def _functions(module: Module) -> dict[str, Function | None]:
     return found
 
 
-def imported_from(name: str, module: Module, others: Sequence[Module]) -> tuple[Module | None, str]:
-    """Return which of the ``others`` a name is imported from, and its name there."""
-    imported = module.imports.get(name)
-    if imported is None or not imported.name or not imported.module or name in module.assigned:
-        return None, ""
-    *folders, last = imported.module.split(".")
-    end = (*folders, f"{last}.py")
-    found = [other for other in others if other.path.parts[-len(end) :] == end]
-    return (found[0] if len(found) == 1 else None), imported.name
+def constant_named(name: str, module: Module) -> ast.expr | ast.AnnAssign | None:
+    """Return what a module assigns to a name once, and that nothing replaces: a value or a call.
 
-
-def constant_named(name: str, module: Module) -> ast.expr | None:
-    """Return what a module assigns to a name once, and that nothing replaces: a value or a call."""
+    With an annotation, it is the statement.
+    """
     return _constants(module).get(name)
 
 
@@ -98,9 +89,14 @@ _SINGLE = (ast.BinOp, ast.Call, ast.Constant, ast.Dict, ast.List, ast.Tuple, ast
 
 
 @lru_cache(maxsize=128)
-def _constants(module: Module) -> dict[str, ast.expr]:
-    values: dict[str, ast.expr] = {}
+def _constants(module: Module) -> dict[str, ast.expr | ast.AnnAssign]:
+    values: dict[str, ast.expr | ast.AnnAssign] = {}
     for statement in module.tree.body:
+        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            is_final = ast.unparse(statement.annotation).endswith("Final")
+            value = statement.value if is_final else statement
+            if value is not None:
+                values[statement.target.id] = value
         is_single = isinstance(statement, ast.Assign) and isinstance(statement.value, _SINGLE)
         if isinstance(statement, ast.Assign) and is_single:
             for target in statement.targets:

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Sequence
 from typing import TypeGuard
 
+from composer.behavior_types.numpy_types import ARRAY, array_operation
 from composer.behavior_types.own_classes import is_plain, known_attributes
 from composer.behavior_types.rclpy_api import is_time, order_of_rclpy, time_arithmetic
 from composer.behavior_types.values import (
@@ -61,6 +62,9 @@ def binary(left: Value, operator: ast.operator, right: Value) -> Value:
     """Return the type of an arithmetic operation."""
     if is_number(left) and is_number(right):
         return _arithmetic(left, operator, right)
+    of_array = array_operation(left, operator, right)
+    if of_array is not None:
+        return of_array
     if isinstance(operator, ast.Add | ast.Sub) and (is_time(left) or is_time(right)):
         return time_arithmetic(left, _SIGNS[type(operator)], right)
     if is_text(left) and (
@@ -94,7 +98,7 @@ def unary(operator: ast.unaryop, operand: Value) -> Value:
         return BOOL
     if isinstance(operator, ast.USub | ast.UAdd) and is_number(operand):
         return INTEGER if operand == BOOL else operand
-    return ANYTHING
+    return ARRAY if operand == ARRAY else ANYTHING
 
 
 def both(operator: ast.boolop, operands: Sequence[Value]) -> Value:
@@ -143,7 +147,8 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
             return f"a {value.of.definition.name} has no operator '{sign}'"
     is_repeated = isinstance(operator, ast.Mult) and (is_integer(left) or is_integer(right))
     for first, second in ((left, right), (right, left)):
-        if is_number(first) and _is_list(second) and not is_repeated:
+        is_sequence = _is_list(second) and second.python in (list, tuple)
+        if is_number(first) and _is_list(second) and not (is_repeated and is_sequence):
             return f"operator '{sign}' on a {second.python.__name__} and a number"
     is_mixed = (is_text(left) and is_number(right)) or (is_number(left) and is_text(right))
     if is_mixed and not is_repeated:

@@ -4,55 +4,84 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from enum import Enum
 from functools import lru_cache
 
-from composer.behavior_source import Class, Module
+from composer.behavior_source import Class, Function, Module, links_version
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.bindings import bindings_of
-from composer.behavior_types.names import full_name
+from composer.behavior_types.lineage import (
+    ENUMS,
+    NAMED_TUPLE,
+    PLAIN_BASES,
+    VALUE_BASES,
+    decorator_name,
+    decorators_of,
+    exception_base,
+    lineage,
+)
 from composer.behavior_types.self_attributes import defined_names
 from composer.behavior_types.values import OwnClass
 from composer.fast_dataclass import dataclass
 
-_ENUMS = frozenset({"enum.Enum", "enum.IntEnum", "enum.StrEnum"})
-_NAMED_TUPLE = "typing.NamedTuple"
 _DATACLASS = "dataclasses.dataclass"
+#: Decorators of classes that add no constructor and no attributes but those of objects.
+_HARMLESS = frozenset(
+    {"enum.unique", "functools.total_ordering", "typing.final", "typing.runtime_checkable"}
+)
 _OF_DATACLASSES = frozenset({"__dataclass_fields__", "__dataclass_params__", "__match_args__"})
+_OF_NAMED_TUPLES = frozenset(
+    {*dir(tuple), "_asdict", "_field_defaults", "_fields", "_make", "_replace"}
+)
 
 
-def class_named(name: str, module: Module) -> OwnClass | None:
-    """Return the class at the top level of a module, if nothing else has its name."""
-    found = module.classes.get(name)
-    is_plain = name not in module.assigned and name not in module.imports
-    return OwnClass(found, module) if found is not None and is_plain else None
+def known_attributes(owner: OwnClass) -> frozenset[str] | None:
+    """Return all attributes of a class and of its objects; None if it may have others."""
+    return _known_attributes(owner, links_version())
 
 
 @lru_cache(maxsize=256)
-def known_attributes(owner: OwnClass) -> frozenset[str] | None:
-    """Return all attributes of a class and of its objects; None if it may have others.
+def _known_attributes(owner: OwnClass, _version: int) -> frozenset[str] | None:
+    family = lineage(owner)
+    of_others = _attributes_of_others(family.others)
+    if of_others is None:
+        return None
+    found = {*dir(object), *of_others}
+    for own in family.classes:
+        decorators = decorators_of(own)
+        if decorators - _HARMLESS - {_DATACLASS} or not _has_plain_metaclass(own):
+            return None
+        found.update(_own(own.definition))
+        found |= _OF_DATACLASSES if _DATACLASS in decorators else set()
+    if {"__getattr__", "__getattribute__", "__setattr__"} & (found - {*dir(object)}):
+        return None
+    return frozenset(found)
 
-    Only plain classes, dataclasses and enumerations are known completely.
-    """
-    definition, home = owner.definition, owner.home
-    bases = {full_name(base, home) or base for base in definition.bases}
-    decorators = {_decorator(item, home) for item in definition.node.decorator_list}
-    is_enum = bool(bases & _ENUMS)
-    is_tuple = _NAMED_TUPLE in bases
-    if (
-        bases - _ENUMS - {"object", _NAMED_TUPLE}
-        or decorators - {_DATACLASS}
-        or definition.node.keywords
-    ):
-        return None
-    found = {*dir(Enum if is_enum else object), *_own(definition), *assigned_from_outside(home)}
-    if is_enum:
-        found |= {"name", "value"}
-    if is_tuple:
-        found |= {*dir(tuple), "_asdict", "_field_defaults", "_fields", "_make", "_replace"}
-    if {"__getattr__", "__getattribute__", "__setattr__"} & found - set(dir(object)):
-        return None
-    return frozenset(found | (_OF_DATACLASSES if decorators else set()))
+
+def _attributes_of_others(bases: frozenset[str]) -> set[str] | None:
+    """Return the attributes that classes of Python give to those derived from them."""
+    found: set[str] = set()
+    is_enum = not bases.isdisjoint(ENUMS)
+    for base in bases - PLAIN_BASES:
+        exception = exception_base(base)
+        if base in ENUMS:
+            found |= {*dir(ENUMS[base]), "name", "value"}
+        elif base == NAMED_TUPLE:
+            found |= _OF_NAMED_TUPLES
+        elif is_enum and base in VALUE_BASES:
+            found |= {*dir(VALUE_BASES[base])}
+        elif exception is not None:
+            found |= {*dir(exception)}
+        else:
+            return None
+    return found
+
+
+def _has_plain_metaclass(own: OwnClass) -> bool:
+    for keyword in own.definition.node.keywords:
+        name = decorator_name(keyword.value, own.home)
+        if keyword.arg != "metaclass" or name != "abc.ABCMeta":
+            return False
+    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,61 +91,92 @@ class ClassField:
     name: str
     annotation: ast.expr
     value: ast.expr | None
+    home: Module
+    by_name: bool = False
 
 
 def has_fields(owner: OwnClass) -> bool:
-    """Return whether a class is a dataclass or a named tuple without bases and constructor."""
-    definition, home = owner.definition, owner.home
-    bases = [full_name(base, home) or base for base in definition.bases]
-    decorators = definition.node.decorator_list
-    if {method.name for method in definition.methods} & {"__init__", "__new__"}:
-        return False
-    if bases == [_NAMED_TUPLE] and not decorators:
-        return True
-    if bases or len(decorators) != 1 or _decorator(decorators[0], home) != _DATACLASS:
-        return False
-    options = getattr(decorators[0], "keywords", ())
-    return not {item.arg for item in options} & {"init", "kw_only", None}
+    """Return whether the constructor of a class takes the fields of a dataclass or named tuple."""
+    return isinstance(constructor_of(owner), OwnClass)
+
+
+def constructor_of(owner: OwnClass) -> OwnClass | tuple[Function, OwnClass] | None:
+    """Return the dataclass or named tuple, or the method, that determines how to create objects.
+
+    The method is ``__init__``, with its class. None: it is not known, or there is none.
+    """
+    for own in lineage(owner).classes:
+        methods = {method.name: method.node for method in own.definition.methods}
+        if "__new__" in methods:
+            return None
+        if "__init__" in methods:
+            function = methods["__init__"]
+            return (function, own) if function is not None else None
+        if _DATACLASS in decorators_of(own):
+            return own if _makes_constructor(own) else None
+        if is_named_tuple(own):
+            return own
+    return None
+
+
+def _makes_constructor(own: OwnClass) -> bool:
+    decorators = own.definition.node.decorator_list
+    options = {item.arg for node in decorators for item in getattr(node, "keywords", ())}
+    return not options & {"init", None}
 
 
 def is_dataclass(owner: OwnClass) -> bool:
     """Return whether a class is a dataclass."""
-    decorators = owner.definition.node.decorator_list
-    return any(_decorator(item, owner.home) == _DATACLASS for item in decorators)
+    return _DATACLASS in decorators_of(owner)
 
 
 def fields_of_class(owner: OwnClass) -> Iterator[ClassField]:
-    """Yield the fields of a dataclass or of a named tuple, in order."""
+    """Yield the fields that a dataclass or a named tuple itself declares, in order."""
+    by_name = _all_by_name(owner)
     for statement in owner.definition.node.body:
         match statement:
             case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation, value=value):
-                if "ClassVar" not in ast.unparse(annotation):
-                    yield ClassField(name, annotation, value)
+                text = ast.unparse(annotation)
+                if text.endswith("KW_ONLY"):
+                    by_name = True
+                elif "ClassVar" not in text:
+                    yield ClassField(name, annotation, value, owner.home, by_name)
 
 
-@lru_cache(maxsize=256)
-def is_enumeration(owner: OwnClass, base: str | None = None) -> bool:
-    """Return whether a class is an enumeration, derived from ``base`` if that is given."""
-    wanted = _ENUMS if base is None else {base}
-    return any((full_name(name, owner.home) or name) in wanted for name in owner.definition.bases)
+def all_fields(owner: OwnClass) -> tuple[ClassField, ...]:
+    """Return the fields that objects of a dataclass or a named tuple are created with."""
+    found: dict[str, ClassField] = {}
+    for own in lineage(owner).classes[::-1]:
+        if is_dataclass(own) or is_named_tuple(own):
+            found.update((item.name, item) for item in fields_of_class(own))
+    return tuple(found.values())
+
+
+def _all_by_name(own: OwnClass) -> bool:
+    options = [
+        item
+        for node in own.definition.node.decorator_list
+        for item in getattr(node, "keywords", ())
+        if item.arg == "kw_only"
+    ]
+    return any(not isinstance(item.value, ast.Constant) or item.value.value for item in options)
+
+
+def is_enumeration(owner: OwnClass, *bases: str) -> bool:
+    """Return whether a class is an enumeration, derived from one of ``bases`` if given."""
+    return not lineage(owner).others.isdisjoint(bases or ENUMS)
 
 
 def is_named_tuple(owner: OwnClass) -> bool:
     """Return whether a class is a NamedTuple."""
-    bases = [full_name(base, owner.home) or base for base in owner.definition.bases]
-    return bases == [_NAMED_TUPLE]
+    family = lineage(owner)
+    return family.others == {NAMED_TUPLE} and len(family.classes) == 1
 
 
 def is_plain(owner: OwnClass) -> bool:
     """Return whether objects of a class are nothing else than that: no numbers, texts or tuples."""
-    bases = {full_name(base, owner.home) or base for base in owner.definition.bases}
-    return known_attributes(owner) is not None and bases <= {"object", "enum.Enum"}
-
-
-def _decorator(node: ast.expr, home: Module) -> str:
-    called = node.func if isinstance(node, ast.Call) else node
-    written = ast.unparse(called)
-    return full_name(written, home) or written
+    others = lineage(owner).others
+    return others <= PLAIN_BASES | {"enum.Enum"} and known_attributes(owner) is not None
 
 
 def _own(definition: Class) -> Iterator[str]:

@@ -37,15 +37,22 @@ def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
             result = api_result(owner, member.name, scope.owner.interfaces)
             return Pending(member.name, node, result) if member.is_async else result
         case OwnMethod(method=method, home=home) if method.node is not None:
-            return returned_by(scope, method.node, home, node)
-        case ModuleFunction(node=function, home=home, parameter=parameter):
-            if is_rclpy(home) and parameter is ANYTHING:
-                parameter = given_class(scope, function, node, is_bound=True)
-            return returned_by(scope, function, home, node, parameter)
+            function = ModuleFunction(method.node, home)
+            return returned_by(scope, function, node, inside=scope.owner.scope(method, home))
+        case ModuleFunction(home=home) as function if is_rclpy(home):
+            if function.parameter is ANYTHING:
+                given = given_class(scope, function.node, node, is_bound=True)
+                function = ModuleFunction(function.node, home, parameter=given)
+            return returned_by(scope, function, node)
+        case ModuleFunction() as function:
+            is_known = function.of is not None or not function.is_bound
+            types = scope.owner.function(function.node, function.home, function.of)
+            return returned_by(scope, function, node, inside=types if is_known else None)
         case OwnClass() as own:
             return created_object(scope, own, node)
         case BuiltinMethod(python=python, name=name):
-            return builtin_result(python, name, [scope.type_of(item) for item in node.args])
+            named = {item.arg: scope.type_of(item.value) for item in node.keywords if item.arg}
+            return builtin_result(python, name, [scope.type_of(item) for item in node.args], named)
         case CollectionMethod(owner=collection, name=name):
             return method_result(collection, name, [scope.type_of(item) for item in node.args])
     full = scope.called_name(node.func)

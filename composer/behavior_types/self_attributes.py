@@ -41,7 +41,7 @@ def escapes(source: BehaviorSource, is_harmless: Callable[[str], bool] = lambda 
     ``is_harmless`` says which functions and classes, by full name, do not.
     """
     return any(
-        method.node is not None and _escapes_from(method.node, home, is_harmless)
+        method.node is not None and escapes_from(method.node, home, is_harmless)
         for home, known in source.classes
         for method in known.methods
     )
@@ -77,7 +77,8 @@ def _sets_by_name(statement: ast.stmt) -> bool:
     )
 
 
-def _escapes_from(function: Function, home: Module, is_harmless: Callable[[str], bool]) -> bool:
+def escapes_from(function: Function, home: Module, is_harmless: Callable[[str], bool]) -> bool:
+    """Return whether a method passes its object on."""
     positional = (*function.args.posonlyargs, *function.args.args)
     if not positional or is_static(function):
         return False

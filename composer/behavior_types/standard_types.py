@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import importlib
 import itertools
 import re
 from collections import deque
@@ -10,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import GeneratorType
 
 from composer import behavior
+from composer.behavior_types.numpy_types import ARRAY, numpy_method_result, numpy_result
 from composer.behavior_types.operators import is_float, is_integer, is_number, is_text
 from composer.behavior_types.values import (
     NONE,
@@ -114,6 +116,8 @@ def sliced(owner: Value) -> Value:
             return Collection(python, element)
         case FieldType(name=name) if owner.is_array:
             return FieldType(name, is_array=True)
+        case BuiltinObject() if owner == ARRAY:
+            return ARRAY
         case _:
             return STRING if is_text(owner) else ANYTHING
 
@@ -123,6 +127,8 @@ def called(name: str, arguments: Sequence[Value], keywords: Mapping[str, Value])
     module, _, function = name.rpartition(".")
     if module == "math":
         return _math(function)
+    if name.startswith("numpy."):
+        return numpy_result(name.removeprefix("numpy."), arguments, keywords)
     if name in _CALLS:
         return _CALLS[name]
     if name in {"copy.copy", "copy.deepcopy"} and len(arguments) == 1:
@@ -235,11 +241,22 @@ _METHODS: Mapping[tuple[type, str], Value] = {
 }
 
 
-def builtin_result(python: type, name: str, arguments: Sequence[Value]) -> Value:
-    """Return the type of what a method of an object of the standard library returns."""
+def builtin_result(
+    python: type, name: str, arguments: Sequence[Value], keywords: Mapping[str, Value]
+) -> Value:
+    """Return the type of what a method of an object of the standard library or numpy returns."""
+    of_numpy = numpy_method_result(python, name, keywords)
+    if of_numpy is not None:
+        return of_numpy
     if (python, name) == (re.Match, "group"):
         return STRING if len(arguments) <= 1 else Collection(tuple, STRING)
+    if python.__module__ == "random":
+        return _CALLS.get(f"random.{name}", ANYTHING)
     return _METHODS.get((python, name), ANYTHING)
+
+
+def _random(_: Sequence[Value], __: Mapping[str, Value]) -> Value:
+    return BuiltinObject(importlib.import_module("random").Random)  # it takes time to import
 
 
 _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] = {
@@ -254,6 +271,7 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
     "max": _least,
     "min": _least,
     "next": _next,
+    "random.Random": _random,
     "round": _round,
     "sum": _sum,
     "zip": _zip,

@@ -127,6 +127,13 @@ class OwnObject:
     parameter: Value = ANYTHING
 
 
+@dataclass(frozen=True, slots=True)
+class OwnModule:
+    """A file of the project that another one imports."""
+
+    module: Module
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnMethod:
     """A method of the behavior."""
@@ -139,13 +146,14 @@ class OwnMethod:
 class ModuleFunction:
     """A function of the behavior's module, or a method of an object of a class in it.
 
-    ``parameter`` is that of the object.
+    ``parameter`` is that of the object, and ``of`` its class, if it is one of the project.
     """
 
     node: ast.FunctionDef | ast.AsyncFunctionDef
     home: Module
     is_bound: bool = False
     parameter: Value = ANYTHING
+    of: OwnClass | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +168,7 @@ class Pending:
 Value: TypeAlias = (
     "ValueType | NoneType | Self | Ports | Parameters | InterfaceClass | ApiValue | ApiMethod"
     " | OwnMethod | ModuleFunction | Pending | Collection | CollectionMethod | OwnClass | OwnObject"
-    " | BuiltinObject | BuiltinMethod"
+    " | BuiltinObject | BuiltinMethod | OwnModule"
 )
 
 

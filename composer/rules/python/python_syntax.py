@@ -8,6 +8,7 @@ from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context
 from composer.analysis.hosted_classes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.source import Span
 
 RULE = register(
     Rule(
@@ -49,6 +50,7 @@ class Counter:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Report the first error of each module."""
+    reported: set[Span] = set()
     behaviors_of_nodes = ((source, "behavior") for _, source in context.once(behaviors))
     classes = ((found.source, "class") for found in context.once(hosted_classes))
     for source, what in (*behaviors_of_nodes, *classes):
@@ -60,3 +62,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 source.problem_span,
                 (label,),
             )
+        for message, span in source.broken:
+            if span not in reported:
+                reported.add(span)
+                label = Label(source.reference.text.span, f"the {what} of this node imports it")
+                yield Diagnostic(RULE, message, span, (label,))

@@ -1,0 +1,188 @@
+"""Checks the keys of dicts that are written down once and never change."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+from composer.behavior_checks.parts import possible_values
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function, Module, helper_named
+from composer.behavior_source.method_body import dotted
+from composer.behavior_source.spans import span_of
+from composer.behavior_source.traversal import walk
+from composer.behavior_types.bindings import Binding, bindings_of, nodes_of
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.lineage import lineage
+from composer.behavior_types.names import constant_named
+from composer.behavior_types.values import OwnModule, OwnObject, Self
+from composer.diagnostics import suggestion
+from composer.field_types import ANYTHING
+
+_READING = frozenset({"copy", "get", "items", "keys", "values"})
+_TAKING = frozenset({"dict", "enumerate", "iter", "len", "list", "max", "min", "set", "sorted"})
+_CAUGHT = frozenset({"BaseException", "Exception", "KeyError", "LookupError"})
+
+
+def key_problems_of(
+    node: ast.Subscript, function: Function, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield the constant keys that such a dict does not have."""
+    candidates = [
+        item for item in possible_values(node.slice, scope) if _constant(item) is not None
+    ]
+    if not candidates or isinstance(node.ctx, ast.Del) or _expects_missing(function, node.value):
+        return
+    declared = _declared(node, scope)
+    if declared is None:
+        return
+    for item in candidates:
+        key = _constant(item)
+        if key not in declared:
+            names = [other for other in declared if isinstance(other, str)]
+            hint = suggestion(key, names) if isinstance(key, str) else None
+            message = f"'{ast.unparse(node.value)}' has no key {key!r}"
+            yield CodeProblem(Kind.VALUE, message, span_of(item, scope.home.source), hint)
+            return
+
+
+def _constant(node: ast.expr) -> str | int | None:
+    value = node.value if isinstance(node, ast.Constant) else None
+    return value if isinstance(value, str | int) and not isinstance(value, bool) else None
+
+
+def _expects_missing(function: Function, owner: ast.expr) -> bool:
+    """Return whether a function handles a missing key, or asks for it."""
+    written = ast.unparse(owner)
+    for node in nodes_of(function):
+        match node:
+            case ast.ExceptHandler(type=None):
+                return True
+            case ast.ExceptHandler(type=ast.expr() as caught):
+                names = {dotted(item) for item in ast.walk(caught) if isinstance(item, ast.expr)}
+                if names & _CAUGHT:
+                    return True
+            case ast.Compare(ops=operators, comparators=others):
+                asks = any(isinstance(item, ast.In | ast.NotIn) for item in operators)
+                if asks and any(ast.unparse(item) == written for item in others):
+                    return True
+    return False
+
+
+def _declared(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int] | None:
+    """Return the keys of the dict that is read, None if they are not known."""
+    owner = node.value
+    modules = scope.owner.source.own_modules
+    object_ = scope.type_of(owner.value) if isinstance(owner, ast.Attribute) else ANYTHING
+    if isinstance(owner, ast.Attribute) and isinstance(object_, Self | OwnObject):
+        is_read = isinstance(node.ctx, ast.Load)
+        places = _places(object_, owner.attr, scope)
+        if len(places) != 1 or (not is_read and not _is_changed(node, modules)):
+            return None
+        return _keys_of(places[0].expression, owner.attr, modules)
+    if not isinstance(node.ctx, ast.Load):
+        return None
+    name, found = "", None
+    if isinstance(owner, ast.Name) and not scope.is_local(owner.id):
+        name, found = owner.id, helper_named(owner.id, scope.home)
+    elif isinstance(owner, ast.Attribute):
+        module = scope.type_of(owner.value)
+        if isinstance(module, OwnModule):
+            name, found = owner.attr, helper_named(owner.attr, module.module)
+    if found is None or not found.name:
+        return None
+    constant = constant_named(found.name, found.module)
+    written = constant.value if isinstance(constant, ast.AnnAssign) else constant
+    return _keys_of(written, name, modules) if name == found.name else None
+
+
+def _places(object_: Self | OwnObject, name: str, scope: FunctionTypes) -> list[Binding]:
+    """Return what an attribute of an object is assigned."""
+    if isinstance(object_, Self):
+        return [binding for _, binding in scope.owner.assigned.get(name, ())]
+    of = object_.of
+    return [
+        binding
+        for own in (*lineage(of).classes, *scope.owner.project_classes.derived(of))
+        for method in own.definition.methods
+        if method.node is not None
+        for binding in bindings_of(method.node).attributes.get(name, ())
+    ]
+
+
+def _is_changed(node: ast.Subscript, modules: Sequence[Module]) -> bool:
+    """Return whether a subscript is the target of '+=' or the like, which reads it first."""
+    return any(
+        isinstance(item, ast.AugAssign) and item.target is node
+        for module in modules
+        for item in walk(module.tree.body)
+    )
+
+
+def _keys_of(
+    written: ast.expr | None, name: str, modules: Sequence[Module]
+) -> frozenset[str | int] | None:
+    """Return the keys of a dict that is written down and whose name is only read."""
+    found: list[str | int | None] = []
+    match written:
+        case ast.Dict(keys=keys):
+            found = [None if key is None else _constant(key) for key in keys]
+        case ast.Call(func=ast.Name(id="dict"), args=[], keywords=keywords):
+            found = [item.arg for item in keywords]
+        case _:
+            return None
+    known = frozenset(item for item in found if item is not None)
+    if len(known) != len(found) or not found:
+        return None
+    for module in modules:
+        stored = _stored_keys(module, name)
+        if stored is None:
+            return None
+        known |= stored
+    return known
+
+
+@lru_cache(maxsize=256)
+def _stored_keys(module: Module, name: str) -> frozenset[str | int] | None:
+    """Return the constant keys that a file stores in what it calls ``name``.
+
+    None: it may change it otherwise, by a method, or by passing it on.
+    """
+    stored: set[str | int] = set()
+    safe: set[int] = set()
+    for node in walk(module.tree.body):
+        match node:
+            case ast.AugAssign(target=ast.Subscript(value=owner)):
+                safe.add(id(node.target))
+                safe.add(id(owner))
+            case ast.Subscript(value=owner, slice=index, ctx=context):
+                key = _constant(index)
+                if isinstance(context, ast.Load) or id(node) in safe:
+                    safe.add(id(owner))
+                elif isinstance(context, ast.Store) and key is not None:
+                    safe.add(id(owner))
+                    if _named(owner) == name:
+                        stored.add(key)
+            case ast.Attribute(value=owner, attr=attr) if attr in _READING:
+                safe.add(id(owner))
+            case ast.Compare(comparators=others):
+                safe.update(map(id, others))
+            case ast.For(iter=iterated) | ast.comprehension(iter=iterated):
+                safe.add(id(iterated))
+            case ast.Call(func=ast.Name(id=called), args=arguments) if called in _TAKING:
+                safe.update(map(id, arguments))
+            case ast.Assign(targets=targets):
+                safe.update(id(item) for item in targets if not isinstance(item, ast.Subscript))
+            case ast.AnnAssign(target=target):
+                safe.add(id(target))
+    uses = (node for node in walk(module.tree.body) if _named(node) == name)
+    return frozenset(stored) if all(id(node) in safe for node in uses) else None
+
+
+def _named(node: ast.AST) -> str:
+    match node:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+        case _:
+            return ""

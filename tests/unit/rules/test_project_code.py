@@ -1,0 +1,247 @@
+"""Code that uses the classes, functions and constants in other files of a project."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic
+from tests.unit.support.checking import diagnostics_in, quoted
+
+SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
+SHAPES = """\
+import abc
+from dataclasses import dataclass, field
+from enum import Enum, Flag
+
+import numpy as np
+from geometry_msgs.msg import Point
+
+SIZES = {"small": 1.0, "large": 2.0}
+
+
+class Side(Enum):
+    LEFT = 1
+    RIGHT = 2
+
+    @property
+    def is_left(self):
+        return self is Side.LEFT
+
+
+class Light(Flag):
+    RED = 1
+    GREEN = 2
+
+
+class ShapeError(ValueError):
+    def __init__(self, shape, reason):
+        super().__init__(reason)
+        self.shape = shape
+
+
+class Shape(abc.ABC):
+    def __init__(self, name: str):
+        self.name = name
+        self.uses = 0
+
+    def use(self):
+        self.uses += 1
+        return self.area()
+
+    @abc.abstractmethod
+    def area(self) -> float: ...
+
+
+class Square(Shape):
+    def __init__(self, name: str, size: float):
+        super().__init__(name)
+        self.size = size
+
+    def area(self) -> float:
+        return self.size * self.size
+
+    def scaled(self, factor):
+        return Square(self.name, self.size * factor)
+
+
+@dataclass
+class Place:
+    x: float
+    y: float = 0.0
+
+
+@dataclass
+class Named(Place):
+    name: str = field(default="", kw_only=True)
+
+
+class Plan:
+    def __init__(self):
+        self.shapes: dict[str, Shape] = {}
+        self.counts = {"used": 0}
+
+    def add(self, shape: Shape):
+        self.shapes[shape.name] = shape
+        self.counts["used"] += 1
+
+    def middle(self):
+        return Point(x=1.0)
+
+    def values(self) -> np.ndarray:
+        return np.zeros(3)
+
+
+def nothing():
+    print("nothing")
+"""
+PACKAGE = "from shapes.shapes import Plan, Side\n"
+CODE = """\
+import numpy as np
+import shapes
+from geometry_msgs.msg import Point, Pose
+from shapes import Plan
+from shapes import shapes as all_shapes
+from shapes.shapes import (
+    SIZES, Light, Named, Place, Shape, ShapeError, Side, Square, nothing
+)
+
+
+class Code:
+    def on_configure(self):
+        self.plan = Plan()
+        self.square = Square("a", 1.0)
+
+    def on_tick(self):
+        point, pose = Point(), Pose()
+        try:
+            {statement}
+        except ShapeError as error:
+            print(error.shape)
+        except TypeError as error:
+            print(error.args)
+"""
+RIGHT = [
+    "self.plan.add(self.square.scaled(2.0))",
+    "self.plan.add(shape=Square(size=1.0, name='b'))",
+    "point.x = self.square.area() + self.plan.shapes['a'].use()",
+    "print(Side['LEFT'], Side(1).is_left, Light.RED | Light.GREEN, all_shapes.Side.LEFT.name)",
+    "print(Named(1.0, name='n').x, Place(x=1.0, y=2.0), shapes.Plan().counts['used'])",
+    "self.plan.counts['new'] = 1; print(self.plan.counts['new'])",
+    "print(SIZES.get('huge'), SIZES['small'], {**SIZES}['large'])",
+    "pose.position = self.plan.middle()",
+    "self.square.color = 'red'; print(self.square.color)",
+    "point.x = float(self.plan.values().mean())",
+    "print(np.fft.rfft(self.plan.values()), np.some_function_of_the_future)",
+    "raise ShapeError(self.square, 'too large')",
+]
+
+
+@pytest.mark.parametrize(
+    ("statement", "rule", "text"),
+    [
+        ("self.square.scale(2.0)", "unknown-attribute", "scale"),
+        ("print(self.square.scaled(2.0).tint)", "unknown-attribute", "tint"),
+        ("print(self.plan.shapes['a'].tint)", "unknown-attribute", "tint"),
+        ("self.square.scaled()", "call-arguments", "self.square.scaled"),
+        ("self.square.use(1)", "call-arguments", "1"),
+        ("self.plan.add(Place(1.0))", "call-arguments", "Place(1.0)"),
+        ("Square('a')", "call-arguments", "Square"),
+        ("Square(1.0, 'a')", "call-arguments", "1.0"),
+        ("Named(1.0, title='n')", "call-arguments", "title"),
+        ("Named(1.0, 0.0, 'n')", "call-arguments", "'n'"),
+        ("print(Side.TOP)", "unknown-attribute", "TOP"),
+        ("print(Light.BLUE)", "unknown-attribute", "BLUE"),
+        ("print(Side.LEFT.is_right)", "unknown-attribute", "is_right"),
+        ("print(all_shapes.Sides)", "unknown-import", "Sides"),
+        ("print(shapes.Plans)", "unknown-import", "Plans"),
+        ("print(SIZES['smal'])", "invalid-value", "'smal'"),
+        ("print(SIZES['small' if point.x else 'big'])", "invalid-value", "'big'"),
+        ("raise ShapeError('too large')", "call-arguments", "ShapeError"),
+        ("point.x = self.plan.middle()", "invalid-value", "self.plan.middle()"),
+        ("pose.position = nothing()", "invalid-value", "nothing()"),
+        ("pose.position = Side.LEFT", "invalid-value", "Side.LEFT"),
+        ("point.x = self.plan.values()", "invalid-value", "self.plan.values()"),
+        ("print(self.plan.values().average())", "unknown-attribute", "average"),
+        ("np.columnstack((point.x, point.y))", "unknown-import", "columnstack"),
+        ("np.fft.rfftt([1.0])", "unknown-import", "rfftt"),
+    ],
+)
+def test_a_mistake_is_reported_once(statement: str, rule: str, text: str, tmp_path: Path) -> None:
+    [diagnostic] = _found(tmp_path, statement)
+    assert (diagnostic.rule.name, quoted(diagnostic)) == (rule, text)
+
+
+@pytest.mark.parametrize("statement", RIGHT)
+def test_right_code_is_not_reported(statement: str, tmp_path: Path) -> None:
+    assert _found(tmp_path, statement) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule", "text"),
+    [
+        ("return self.area()", "return self.aria()", "unknown-attribute", "aria"),
+        ("super().__init__(name)", "super().__init__(name, size)", "call-arguments", "size"),
+        ("super().__init__(name)", "super().__init__()", "call-arguments", "super().__init__"),
+        ("self.size * self.size", "self.size * self.side", "unknown-attribute", "side"),
+        ('self.counts["used"] += 1', 'self.counts["use"] += 1', "invalid-value", '"use"'),
+        ("self.shape = shape", "self.form = shape", "unknown-attribute", "shape"),
+        ("np.zeros(3)", "np.zeroes(3)", "unknown-import", "zeroes"),
+        ("self is Side.LEFT", "self is Side.LEFT)", "python-syntax", ")"),
+    ],
+)
+def test_a_mistake_in_a_helper_is_reported_once(
+    old: str, new: str, rule: str, text: str, tmp_path: Path
+) -> None:
+    helper = SHAPES.replace(old, new, 1)
+    [diagnostic] = _found(tmp_path, "raise ShapeError(self.square.use(), 'wrong')", helper)
+    assert (diagnostic.rule.name, quoted(diagnostic)) == (rule, text)
+
+
+def test_a_changed_helper_is_read_again(tmp_path: Path) -> None:
+    statement = "print(self.square.tint)"
+    assert [item.rule.name for item in _found(tmp_path, statement)] == ["unknown-attribute"]
+    with_attribute = SHAPES.replace("self.size = size", "self.size = self.tint = size")
+    assert _found(tmp_path, statement, with_attribute) == []
+
+
+@pytest.mark.parametrize(
+    "helper",
+    [
+        # a mixin: what others derive from it has the attribute
+        "class Mixin:\n    def show(self):\n        print(self.text)\n\n\n"
+        "class Full(Mixin):\n    text = 'a'\n\n\nfull = Full()\n",
+        # it passes itself to code that may set attributes
+        "import argparse\n\n\nclass Options:\n    def __init__(self):\n"
+        "        argparse.ArgumentParser().parse_args([], self)\n        print(self.speed)\n\n\n"
+        "options = Options()\n",
+        # derived classes may be created otherwise
+        "class Base:\n    @classmethod\n    def make(cls):\n        return cls(1)\n\n\n"
+        "class Full(Base):\n    def __init__(self, number):\n        self.number = number\n\n\n"
+        "full = Full.make()\n",
+        # a method that is not implemented may take other arguments in derived classes
+        "class Base:\n    def run(self):\n        self.step(1)\n\n    def step(self):\n"
+        "        raise NotImplementedError\n\n\nbase = Base()\n",
+        # the elements of a list or dict may change
+        "class Table:\n    def __init__(self):\n        self.rows = {'a': (1, 2)}\n\n"
+        "    def add(self, name):\n        self.rows[name] = (1, 2, 3)\n"
+        "        a, b, c = self.rows[name]\n        return a, b, c\n\n\ntable = Table()\n",
+        # a name that is defined in several ways
+        "import sys\n\nif sys.platform == 'linux':\n\n    class Port:\n"
+        "        def __init__(self, path):\n            self.path = path\n\n"
+        "else:\n\n    class Port:\n        pass\n\n\nport = Port('a')\n",
+    ],
+)
+def test_classes_that_may_have_more_are_not_reported(helper: str, tmp_path: Path) -> None:
+    (tmp_path / "more.py").write_text(helper, encoding="utf-8")
+    assert _found(tmp_path, "import more; print(more)") == []
+
+
+def _found(folder: Path, statement: str, helper: str = SHAPES) -> list[Diagnostic]:
+    package = folder / "shapes"
+    package.mkdir(exist_ok=True)
+    (package / "__init__.py").write_text(PACKAGE, encoding="utf-8")
+    (package / "shapes.py").write_text(helper, encoding="utf-8")
+    (folder / "code.py").write_text(CODE.replace("{statement}", statement), encoding="utf-8")
+    return diagnostics_in(SYSTEM, folder)
