@@ -41,7 +41,7 @@ def test_programs_run_only_when_requested() -> None:
 
     with PausedPrograms(BOTH, os.environ, timeout_s=20.0) as held:
         wait_until(lambda: states() == [STOPPED, STOPPED], "both stopped")
-        held.work(0.5)
+        held.work(2.0)
         wait_until(lambda: states() == [STOPPED, STOPPED], "both stopped again")
         result = held.result()
     assert result["delivered"] > 0

@@ -208,7 +208,7 @@ def test_browsers_and_subscriptions_have_a_limit(server: Dashboard) -> None:
 
 def test_images_are_sampled_and_made_smaller(page: Browser) -> None:
     page.subscribe("image", topic="/camera", max_hz=10, max_width=320)
-    page.wait(lambda: len(page.pictures) >= 3)
+    page.wait(lambda: len(page.pictures) >= 3 and page.pictures[-1][0]["dropped"])
     header, pixels = page.pictures[-1]
     assert (header["width"], header["height"]) == (320, 240)
     assert (header["source_width"], header["source_encoding"]) == (640, "rgb8")

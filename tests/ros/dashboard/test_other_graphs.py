@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from composer.runtime.process.instance_lock import local_systems
-from tests.ros.support.commands import hand_written, output_of
+from tests.ros.support.commands import hand_written, listed
 from tests.ros.support.dashboard import dashboard
 from tests.ros.support.pages import opened, visit
 from tests.ros.support.system_process import RunningSystem
@@ -94,8 +94,8 @@ def test_what_the_pipeline_does_not_have(dropping: Page) -> None:
     gear.select_option("3")
     expect(page, "[data-name=gear] .outcome", "^Set$")
     expect(page, "[data-name=gear] .declared", r"^declared 1 at dropping\.yaml:\d+:\d+$")
-    assert output_of("param", "get", "/source", "mode").strip().endswith("fast, very")
-    assert output_of("param", "get", "/source", "gear").strip().endswith("3")
+    for name, value in (("mode", "fast, very"), ("gear", "3")):
+        assert listed((value,), "param", "get", "/source", name).strip().endswith(value)
 
 
 def test_the_deployment_shows_processes_and_restarts(

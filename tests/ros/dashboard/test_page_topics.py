@@ -15,7 +15,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header, Int32
 
-from tests.ros.support.commands import hand_written, output_of
+from tests.ros.support.commands import hand_written, listed
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.pages import detail, expect_text, visit
 
@@ -219,7 +219,7 @@ def test_a_request_with_lists_and_ranges(view: Page) -> None:
     form.locator(field("double_value")).fill("2.5")
     form.get_by_text("Call").click()
     expect_text(detail(view).locator(".message"), "successful.*true")
-    assert "2.5" in output_of("param", "get", "/lab/talker", "speed")
+    assert "2.5" in listed(("2.5",), "param", "get", "/lab/talker", "speed")
     form.locator(field("double_value")).fill("5.5")
     form.get_by_text("Call").click()
     expect_text(detail(view).locator(".message"), "successful.*false.*reason.*range")

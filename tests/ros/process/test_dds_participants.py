@@ -19,7 +19,7 @@ from tests.ros.support.in_process import Peer, wait_until
 #: that is every second one. The share allows for delays on a busy machine.
 JOINS, ENOUGH = 16, 12
 AT_ONCE_S = 0.9
-ATTEMPTS = 3
+ATTEMPTS = 5
 #: The lease of a command is 4 s. With the default of 20 s, it would be known for 17 s at least.
 FORGOTTEN_WITHIN_S = 15.0
 #: Enough for several packets.

@@ -116,6 +116,12 @@ def listed(parts: tuple[str, ...], *arguments: str) -> str:
     return repeated_until(lambda text: all(part in text for part in parts), *arguments)
 
 
+def expect_state(node: str, state: str) -> None:
+    """Repeat a command until it reports the lifecycle state of a node."""
+    line = f"{state}\n"
+    assert repeated_until(lambda text: text == line, "lifecycle", "get", node) == line
+
+
 def measured(fits: Callable[[dict[str, Any]], bool], *arguments: str) -> dict[str, Any]:
     """Repeat a measurement until it fits: a busy machine distorts rates and delays."""
     text = repeated_until(lambda text: fits(json.loads(text.splitlines()[-1])), *arguments)
