@@ -161,7 +161,11 @@ class _GuardedProtocol(H11Protocol):
             return  # it is a WebSocket now
         is_busy = self.cycle is not None and not self.cycle.response_complete
         if not is_busy and self.cycle is self._last_cycle:
-            self._refuse(Refusal(408, f"no complete request within {REQUEST_WITHIN_S:g} s"))
+            if self.conn.trailing_data[0]:
+                self._refuse(Refusal(408, f"no complete request within {REQUEST_WITHIN_S:g} s"))
+            else:
+                # A browser that is about to use it would take a reason for the response.
+                self.transport.close()
             return
         self._last_cycle = self.cycle
         self._check = self.loop.call_later(REQUEST_WITHIN_S, self._end_if_idle)

@@ -158,9 +158,11 @@ def test_half_open_and_many_connections(server: Dashboard, page: Browser) -> Non
         refused = (answer_of(one).startswith(b"HTTP/1.1 503 ") for one in opened[MAX_OPEN:])
         assert any(refused)
     wait_until(lambda: server.open_files() <= before + 5, "the files of the ended connections")
-    slow = raw(address, b"GET / HTTP/1.1\r\nHost: x\r\nX: ")
+    idle, slow = raw(address), raw(address, b"GET / HTTP/1.1\r\nHost: x\r\nX: ")
     assert answer_of(slow).startswith(b"HTTP/1.1 408 ")
     assert closed(slow)
+    assert idle.recv(100) == b""  # a browser that uses it just then would take it for a response
+    idle.close()
     with browser(address) as other:
         assert other.ok("ping")
     wait_until(lambda: server.open_files() <= before + 5, "the files of the ended connections")
