@@ -59,14 +59,14 @@ export function createOverlay(picture, things, executors) {
     entry.item.element.setAttribute("aria-label", `node ${entry.item.name}, ${labelOfState(state)}`);
   }
 
-  /** Write the dropped messages next to the middle of a line; only there if there are any. */
+  /** Write the dropped messages over the middle of a line, above all boxes; only if there are any. */
   function showDrops(line, total) {
     const [path] = line.parts;
     path.classList.toggle("lossy", total > 0);
     if (total > 0 && !drops.has(line.key)) {
       const middle = path.getPointAtLength(path.getTotalLength() / 2);
       const text = s("text", { class: "edge-label drop-label", x: middle.x, y: middle.y - SHAPE_SIZE / 2 });
-      path.after(text);
+      picture.world.append(text);
       drops.set(line.key, text);
     }
     const label = drops.get(line.key);
