@@ -33,24 +33,6 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-const FOCUSABLE = "a[href], button, input, select, summary, textarea, [tabindex]";
-
-/**
- * Replace the children of an element. If the focus was in it, it moves to the same control, by its name,
- * or to the first one: otherwise, users of a keyboard would start again at the top of the page.
- */
-export function refill(element, ...children) {
-  const focused = element.contains(document.activeElement) ? nameOf(document.activeElement) : null;
-  element.replaceChildren(...children);
-  if (focused === null) return;
-  const controls = [...element.querySelectorAll(FOCUSABLE)];
-  (controls.find((one) => nameOf(one) === focused) ?? controls[0])?.focus({ preventScroll: true });
-}
-
-function nameOf(control) {
-  return `${control.tagName} ${control.dataset.key ?? control.getAttribute("aria-label") ?? control.textContent}`;
-}
-
 let lastId = 0;
 
 /** Return an id that no other element has. */

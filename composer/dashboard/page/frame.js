@@ -1,6 +1,6 @@
 /** What is around every view: the bar with the state of the system, the views, the connection. */
 import { createAppearance } from "./graph/appearance.js";
-import { button, h, refill, setText } from "./dom.js";
+import { button, h, setText } from "./dom.js";
 import { duration, usage } from "./format.js";
 import { icon } from "./icons.js";
 import { attempt, confirmed, toast } from "./widgets/notices.js";
@@ -120,7 +120,7 @@ export function createFrame(app) {
     const wanted = app.isReadOnly() ? [] : system.commands.filter((name) => (POSSIBLE[system.activity] ?? OTHERWISE).includes(name));
     if (commands.dataset.shown === wanted.join()) return;
     commands.dataset.shown = wanted.join();
-    refill(commands, ...wanted.map((name) => {
+    commands.replaceChildren(...wanted.map((name) => {
       const { label, ask, hint } = COMMANDS[name];
       const pressed = button([icon(name), h("span", {}, label)], () => attempt(pressed, async () => {
         if (ask && !(await confirmed(`${ask} ${system.name}?`, { verb: label, hint }))) return;

@@ -1,6 +1,7 @@
 /** Starts the page: connection, address, frame and views. */
 import { createConnection } from "./connection.js";
 import { h } from "./dom.js";
+import { keepFocus } from "./focus.js";
 import { createFrame } from "./frame.js";
 import { createRouter } from "./router.js";
 
@@ -83,6 +84,7 @@ function main() {
     if (document.hidden) hiding = setTimeout(() => app.connection.suspend(true), HIDDEN_MS);
     else app.connection.suspend(false);
   });
+  keepFocus();
   frame.listenToKeys((view) => router.go(`/${view}`));
   show(router.read());
   addEventListener("load", () => setTimeout(loadOthers, LOAD_OTHERS_MS));

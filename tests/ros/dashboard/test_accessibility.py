@@ -49,8 +49,8 @@ def test_a_view_is_busy_until_its_module_is_loaded(view: Page) -> None:
 FOCUS = """() => {
     const one = document.activeElement;
     one.dataset.reached = "true";
-    const isSeen = getComputedStyle(one).outlineStyle !== "none" || one.matches("body, .world *");
-    return isSeen ? "" : one.outerHTML.slice(0, 120);
+    const hasOutline = getComputedStyle(one).outlineStyle !== "none";
+    return hasOutline || one.matches("body, main, .world *") ? "" : one.outerHTML.slice(0, 120);
 }"""
 #: Visible controls that the focus has not reached. In the diagram, the arrow keys move it.
 UNREACHED = """() => [...document.querySelectorAll("a[href], button, input, select, summary")]
@@ -69,6 +69,60 @@ def test_tab_reaches_every_control_and_the_focus_is_seen(view: Page) -> None:
             if view.evaluate(UNREACHED) == []:
                 break
         assert view.evaluate(UNREACHED) == [], path
+
+
+#: Scrolls the log away from its end, once it is long enough; returns whether that was noticed.
+SCROLL_UP = """() => {
+    const [list, button] = document.querySelectorAll("ol.log, .to-end");
+    list.style.maxHeight = "24px";
+    if (button.hidden) list.scrollTop = list.scrollTop > 0 ? 0 : list.scrollHeight;
+    return !button.hidden;
+}"""
+
+
+#: Shows an error, which stays until it is closed.
+NOTICE = """async () => {
+    const { toast } = await import("/page/widgets/notices.js");
+    toast("failed", {tone: "bad"});
+}"""
+
+
+def wait_for_focus(page: Page, selector: str) -> None:
+    page.wait_for_function("selector => document.activeElement.matches(selector)", arg=selector)
+
+
+def test_the_focus_stays_near_a_control_that_is_gone(view: Page) -> None:
+    # Hidden: the buttons of a parameter.
+    visit(view, f"/parameters{PLANNER}")
+    line = view.locator("[data-name=max_velocity]")
+    line.locator("input[type=text]").fill("2")
+    line.get_by_text("Undo").press("Enter")
+    wait_for_focus(view, "[data-name=max_velocity] input[type=text]")
+    # Disabled: there is no older message than the first one.
+    visit(view, "/topics/sensor_data")
+    view.locator(".echo").get_by_text("Pause").press("Enter")
+    view.get_by_label("Older message").focus()
+    while view.get_by_label("Older message").is_enabled():
+        view.keyboard.press("Enter")
+    wait_for_focus(view, ".echo [aria-label='Newer message']")
+    # Removed: a notice, and before it, another control had the focus.
+    view.get_by_label("Messages per second shown").focus()
+    view.evaluate(NOTICE)
+    view.locator(".toast button").press("Enter")
+    wait_for_focus(view, "[aria-label='Messages per second shown']")
+    # Hidden, at the end of a list that can have the focus.
+    visit(view, "/log")
+    wait_until(lambda: view.evaluate(SCROLL_UP), "a log that is scrolled up")
+    view.get_by_text("Jump to the newest").press("Enter")
+    wait_for_focus(view, "ol.log")
+    # Replaced: the diagram is drawn again for another size of the page.
+    visit(view, "/graph")
+    planner = f'.world [data-key="node:{PLANNER}"]'
+    view.focus(planner)
+    view.evaluate("document.querySelector('.world').classList.add('old')")
+    view.set_viewport_size({"width": 700, "height": 800})
+    view.locator(".world:not(.old)").wait_for()
+    wait_for_focus(view, planner)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

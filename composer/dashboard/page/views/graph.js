@@ -4,7 +4,7 @@ import { readPicture } from "../graph/picture.js";
 import { createSearch } from "../graph/search.js";
 import { createSelection, listenToItems } from "../graph/selection.js";
 import { createViewport } from "../graph/viewport.js";
-import { button, empty, h, refill, s } from "../dom.js";
+import { button, empty, h, s } from "../dom.js";
 import { icon } from "../icons.js";
 import { pathOf } from "../router.js";
 import { dropNote, searchField, tabs } from "../widgets/parts.js";
@@ -130,7 +130,7 @@ export function createView(app) {
   /** The bring-up and the executors are in the file of a system. */
   function showLinks() {
     const possible = VIEWS.filter(([id, , isDeclared]) => !isDeclared || app.hello?.file || id === view);
-    refill(links, tabs("Diagram", possible.map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
+    links.replaceChildren(tabs("Diagram", possible.map(([id, label]) => [id, label, pathOf("graph", "", { view: id === "nodes" ? "" : id })]), view));
   }
 
   addEventListener("hello", showLinks);

@@ -1,5 +1,5 @@
 /** The details of one node: what it does, what it did wrong, and what can be done with it. */
-import { button, empty, h, refill } from "../dom.js";
+import { button, empty, h } from "../dom.js";
 import { count, duration, hertz, milliseconds, percent, usage } from "../format.js";
 import { pathOf } from "../router.js";
 import { asked, attempt, confirmed, toast } from "../widgets/notices.js";
@@ -123,7 +123,7 @@ export function createNodeDetail(app) {
     const buttons = TRANSITIONS.filter((transition) => legal.includes(transition)).map((transition) =>
       acting(transition, "transition", { transition }, transition === "shutdown"));
     if (node.system) buttons.push(acting("restart", "restart", {}, false));
-    refill(actions, ...buttons);
+    actions.replaceChildren(...buttons);
   }
 
   function acting(label, op, args, isFinal) {

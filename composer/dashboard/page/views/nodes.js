@@ -1,5 +1,5 @@
 /** The nodes: states, figures, transitions; the plan, and the drift against the declaration. */
-import { h, refill } from "../dom.js";
+import { h } from "../dom.js";
 import { count, duration, hertz, percent, usage } from "../format.js";
 import { pathOf } from "../router.js";
 import { searchField, matches, split, stateBadge, tabs } from "../widgets/parts.js";
@@ -66,7 +66,7 @@ export function createView(app) {
 
   function show(route) {
     const tab = route.query.get("show") ?? "nodes";
-    refill(links, tabs("Nodes", [
+    links.replaceChildren(tabs("Nodes", [
       ["nodes", "States", "/nodes"],
       ["plan", "Plan", "/nodes?show=plan"],
       ["drift", "Drift", "/nodes?show=drift"],

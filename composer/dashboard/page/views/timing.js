@@ -1,5 +1,5 @@
 /** Timing: chains against their budget, timers by lateness, and a histogram for each callback. */
-import { h, refill } from "../dom.js";
+import { h } from "../dom.js";
 import { count, hertz, milliseconds, percent } from "../format.js";
 import { pathOf } from "../router.js";
 import { createHistogram } from "../widgets/histogram.js";
@@ -90,7 +90,7 @@ export function createView(app) {
   function show(route) {
     tab = route.query.get("show") === "timers" ? "timers" : "callbacks";
     chosen = route.query.get("of") ?? "";
-    refill(links, tabs("Timing", [["callbacks", "Callbacks", "/timing"], ["timers", "Timers", "/timing?show=timers"]], tab));
+    links.replaceChildren(tabs("Timing", [["callbacks", "Callbacks", "/timing"], ["timers", "Timers", "/timing?show=timers"]], tab));
     list.replaceChildren(tables[tab].element);
     tables[tab].select(chosen);
     detail.hidden = chosen === "";

@@ -1,5 +1,5 @@
 /** The topics: figures of those on the screen, and for one of them echo, plot, image and publish. */
-import { button, empty, h, refill } from "../dom.js";
+import { button, empty, h } from "../dom.js";
 import { bandwidth, count, hertz } from "../format.js";
 import { pathOf } from "../router.js";
 import { detailHead, facts, section, searchField, matches, split, tabs, toggle } from "../widgets/parts.js";
@@ -120,7 +120,7 @@ export function createView(app) {
       part.update(topic);
       return;
     }
-    refill(detail, detailHead(name, "/topics"), h("p", { class: "type" }, topic.types.join(", ")), tabs("Topic", entries, tab), part.element);
+    detail.replaceChildren(detailHead(name, "/topics"), h("p", { class: "type" }, topic.types.join(", ")), tabs("Topic", entries, tab), part.element);
   }
 
   function make(topic) {
@@ -191,7 +191,7 @@ export function createView(app) {
       const wanted = JSON.stringify([now.publishers, now.subscriptions]);
       if (wanted === shown) return;
       shown = wanted;
-      refill(box, ends("Publishers", now.publishers), ends("Subscriptions", now.subscriptions));
+      box.replaceChildren(ends("Publishers", now.publishers), ends("Subscriptions", now.subscriptions));
     };
     update(topic);
     return { element: box, end() {}, update };

@@ -3,7 +3,7 @@
  *
  * `filter` shows the fields whose path contains it; `onplot(path)` adds a button to every number.
  */
-import { button, h, refill, setText } from "../dom.js";
+import { button, h, setText } from "../dom.js";
 import { number } from "../format.js";
 import { icon } from "../icons.js";
 
@@ -23,7 +23,7 @@ export function createMessageTree({ onplot = null, isPlotted = () => false } = {
     if (newShape !== shape) {
       shape = newShape;
       leaves.clear();
-      refill(element, ...(lines.length > 0 ? lines.map(build) : [nothing()]));
+      element.replaceChildren(...(lines.length > 0 ? lines.map(build) : [nothing()]));
     }
     for (const { path, text } of lines) {
       const leaf = leaves.get(path);

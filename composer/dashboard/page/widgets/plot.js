@@ -3,7 +3,7 @@
  *
  * A series is {topic, field}; its points come from the channel `plot`.
  */
-import { button, h, refill } from "../dom.js";
+import { button, h } from "../dom.js";
 import { number, timeOfDay } from "../format.js";
 import uPlot from "../vendor/uplot/uPlot.esm.js";
 import { dropNote, toggle } from "./parts.js";
@@ -93,7 +93,7 @@ export function createPlot(connection, { onremove }) {
     chart?.destroy();
     chart = null;
     frame.replaceChildren();
-    refill(legend, ...series.map(entry));
+    legend.replaceChildren(...series.map(entry));
     if (series.length === 0) return;
     chart = new uPlot(options(), data(), frame);
   }

@@ -88,7 +88,7 @@ export function createTable({ label, columns, keyOf, hrefOf, sortBy = null, noth
     const keys = new Set(rows.map(keyOf));
     for (const key of known.keys()) if (!keys.has(key)) known.delete(key);
     if (lines.length !== body.children.length || lines.some((line, i) => line !== body.children[i])) {
-      keepingFocus(() => body.replaceChildren(...lines));
+      body.replaceChildren(...lines);
     }
     table.hidden = rows.length === 0;
     message.replaceChildren(...(rows.length === 0 ? [empty(...[nothing()].flat())] : []));
@@ -153,11 +153,4 @@ function compare(one, other) {
   if (isMissing(one) || isMissing(other)) return Number(isMissing(one)) - Number(isMissing(other));
   if (typeof one === "number") return one - other;
   return String(one).localeCompare(String(other), "en", { numeric: true });
-}
-
-/** Moving an element in the document takes its focus away. */
-function keepingFocus(change) {
-  const focused = document.activeElement;
-  change();
-  if (focused?.isConnected && document.activeElement !== focused) focused.focus({ preventScroll: true });
 }
