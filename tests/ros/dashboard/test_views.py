@@ -95,9 +95,13 @@ def test_plan_source_and_drift(page: Browser) -> None:
     steps = page.ok("plan")["steps"]
     assert [step["number"] for step in steps] == list(range(1, 7))
     assert any(PLANNER in step["cause"] or step["after"] for step in steps)
-    node = page.ok("node", node=PLANNER)
+    names = {"/sensor_data", "/plan_trajectory"}
+
+    def has_endpoints(node: Any) -> bool:  # they are discovered one after the other
+        return {end["name"] for end in node["endpoints"]} >= names
+
+    node = page.ok_when(has_endpoints, "node", node=PLANNER)
     assert "planner: {type: planner" in node["source"]["text"]
-    assert {end["name"] for end in node["endpoints"]} >= {"/sensor_data", "/plan_trajectory"}
     page.ok("set_parameter", node=PLANNER, name="max_velocity", value=2.0)
     expected = {("wrong parameter", PLANNER), ("extra node", TALKER)}
 
