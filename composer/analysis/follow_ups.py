@@ -45,14 +45,21 @@ def without_follow_ups(
     wrong_files = {
         item.primary.file.path for item in found if item.severity is Severity.ERROR
     } & _files_of_infos(found)
+    is_misplaced = any(_names_no_node(item) for item in found)
     kept = [
         item
         for item in found
         if not consequences.include(item)
+        and not (is_misplaced and item.rule.name == "unmeasured-chain")
         and not (item.rule.name in _OF_WRONG_KIND and _mentions(item, wrong_ports))
         and not (item.rule.name in _UNUSED and item.primary.file.path in wrong_files)
     ]
     return _joined(_without_sections(kept), context)
+
+
+def _names_no_node(item: Diagnostic) -> bool:
+    """Return whether a process lacks nodes, because it names what is not one."""
+    return item.rule.name == "unknown-process" and item.message.endswith(_NODE)
 
 
 def _without_sections(found: list[Diagnostic]) -> list[Diagnostic]:

@@ -85,3 +85,28 @@ def test_names_that_resemble_others_are_reported_each(tmp_path: Path) -> None:
         "a: {lifecycle: {depends_on: [camra, lidr, reciever]}, on_activate: {log: started}}",
     )
     assert rules_broken(text, tmp_path) == ["unknown-node"] * 3
+
+
+SPLIT = """\
+system: brake
+nodes:
+  lidar:
+    timers: {tick: {period_ms: 20, publish: {scan: {data: near}}}}
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data}}
+  brake:
+    subscriptions:
+      scan: {type: std_msgs/msg/String, qos: sensor_data, publish: {commands: {data: stop}}}
+    publishers: {commands: {type: std_msgs/msg/String, qos: command, external: true}}
+connections: [{topic: /scan, from: lidar.scan, to: brake.scan}]
+processes:
+  sensing: {nodes: ["NODES", brake]}
+chains:
+  stop: {through: [lidar.scan, brake.commands], latency_ms: 50}
+"""
+
+
+@pytest.mark.parametrize(("nodes", "rules"), [("*_lidars", ["unknown-process"]), ("lida*", [])])
+def test_a_chain_of_a_process_without_one_of_its_nodes(
+    nodes: str, rules: list[str], tmp_path: Path
+) -> None:
+    assert rules_broken(SPLIT.replace("NODES", nodes), tmp_path) == rules
