@@ -54,7 +54,6 @@ _CHECK_PERIOD_S = 0.5
 _REPORTS_WITHIN_S = 5.0
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
-_COMPOSER = "composer"
 
 
 @dataclass(slots=True)
@@ -359,7 +358,7 @@ class MemberProcess:
         self._life = life = _Life(holds_lock=is_held(self._name))
         self._may_start = False
         text = f"{self} was not started here; it is used: host {report.host}, process {report.pid}"
-        self._context.write_log(LogLevel.INFO, _COMPOSER, text)
+        self._context.write_log(LogLevel.INFO, "composer", text)
         return life
 
     def _check(self) -> None:
