@@ -82,6 +82,7 @@ def test_problems_are_counted_and_have_remedies(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_hosts_are_looked_up_before_the_checks() -> None:
+    pytest.importorskip("asyncssh", reason="asyncssh is not installed")
     done = compose("doctor", "minimal", "--hosts")
     assert (done.code, done.out) == (1, "")
     assert "has no 'hosts'" in done.err

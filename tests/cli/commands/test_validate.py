@@ -144,7 +144,8 @@ def test_a_mistyped_path_gets_a_suggestion(folder: Path, written: str, meant: st
     Path("systems").mkdir()
     Path("systems/robot.yaml").write_text(FINE)
     assert f"did you mean '{meant}'?" in compose("validate", written).err
-    assert f"did you mean '{meant}'?" in compose("run", "--dry-run", written).err
+    if meant.endswith(".yaml"):  # 'run' needs a file
+        assert f"did you mean '{meant}'?" in compose("run", "--dry-run", written).err
 
 
 def test_a_path_without_its_suffix_gets_a_suggestion(folder: Path) -> None:

@@ -89,7 +89,7 @@ def test_an_interface_package_stays_if_it_cannot_be_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "build" / "tf2_msgs"
-    complete_package("tf2_msgs", None, target)
+    complete_package("tf2_msgs", None, target, for_pip=False)
     (target / "old").touch()
     before = contents(tmp_path)
 
@@ -99,9 +99,9 @@ def test_an_interface_package_stays_if_it_cannot_be_replaced(
 
     monkeypatch.setattr(interface_builds, "bundled_package", lambda _: Package())
     with pytest.raises(CommandError, match="cannot complete package 'tf2_msgs'"):
-        complete_package("tf2_msgs", None, target)
+        complete_package("tf2_msgs", None, target, for_pip=False)
     assert contents(tmp_path) == before
     monkeypatch.undo()
-    complete_package("tf2_msgs", None, target)
+    complete_package("tf2_msgs", None, target, for_pip=False)
     del before["build/tf2_msgs/old"]
     assert contents(tmp_path) == before
