@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -100,6 +101,7 @@ def test_the_focus_stays_near_a_control_that_is_gone(view: Page) -> None:
     wait_for_focus(view, "[data-name=max_velocity] input[type=text]")
     # Disabled: there is no older message than the first one.
     visit(view, "/topics/sensor_data")
+    view.get_by_text(re.compile(r"([2-9]|\d\d+) received")).wait_for()
     view.locator(".echo").get_by_text("Pause").press("Enter")
     view.get_by_label("Older message").focus()
     while view.get_by_label("Older message").is_enabled():
