@@ -64,12 +64,16 @@ MAX_TABS = 200
 def test_tab_reaches_every_control_and_the_focus_is_seen(view: Page) -> None:
     for path in (*DETAILS, "topics/sensor_data?tab=info", "nodes?show=plan", "timing"):
         visit(view, f"/{path}")
+        if path.startswith("parameters"):  # they are read from the node first
+            view.locator("[data-name]").first.wait_for()
+        unreached = None
         for _ in range(MAX_TABS):
             view.keyboard.press("Tab")
             assert view.evaluate(FOCUS) == "", path
-            if view.evaluate(UNREACHED) == []:
+            unreached = view.evaluate(UNREACHED)
+            if unreached == []:
                 break
-        assert view.evaluate(UNREACHED) == [], path
+        assert unreached == [], path
 
 
 #: Scrolls the log away from its end, once it is long enough; returns whether that was noticed.

@@ -322,15 +322,16 @@ def test_timers_are_sorted_by_lateness_and_have_histograms(view: Page) -> None:
     assert list(late.values()) == sorted(late.values(), reverse=True)
     view.get_by_role("link", name="timer step").click()
     expect_text(view.locator(".facts:visible"), r"late, p99[\d.]+ (ms|µs)")
+    view.locator(".histogram figcaption", has_text="calls").wait_for()
     counts = view.evaluate(COUNTS)
     assert sum(counts["bins"]) == counts["total"] > 0
 
 
 #: The names and the lateness of timers, read at once, since they change every second.
 LATE = """() => {
-    const {cellIndex} = document.querySelector("th[data-id=late][aria-sort=descending]");
+    const head = document.querySelector("th[data-id=late][aria-sort=descending]");
     const rows = [...document.querySelectorAll("table[aria-label^=Timers] tbody tr")];
-    return rows.map(({cells}) => [cells[0].innerText, cells[cellIndex].innerText]);
+    return rows.map(({cells}) => [cells[0].innerText, cells[head.cellIndex].innerText]);
 }"""
 #: The number of calls of each bin of a histogram, and of all.
 COUNTS = """() => {
