@@ -16,6 +16,7 @@ from composer.behavior_types.bindings import Binding, bindings_of, nodes_of
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.lineage import lineage
 from composer.behavior_types.names import constant_named
+from composer.behavior_types.own_classes import updated_targets
 from composer.behavior_types.values import OwnModule, OwnObject, Self
 from composer.diagnostics import suggestion
 from composer.field_types import ANYTHING
@@ -78,7 +79,7 @@ def _declared(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int]
     if isinstance(owner, ast.Attribute) and isinstance(object_, Self | OwnObject):
         is_read = isinstance(node.ctx, ast.Load)
         places = _places(object_, owner.attr, scope)
-        if len(places) != 1 or (not is_read and not _is_changed(node, modules)):
+        if len(places) != 1 or (not is_read and not _is_updated(node, modules)):
             return None
         return _keys_of(places[0].expression, owner.attr, modules)
     if not isinstance(node.ctx, ast.Load):
@@ -111,13 +112,9 @@ def _places(object_: Self | OwnObject, name: str, scope: FunctionTypes) -> list[
     ]
 
 
-def _is_changed(node: ast.Subscript, modules: Sequence[Module]) -> bool:
+def _is_updated(node: ast.Subscript, modules: Sequence[Module]) -> bool:
     """Return whether a subscript is the target of '+=' or the like, which reads it first."""
-    return any(
-        isinstance(item, ast.AugAssign) and item.target is node
-        for module in modules
-        for item in walk(module.tree.body)
-    )
+    return any(id(node) in updated_targets(module) for module in modules)
 
 
 def _keys_of(

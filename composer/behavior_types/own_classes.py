@@ -112,7 +112,7 @@ def constructor_of(owner: OwnClass) -> OwnClass | tuple[Function, OwnClass] | No
         if "__init__" in methods:
             function = methods["__init__"]
             return (function, own) if function is not None else None
-        if _DATACLASS in decorators_of(own):
+        if is_dataclass(own):
             return own if _makes_constructor(own) else None
         if is_named_tuple(own):
             return own
@@ -120,9 +120,7 @@ def constructor_of(owner: OwnClass) -> OwnClass | tuple[Function, OwnClass] | No
 
 
 def _makes_constructor(own: OwnClass) -> bool:
-    decorators = own.definition.node.decorator_list
-    options = {item.arg for node in decorators for item in getattr(node, "keywords", ())}
-    return not options & {"init", None}
+    return not _options(own).keys() & {"init", None}
 
 
 def is_dataclass(owner: OwnClass) -> bool:
@@ -153,13 +151,14 @@ def all_fields(owner: OwnClass) -> tuple[ClassField, ...]:
 
 
 def _all_by_name(own: OwnClass) -> bool:
-    options = [
-        item
-        for node in own.definition.node.decorator_list
-        for item in getattr(node, "keywords", ())
-        if item.arg == "kw_only"
-    ]
-    return any(not isinstance(item.value, ast.Constant) or item.value.value for item in options)
+    option = _options(own).get("kw_only")
+    return bool(option.value) if isinstance(option, ast.Constant) else option is not None
+
+
+def _options(own: OwnClass) -> dict[str | None, ast.expr]:
+    """Return the keyword arguments of the decorators of a class; None is that of ``**``."""
+    decorators = own.definition.node.decorator_list
+    return {item.arg: item.value for node in decorators for item in getattr(node, "keywords", ())}
 
 
 def is_enumeration(owner: OwnClass, *bases: str) -> bool:
@@ -189,15 +188,21 @@ def _own(definition: Class) -> Iterator[str]:
 
 
 @lru_cache(maxsize=128)
+def updated_targets(module: Module) -> frozenset[int]:
+    """Return the ``id`` of each target of '+=' and the like in a file, which is read first."""
+    nodes = walk(module.tree.body)
+    return frozenset(id(node.target) for node in nodes if isinstance(node, ast.AugAssign))
+
+
+@lru_cache(maxsize=128)
 def assigned_from_outside(module: Module) -> frozenset[str]:
     """Return the names that the file assigns as attributes of anything but ``self``."""
-    nodes = list(walk(module.tree.body))
-    changed = {id(node.target) for node in nodes if isinstance(node, ast.AugAssign)}
+    updated = updated_targets(module)
     return frozenset(
         node.attr
-        for node in nodes
+        for node in walk(module.tree.body)
         if isinstance(node, ast.Attribute)
         and isinstance(node.ctx, ast.Store)
-        and id(node) not in changed
+        and id(node) not in updated
         and not (isinstance(node.value, ast.Name) and node.value.id == "self")
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -71,14 +73,22 @@ def report(on: Bench, node: MemberNode, state: str) -> None:
     on.loop.run(lambda: node.on_report(MemberState(state, "silent for 1 s")))
 
 
-def test_a_node_hangs_only_if_late_reports_say_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@contextmanager
+def restart_of_failed_node(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[Bench, MemberNode, Process, Future[Any]]]:
+    """Restart a failed node whose reports are late from the beginning."""
     monkeypatch.setattr(member_node, "_REPORTED_WITHIN_S", 0.0)
     with bench(ExecutorKind.EVENTS) as on:
         process = Process()
-        node = failed_node(on, process, tmp_path)
-        restart = on.loop.run_task(node.run_step("configure", lambda: False))
+        node = failed_node(on, process, folder)
+        yield on, node, process, on.loop.run_task(node.run_step("configure", lambda: False))
+
+
+def test_a_node_hangs_only_if_late_reports_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with restart_of_failed_node(tmp_path, monkeypatch) as (on, node, process, restart):
         report(on, node, "active")  # the process was busy; this one may be older
         on.loop.run(lambda: None)
         assert not process.killed
@@ -91,11 +101,7 @@ def test_a_node_hangs_only_if_late_reports_say_so(
 def test_a_node_that_is_taken_down_late_does_not_hang(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(member_node, "_REPORTED_WITHIN_S", 0.0)
-    with bench(ExecutorKind.EVENTS) as on:
-        process = Process()
-        node = failed_node(on, process, tmp_path)
-        restart = on.loop.run_task(node.run_step("configure", lambda: False))
+    with restart_of_failed_node(tmp_path, monkeypatch) as (on, node, process, restart):
         report(on, node, "active")
         report(on, node, "unconfigured")
         wait_until(restart.done, "the end of the restart")
