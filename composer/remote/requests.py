@@ -17,11 +17,10 @@ from typing import Any, TypeAlias
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.task import Future
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.names import join_node_name
 from composer.remote.session import Deadline, NoResponseError, Session
-from composer.runtime.ros.graph import participant
+from composer.runtime.ros.graph import participant, servers_of
 
 _RETRY_AFTER_S = 1.0
 #: A process that does not respond for so long is busy, and has discovered the client long ago.
@@ -65,7 +64,7 @@ class ServiceCaller:
             raise NoResponseError(
                 f"no server of service '{name}' found within {deadline.timeout_s:g} s"
             )
-        servers = frozenset(map(participant, _servers(self._session, name)))
+        servers = frozenset(map(participant, servers_of(self._session.node, name)))
         if servers != self._knowing.get(name):
             wait_until_known(self._session, name, deadline)
             self._knowing[name] = servers
@@ -144,14 +143,9 @@ def _required(responses: Mapping[str, Any], deadline: Deadline) -> Any:
     return response
 
 
-def _servers(session: Session, service: str) -> list[TopicEndpointInfo]:
-    """Return the endpoints that receive the requests to a service."""
-    return session.node.get_subscriptions_info_by_topic(f"rq{service}Request", no_mangle=True)
-
-
 def _read_service(session: Session, service: str) -> str | None:
     """Return a service of the same process that changes nothing; of the same node if it has one."""
-    servers = _servers(session, service)
+    servers = servers_of(session.node, service)
     processes = set(map(participant, servers))
     own = {
         f"{join_node_name(server.node_namespace, server.node_name)}/{_READ_SERVICE}"
@@ -159,7 +153,7 @@ def _read_service(session: Session, service: str) -> str | None:
     }
     known = [name for name, types in session.graph.services() if _READ_TYPE in types]
     for name in sorted(known, key=own.__contains__, reverse=True):
-        if not processes.isdisjoint(map(participant, _servers(session, name))):
+        if not processes.isdisjoint(map(participant, servers_of(session.node, name))):
             return name
     return None
 

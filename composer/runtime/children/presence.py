@@ -8,7 +8,7 @@ from rclpy.node import Node as RosNode
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.model import Node, Port, PortKind
-from composer.runtime.ros.graph import RosGraph, participant
+from composer.runtime.ros.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.
 _COMMON_TOPICS = ("/rosout", "/parameter_events")
@@ -57,9 +57,8 @@ class NodePresence:
 
     def has_service(self, service: str, earlier: frozenset[bytes]) -> bool:
         """Return whether the node provides a service, by its full name."""
-        return any(
-            participant(endpoint) not in earlier for endpoint in self._own(self._servers(service))
-        )
+        servers = self._own(servers_of(self._manager, service))
+        return any(participant(endpoint) not in earlier for endpoint in servers)
 
     def _own(self, endpoints: Iterable[TopicEndpointInfo]) -> Iterator[TopicEndpointInfo]:
         for endpoint in endpoints:
@@ -75,20 +74,10 @@ class NodePresence:
             case PortKind.SUBSCRIPTION:
                 return list(self._manager.get_subscriptions_info_by_topic(name))
             case PortKind.SERVICE:
-                return self._servers(name)
+                return servers_of(self._manager, name)
             case PortKind.CLIENT:
-                return self._clients(name)
+                return clients_of(self._manager, name)
             case PortKind.ACTION_SERVER:
-                return self._servers(name + _SEND_GOAL)
+                return servers_of(self._manager, name + _SEND_GOAL)
             case PortKind.ACTION_CLIENT:
-                return self._clients(name + _SEND_GOAL)
-
-    # A service is a pair of DDS topics: its server reads requests, its clients write them.
-
-    def _servers(self, service: str) -> list[TopicEndpointInfo]:
-        topic = f"rq{service}Request"
-        return list(self._manager.get_subscriptions_info_by_topic(topic, no_mangle=True))
-
-    def _clients(self, service: str) -> list[TopicEndpointInfo]:
-        topic = f"rq{service}Request"
-        return list(self._manager.get_publishers_info_by_topic(topic, no_mangle=True))
+                return clients_of(self._manager, name + _SEND_GOAL)

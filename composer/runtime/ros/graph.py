@@ -221,6 +221,19 @@ class RosGraph:
         ]
 
 
+# A service is a pair of DDS topics: its server reads requests, its clients write them.
+
+
+def servers_of(node: Node, service: str) -> list[TopicEndpointInfo]:
+    """Return the endpoints that receive the requests to a service, as ``node`` discovered them."""
+    return list(node.get_subscriptions_info_by_topic(f"rq{service}Request", no_mangle=True))
+
+
+def clients_of(node: Node, service: str) -> list[TopicEndpointInfo]:
+    """Return the endpoints that send requests to a service, as ``node`` has discovered them."""
+    return list(node.get_publishers_info_by_topic(f"rq{service}Request", no_mangle=True))
+
+
 def participant(endpoint: TopicEndpointInfo) -> bytes:
     """Return the prefix of the participant with an endpoint."""
     return bytes(endpoint.endpoint_gid[:_PARTICIPANT_BYTES])

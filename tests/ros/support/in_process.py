@@ -35,6 +35,7 @@ from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.node.node import RunningNode
 from composer.runtime.process.shared_memory import remove_incomplete_ports
+from composer.runtime.ros.graph import servers_of
 from composer.runtime.supervision.events import (
     BroughtUp,
     Event,
@@ -44,7 +45,7 @@ from composer.runtime.supervision.events import (
     StateChanged,
 )
 from tests.ros.support.leaving import leave
-from tests.ros.support.service_calls import Call, ServiceClients, servers_of
+from tests.ros.support.service_calls import Call, ServiceClients, ids_of
 
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
 PATIENCE_S = 60.0
@@ -257,7 +258,7 @@ class Peer:
 
         Requests to a node that is being created again are lost until the new server is discovered.
         """
-        return servers_of(self.node, name)
+        return ids_of(servers_of(self.node, name))
 
     def call(self, kind: Any, name: str, request: Any = None) -> Any:
         """Call a service and return its response; see :class:`.ServiceClients`."""

@@ -8,26 +8,26 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from composer.runtime.ros.graph import participant, servers_of
 
 _REPEAT_AFTER_S = 0.5
 #: Names of service types that change nothing begin with these.
 _READS = ("Get", "List", "Describe", "Plan")
 #: Types of services that every node may call at any time.
 _SAFE = {"rcl_interfaces/srv/GetParameters": GetParameters, "lifecycle_msgs/srv/GetState": GetState}
-#: The id of an endpoint begins with that of its participant.
-_PARTICIPANT_BYTES = 12
 
 
-def servers_of(node: Node, name: str) -> set[bytes]:
-    """Return the ids of the servers of a service that a node has discovered."""
-    endpoints = node.get_subscriptions_info_by_topic(f"rq{name}Request", no_mangle=True)
-    return {bytes(endpoint.endpoint_gid) for endpoint in endpoints}
+def ids_of(servers: Iterable[TopicEndpointInfo]) -> set[bytes]:
+    """Return the ids of endpoints."""
+    return {bytes(server.endpoint_gid) for server in servers}
 
 
 class ServiceClients:
@@ -88,7 +88,11 @@ class _Client:
 
     def discovered(self) -> set[bytes]:
         """Return all servers when one of them is available."""
-        return servers_of(self._node, self._name) if self.of_rclpy.service_is_ready() else set()
+        return (
+            ids_of(servers_of(self._node, self._name))
+            if self.of_rclpy.service_is_ready()
+            else set()
+        )
 
     def acquainted(self) -> set[bytes]:
         """Return all servers when they are available and have discovered the client."""
@@ -156,17 +160,17 @@ class Acquaintance:
         One response is enough: the other servers may belong to a killed process.
         """
         servers = servers_of(self._node, self._name)
-        unknown = {server[:_PARTICIPANT_BYTES] for server in servers} - self._known
+        unknown = set(map(participant, servers)) - self._known
         if unknown and not self._has_response(unknown):
             return set()
         self._known |= unknown
-        return servers
+        return ids_of(servers)
 
     def _has_response(self, participants: set[bytes]) -> bool:
         """Send requests to participants until one responds."""
-        for participant, (name, kind) in self._services_to_call(participants - self._calls.keys()):
-            self._calls[participant] = _Client(self._node, kind, name).call(kind.Request())
-        responded = [participant for participant, call in self._calls.items() if call.done()]
+        for process, (name, kind) in self._services_to_call(participants - self._calls.keys()):
+            self._calls[process] = _Client(self._node, kind, name).call(kind.Request())
+        responded = [process for process, call in self._calls.items() if call.done()]
         if not responded:
             return False
         self._calls.clear()  # their clients would be too old for the next participant
@@ -182,7 +186,7 @@ class Acquaintance:
         # The manager node of a system has an executor of its own, which no node can block.
         for name, types in sorted(services, key=lambda service: "/manager/" not in service[0]):
             if types[0] in _SAFE:
-                found = {server[:_PARTICIPANT_BYTES] for server in servers_of(self._node, name)}
-                for participant in found & participants:
-                    yield participant, (name, _SAFE[types[0]])
+                found = set(map(participant, servers_of(self._node, name)))
+                for process in found & participants:
+                    yield process, (name, _SAFE[types[0]])
                 participants = participants - found
