@@ -1,4 +1,4 @@
-"""A headless Chromium, one for all tests of a process."""
+"""A headless Chromium, one for the tests of a file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, PROGRAMS)), None)
 
 
-@pytest.fixture(scope="session")
+# Playwright's event loop counts as running until it ends: in that time, no test of the process can run its own.
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     program = chromium()
     require(program, "no Chromium is installed")
