@@ -22,7 +22,7 @@ from tests.examples import register_profiles
 
 TESTS = Path(__file__).parent
 TESTS_WITH_ROS = TESTS / "ros"
-LONG_FILES = (TESTS_WITH_ROS, TESTS / "packaging")
+WAITING_FILES = (TESTS_WITH_ROS, TESTS / "packaging")
 #: These start no ROS node, so all of them share a domain.
 TESTS_WITHOUT_NODES = (TESTS / "unit", TESTS / "golden", TESTS / "properties")
 FAST_DDS_PROFILE = Path(__file__).with_name("udp_on_this_computer.xml")
@@ -97,9 +97,7 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    # With xdist's --no-loadscope-reorder: the long files come first, so that the workers finish at
-    # the same time.
-    items.sort(key=lambda item: not any(map(item.path.is_relative_to, LONG_FILES)))
+    _mix(items)
     if not config.getoption("--soak"):
         _deselect(config, items, "soak")
     may_skip = _may_skip()
@@ -108,6 +106,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.ros)
         if may_skip and item.get_closest_marker("ros"):
             item.add_marker(pytest.mark.skip(reason=NO_ROS))
+
+
+def _mix(items: list[pytest.Item]) -> None:
+    """Spread the files that mostly wait evenly among those that mostly compute.
+
+    With xdist's --no-loadscope-reorder, the workers run both kinds at all times.
+    """
+    files = dict.fromkeys(item.path for item in items)
+    waiting = [path for path in files if any(map(path.is_relative_to, WAITING_FILES))]
+    computing = [path for path in files if path not in waiting]
+    place = {
+        path: (number / len(group), number)
+        for group in (waiting, computing)
+        for number, path in enumerate(group)
+    }
+    items.sort(key=lambda item: (place[item.path], item.path))
 
 
 def _deselect(config: pytest.Config, items: list[pytest.Item], marker: str) -> None:

@@ -11,8 +11,7 @@ from composer.loading import load
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "pictures"
 
-#: The systems and their views.
-PICTURES = (
+_SHOWN = (
     ("talker_listener", View.NODES),
     ("pipeline", View.NODES),
     ("pipeline", View.CONNECTIONS),
@@ -25,14 +24,12 @@ PICTURES = (
     ("qos_patterns", View.CONNECTIONS),
     ("frames", View.FRAMES),
 )
+#: The systems and their views, by file name.
+PICTURES = {f"{system}-{view}.svg": (system, view) for system, view in _SHOWN}
 
 
-def pictures() -> dict[str, bytes]:
-    """Return the SVG images by file name. They are identical on all machines."""
-    return {f"{system}-{view}.svg": _drawn(system, view) for system, view in PICTURES}
-
-
-def _drawn(name: str, view: View) -> bytes:
+def drawn(name: str, view: View) -> bytes:
+    """Return an SVG image, identical on all machines."""
     path = ROOT / "systems" / f"{name}.yaml"
     loading = load(path, shown=f"systems/{name}.yaml")
     if loading.system is None:
@@ -44,8 +41,8 @@ def _drawn(name: str, view: View) -> bytes:
 def main() -> None:
     """Write all diagrams."""
     FOLDER.mkdir(exist_ok=True)
-    for name, drawn in pictures().items():
-        (FOLDER / name).write_bytes(drawn)
+    for file, (system, view) in PICTURES.items():
+        (FOLDER / file).write_bytes(drawn(system, view))
 
 
 if __name__ == "__main__":

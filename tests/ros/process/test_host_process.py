@@ -49,7 +49,12 @@ class Running:
                 self.process.wait(0.15)
                 break
             self.process.send_signal(signal.SIGINT)
-        code = self.process.wait(PATIENCE_S)
+        try:
+            code = self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.send_signal(signal.SIGABRT)  # prints the stacks of all threads
+            self.process.wait()
+            raise AssertionError(f"does not end: {self.text()}") from None
         return code, time.monotonic() - began_s
 
 
@@ -62,7 +67,7 @@ def compose_run(folder: Path, *arguments: object, **environment: str) -> Iterato
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
-            env={**os.environ, **environment},
+            env={**os.environ, "PYTHONFAULTHANDLER": "1", **environment},
         )
     try:
         yield Running(process, path)

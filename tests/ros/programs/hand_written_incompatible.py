@@ -53,7 +53,7 @@ def main() -> None:
     context.init([])
     odd = Node("odd", namespace="/lab", context=context)
     odd.create_publisher(String, "mixed", 10)
-    ActionServer(mapper, Navigate, "endless", work_forever)
+    server = ActionServer(mapper, Navigate, "endless", work_forever)
     executor = MultiThreadedExecutor(3)
     for node in (scanner, mapper, *(Node("twin", namespace="/lab") for _ in range(2))):
         executor.add_node(node)
@@ -61,6 +61,7 @@ def main() -> None:
     try:
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
+        server.destroy()  # the process may take long to end, with a participant that responds
         sys.exit(0)
 
 

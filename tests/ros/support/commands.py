@@ -157,7 +157,7 @@ def errors(*commands: tuple[object, ...]) -> list[str]:
     results = [process.communicate(timeout=PATIENCE_S) for process in processes]
     for process, (output, text) in zip(processes, results, strict=True):
         assert process.returncode == 1, text
-        assert output == ""
+        assert output == "", output
     return [text for _, text in results]
 
 
@@ -165,7 +165,7 @@ def expect_error(part: str, *arguments: object) -> str:
     """Repeat a command that must fail, until its stderr contains ``part``; return its stderr."""
     done = repeated(lambda done: done.returncode == 1 and part in done.stderr, *arguments)
     assert done.returncode == 1, done.stderr
-    assert done.stdout == ""
+    assert done.stdout == "", done.stdout
     assert part in done.stderr
     return done.stderr
 
