@@ -22,7 +22,7 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, PROGRAMS)), None)
 
 
-# Playwright's event loop counts as running until it ends: in that time, no test of the process can run its own.
+# Not for all files: until Playwright ends, no test of its process can run an event loop.
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     program = chromium()
