@@ -35,7 +35,8 @@ class RepeatLimit:
 
     def __init__(self, period_s: float = 1.0) -> None:
         self._period_s = period_s
-        self._lock = threading.Lock()
+        # Reentrant: garbage collection may report a lost exception, at any allocation.
+        self._lock = threading.RLock()
         self._subjects: dict[str, _Subject] = {}
 
     def admit(self, subject: str) -> Admission | None:

@@ -38,3 +38,18 @@ def test_the_number_of_subjects_is_limited(clock: list[float]) -> None:
     clock[0] += 1.0
     assert limit.admit("new") is not None
     assert list(limit._subjects) == ["new"]
+
+
+def test_a_line_may_cause_another_one_at_any_moment() -> None:
+    """As garbage collection does, if it finds an exception that was never retrieved."""
+    limit = RepeatLimit()
+
+    class Subject(str):
+        __slots__ = ()
+
+        def __hash__(self) -> int:
+            limit.admit("garbage")
+            return super().__hash__()
+
+    assert limit.admit(Subject("line")) is not None
+    assert limit.admit("garbage") is None
