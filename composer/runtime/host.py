@@ -76,6 +76,9 @@ _URGENT_S = 0.2
 _FEW_NODES = 20
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
 _SHORTEST_START_LIMIT_S = 5.0
+#: A phase that has a time limit and takes that much longer hangs: C code may hold the GIL forever,
+#: and then nothing in Python can end it. The last plan of a phase may be slow.
+_HANGS_AFTER_S = 60.0
 _MESSAGES_ARRIVE_WITHIN_S = 0.2
 
 
@@ -211,12 +214,18 @@ class Host:
 
     def _limit_start(self) -> None:
         """Limit the next call that joins the ROS graph: signals are not handled during it."""
-        if not self._is_end_limited:
-            self._options.end_within(max(self._options.grace_s, _SHORTEST_START_LIMIT_S))
+        self._limit(max(self._options.grace_s, _SHORTEST_START_LIMIT_S))
 
-    def _lift_start_limit(self) -> None:
+    def _limit_phase(self, phase_s: float) -> None:
+        """Limit a phase that may take this long, which may be infinite, with a minute to spare."""
+        self._limit(phase_s + _HANGS_AFTER_S if math.isfinite(phase_s) else None)
+
+    def _limit(self, limit_s: float | None) -> None:
+        """End the process after this time, unless the time to its end is limited already."""
         if not self._is_end_limited:
-            self._options.end_within(None)
+            self._options.end_within(limit_s)
+            if self._is_end_limited:  # meanwhile, by a signal or another thread
+                self._options.end_within(self._options.grace_s)
 
     def _make_listener(self, node: Node) -> NodeListener:
         return SupervisionListener(
@@ -226,7 +235,7 @@ class Host:
     def _create(self, process: ProcessContext) -> bool:
         try:
             self._node_set.create(process, self._limit_start)
-            self._lift_start_limit()
+            self._limit_phase(self._options.bring_up_within_s)
         except CreationFailed as error:
             at_s = self._reporter.elapsed_s
             self._reporter.report(events.RollingBack(at_s, error.node, str(error)))
@@ -250,6 +259,7 @@ class Host:
                 monitor.system_is_up()
                 self._supervise()
         finally:
+            self._limit_end()
             monitor.stop()
 
     def _bring_up(self) -> bool:
@@ -259,9 +269,9 @@ class Host:
         return not self._main_queue.stopping
 
     def _supervise(self) -> None:
-        run_for_s = self._options.run_for_s
-        end_s = math.inf if run_for_s is None else time.monotonic() + run_for_s
-        self._supervisor.run(self._run_command, end_s)
+        run_for_s = math.inf if self._options.run_for_s is None else self._options.run_for_s
+        self._limit_phase(run_for_s)
+        self._supervisor.run(self._run_command, time.monotonic() + run_for_s)
         if not self._main_queue.stopping:
             self._main_queue.request_stop("--for elapsed")
 

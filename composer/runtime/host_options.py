@@ -27,7 +27,8 @@ class HostOptions:
     ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
     cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled
     then: the end of Python may hang as well. It also limits each call of the start that may never
-    return from the middleware. ``ends_process`` promises that the process ends after the run, by
+    return from the middleware, and with a minute to spare the bring-up and the run if they have a
+    limit. ``ends_process`` promises that the process ends after the run, by
     ``os._exit`` if the outcome requires it. ``on_alive()`` is called every second.
     """
 

@@ -121,12 +121,15 @@ def test_a_behavior_that_cannot_be_imported_fails_the_bring_up(tmp_path: Path) -
 
 
 def test_a_system_stops_after_its_run_time(tmp_path: Path) -> None:
-    options = HostOptions(run_for_s=0.3)
+    limits: list[float | None] = []
+    options = HostOptions(run_for_s=0.3, bring_up_within_s=30.0, end_within=limits.append)
     system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), options, None)
     outcome = system.end()
     assert (outcome.exit_code, outcome.reason) == (0, "--for elapsed")
     up, stopping = system.reported(BroughtUp)[0], system.reported(Stopping)[0]
     assert stopping.elapsed_s - up.elapsed_s >= 0.3
+    # The start, with a limit for each node; the bring-up and the run, if they hang; the end.
+    assert limits == [10.0, 10.0, 10.0, 10.0, 90.0, 60.3, 10.0]
 
 
 HANG = """
