@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import ast
 import builtins
+import dataclasses
 import importlib
 import inspect
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 
 from composer import behavior
 from composer.behavior_source import Function, Method
 from composer.behavior_source.method_body import dotted
-from composer.behavior_types.bindings import is_class_method, is_static
+from composer.behavior_types.bindings import CONTEXTS, is_class_method, is_static
 from composer.behavior_types.lineage import PLAIN_BASES, lineage
 from composer.behavior_types.own_classes import (
     all_fields,
@@ -114,9 +115,10 @@ def signature_of(function: Function, *, is_bound: bool, name: str = "") -> Signa
     )
 
 
-_TRANSPARENT = frozenset(
-    {"abc.abstractmethod", "abstractmethod", "final", "override", "typing.override"}
-)
+_TRANSPARENT = CONTEXTS | {
+    *("abc.abstractmethod", "abstractmethod", "final", "override", "typing.override"),
+    *("cache", "functools.cache", "functools.lru_cache", "lru_cache"),
+}
 
 
 def _keeps_signature(function: Function, *, is_bound: bool) -> bool:
@@ -156,7 +158,7 @@ def _of_fields(own: OwnClass) -> Signature | None:
         match field.value:
             case ast.Call(func=function, keywords=keywords) if dotted(function).endswith("field"):
                 given = {keyword.arg: keyword.value for keyword in keywords}
-                if {"init", None} & given.keys():
+                if {"init", None} & given.keys() or given.keys() - _OF_FIELD:
                     return None
                 only = given.get("kw_only")
                 if only is not None:
@@ -166,6 +168,18 @@ def _of_fields(own: OwnClass) -> Signature | None:
         required += [field.name] if is_required else []
     name = own.definition.name
     return Signature(name, tuple(names), tuple(by_name), frozenset(required))
+
+
+def fields_signature(own: OwnClass, name: str, *, first: bool) -> Signature | None:
+    """Return the parameters of ``replace`` and the like: any of the fields, by name.
+
+    If ``first``, the object is the first argument.
+    """
+    constructed = _of_fields(own)
+    if constructed is None:
+        return None
+    names = (*constructed.positional, *constructed.keywords)
+    return Signature(name, ("object",) if first else (), names, frozenset())
 
 
 #: Methods whose signature Python does not report.
@@ -194,11 +208,18 @@ def method_signature(python: type, name: str) -> Signature | None:
 
 #: Modules of the standard library whose functions have signatures.
 _LIBRARY = frozenset({"copy", "json", "random"})
+_OF_FIELD = frozenset(inspect.signature(dataclasses.field).parameters)
+_BY_NAME: Mapping[str, Signature] = {
+    "collections.deque": Signature("deque", ("iterable", "maxlen"), (), frozenset()),
+    "dataclasses.field": Signature("field", (), tuple(sorted(_OF_FIELD)), frozenset()),
+}
 
 
 @cache
 def library_signature(name: str) -> Signature | None:
     """Return the parameters of a built-in function or one of the library; None if unknown."""
+    if name in _BY_NAME:
+        return _BY_NAME[name]
     module, _, last = name.rpartition(".")
     home = {"": builtins, "math": math}.get(module)
     if module in _LIBRARY:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from string import Formatter
 
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -25,6 +26,10 @@ def text_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
     match node:
         case ast.FormattedValue(value=value, conversion=-1, format_spec=ast.JoinedStr() as written):
             problem = _format_problem(scope.type_of(value), written)
+        case ast.Call(
+            func=ast.Attribute(value=ast.Constant(value=str() as text) as value, attr="format")
+        ):
+            problem = _call_problem(text, node, scope)
         case ast.Raise(exc=ast.expr() as value):
             problem = _raise_problem(scope.type_of(value))
         case _:
@@ -33,12 +38,65 @@ def text_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
         yield CodeProblem(Kind.VALUE, problem, span_of(value, scope.home.source))
 
 
+def _call_problem(text: str, call: ast.Call, scope: FunctionTypes) -> str | None:
+    """Return why ``"...".format(...)`` fails, None if it may be right."""
+    try:
+        fields = list(_replacements(text))
+    except ValueError as error:
+        return f"this is not a format: {error}"
+    names = {item.arg: item.value for item in call.keywords}
+    is_open = any(isinstance(item, ast.Starred) for item in call.args)
+    numbered = [name for name, _ in fields if name.isdigit()]
+    automatic = [name for name, _ in fields if not name]
+    if numbered and automatic:
+        return "numbered and automatic fields cannot be mixed"
+    needed = max([len(automatic), *(int(name) + 1 for name in numbered)])
+    if needed > len(call.args) and not is_open:
+        return f"{_counted(len(call.args), 'value')} for {_counted(needed, 'placeholder')}"
+    at = 0
+    for name, spec in fields:
+        value = names.get(name)
+        if not name or name.isdigit():
+            place = int(name) if name else at
+            at += not name
+            value = call.args[place] if place < len(call.args) and not is_open else None
+        elif value is None and None not in names and name.isidentifier():
+            return f"no value is given for '{name}'"
+        problem = _spec_problem(scope.type_of(value), spec) if value is not None else None
+        if problem is not None:
+            return problem
+    return None
+
+
+def _replacements(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the names of the fields of a format, and how each is written.
+
+    A field with an attribute, an index or a conversion may be written in any way: "".
+    """
+    for _, field, spec, conversion in Formatter().parse(text):
+        if field is None:
+            continue
+        name = re.split(r"[.\[]", field, maxsplit=1)[0]
+        inner = list(_replacements(spec)) if spec else []
+        is_plain = name == field and not conversion and not inner
+        yield name, (spec or "") if is_plain else ""
+        yield from ((other, "") for other, _ in inner)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" + ("" if count == 1 else "s")
+
+
 def _format_problem(value: Value, written: ast.JoinedStr) -> str | None:
     """Return why ``{value:format}`` fails, None if it may be right."""
     spec = "".join(
         str(part.value) if isinstance(part, ast.Constant) else "?" for part in written.values
     )
-    if not spec or "?" in spec:
+    return None if "?" in spec else _spec_problem(value, spec)
+
+
+def _spec_problem(value: Value, spec: str) -> str | None:
+    if not spec:
         return None
     is_plain = isinstance(value, OwnObject) and _has_no_format(value)
     is_collection = isinstance(value, Collection) and value.python in (list, dict, tuple, set)
@@ -60,9 +118,10 @@ def _has_no_format(value: OwnObject) -> bool:
 
 
 def percent_problem(
-    left: ast.expr, operator: ast.operator, right: ast.expr, value: Value
+    left: ast.expr, operator: ast.operator, right: ast.expr, scope: FunctionTypes
 ) -> str | None:
     """Return why ``"..." % (...)`` has too few or too many values, None if it may be right."""
+    value = scope.type_of(right)
     is_one = kind_of(value) in {"number", "text"} or isinstance(value, Message)
     if not isinstance(operator, ast.Mod) or not (isinstance(right, ast.Tuple) or is_one):
         return None
@@ -75,8 +134,19 @@ def percent_problem(
     if any(item["key"] or "*" in item[0] for item in found):
         return None
     if len(found) == len(items):
+        types = [scope.type_of(item) for item in items]
+        wrong = (_conversion_problem(*pair) for pair in zip(types, found, strict=True))
+        return next((problem for problem in wrong if problem is not None), None)
+    return f"{_counted(len(items), 'value')} for {_counted(len(found), 'placeholder')}"
+
+
+def _conversion_problem(value: Value, written: re.Match[str]) -> str | None:
+    """Return why ``%d`` and the like fail for a value, None if they may be right."""
+    is_known = kind_of(value) not in (None, "number", "bytes") and not isinstance(value, OwnObject)
+    if written["type"] not in "diouxXeEfFgG" or not (is_known or value is NONE):
         return None
-    return f"{len(items)} values for {len(found)} placeholders"
+    what = "None" if value is NONE else shown(value)
+    return f"{what} cannot be formatted with '{written[0]}'"
 
 
 def _raise_problem(value: Value) -> str | None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from composer.behavior_checks.arguments import (
     api_signature,
     constructor,
+    fields_signature,
     method_signature,
     signature_of,
 )
@@ -25,6 +26,8 @@ from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.hosted import rclpy_function
 from composer.behavior_types.objects import fields_expected
 from composer.behavior_types.own_classes import constructor_of
+from composer.behavior_types.protocols import special_method
+from composer.behavior_types.results import changed_tuple
 from composer.behavior_types.values import (
     ApiMethod,
     ApiValue,
@@ -87,8 +90,16 @@ class CallChecker:
                     yield from call_problems(node, parameters, self.scope)
             case CollectionMethod(owner=collection, name=name):
                 yield from method_problems(node, collection, name, self.scope)
+            case _ if (changed := changed_tuple(self.scope, node)) is not None:
+                parameters = fields_signature(changed.of, "_replace", first=False)
+                if parameters is not None:
+                    fields = fields_expected(self.scope, changed.of)
+                    yield from call_problems(node, parameters, self.scope, fields)
             case other:
                 yield from self.values.added(node)
+                special = special_method(self.scope, other, "__call__")
+                if special is not None:
+                    yield from self._own_call(node, special.node, special.home, is_bound=True)
                 reason = uncallable(other)
                 if reason is not None:
                     yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])

@@ -96,7 +96,7 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
     match node:
         case ast.BinOp(left=left, op=operator, right=right):
             problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
-            problem = problem or percent_problem(left, operator, right, scope.type_of(right))
+            problem = problem or percent_problem(left, operator, right, scope)
             if problem is not None:
                 about = blamed_name((left, right), scope)
                 yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)

@@ -9,6 +9,7 @@ from itertools import pairwise
 from composer.behavior_checks.arguments import (
     Signature,
     constructor,
+    fields_signature,
     library_signature,
     signature_of,
 )
@@ -17,8 +18,10 @@ from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.objects import fields_expected
 from composer.behavior_types.operators import is_float, operation_problem, order_problem
-from composer.behavior_types.values import ModuleFunction, OwnClass, OwnMethod, Value
+from composer.behavior_types.own_classes import is_dataclass
+from composer.behavior_types.values import ModuleFunction, OwnClass, OwnMethod, OwnObject, Value
 from composer.field_types import INTEGER
 
 #: Functions of math that do not take numbers only.
@@ -32,6 +35,9 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
         return
     if name in {"functools.partial", "functools.partialmethod"}:
         yield from _partial(call, scope)
+        return
+    if name == "dataclasses.replace":
+        yield from _replaced(call, scope)
         return
     signature = library_signature(name)
     if signature is not None:
@@ -73,6 +79,16 @@ def _range(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
             problem = f"'range' takes integers, not {shown(found)}"
             hint = None if kind_of(found) == "function" else "write range(len(...))"
             yield CodeProblem(Kind.VALUE, problem, span, hint)
+
+
+def _replaced(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check the fields that ``dataclasses.replace`` sets."""
+    found = scope.type_of(call.args[0]) if call.args else None
+    if not isinstance(found, OwnObject) or not is_dataclass(found.of):
+        return
+    signature = fields_signature(found.of, "replace", first=True)
+    if signature is not None:
+        yield from call_problems(call, signature, scope, fields_expected(scope, found.of))
 
 
 def _partial(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:

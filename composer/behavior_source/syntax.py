@@ -13,6 +13,7 @@ from pathlib import Path
 from composer.behavior_source.compilation import NotPython, parse
 from composer.behavior_source.method_body import Call, Function, dotted, imported_names, read_body
 from composer.behavior_source.modules import Unreadable, read_text
+from composer.behavior_source.named_tuples import called_tuples
 from composer.behavior_source.publishing import PublisherUses, publisher_uses
 from composer.behavior_source.spans import start_span
 from composer.fast_dataclass import dataclass
@@ -105,15 +106,18 @@ def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Modul
         raise Unreadable(f"is not Python: {error}", error.span) from None
     statements = tuple(_top_level(tree.body))
     names = dict(_imported_names(statements))
+    tuples = {item.name: item for item in called_tuples(statements, names)}
     classes = (item for item in statements if isinstance(item, ast.ClassDef))
     imports = dict(_imports(statements))
     return Module(
         path=path,
         source=source,
         tree=tree,
-        classes={item.name: _class(item, names, source) for item in classes},
+        classes={item.name: _class(item, names, source) for item in (*tuples.values(), *classes)},
         imports=imports,
-        assigned=frozenset(name.id for item in statements for name in _assigned(item)),
+        assigned=frozenset(
+            name.id for item in statements for name in _assigned(item) if name.id not in tuples
+        ),
         dynamic="*" in imports or any(_is_getattr(item) for item in statements),
         repeated=_repeated(statements),
     )

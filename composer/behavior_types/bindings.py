@@ -20,6 +20,7 @@ class How(Enum):
     ELEMENT = "element"  # the name is an element of this value
     ANNOTATION = "annotation"  # the expression is the annotation
     EXCEPTION = "exception"  # the name is an exception of this class
+    CONTEXT = "context"  # the name is what 'with' gives for this value
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +115,13 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     return found
 
 
+#: Decorators that make a context for 'with' of a generator.
+CONTEXTS = frozenset(
+    {"asynccontextmanager", "contextlib.asynccontextmanager"}
+    | {"contextlib.contextmanager", "contextmanager"}
+)
+
+
 def is_static(function: Function) -> bool:
     """Return whether a function is a static method, without the object as its first argument."""
     return any(
@@ -155,7 +163,7 @@ def _bind(node: ast.AST, found: Bindings) -> None:
             is_async = isinstance(node, ast.AsyncFor) or bool(getattr(node, "is_async", False))
             found.bind(node.target, None if is_async else node.iter, How.ELEMENT)
         case ast.withitem(optional_vars=ast.expr() as target):
-            found.bind(target, None)
+            found.bind(target, node.context_expr, How.CONTEXT)
         case ast.ExceptHandler(type=ast.expr() as caught, name=str() as name):
             found.bind(ast.Name(name), caught, How.EXCEPTION)
         case ast.ExceptHandler(name=name) | ast.MatchAs(name=name) | ast.MatchStar(name=name):

@@ -21,14 +21,11 @@ from composer.behavior_types.names import (
     function_named,
     interface_name,
 )
+from composer.behavior_types.protocols import entered, iterated
 from composer.behavior_types.rclpy_api import rclpy_value
 from composer.behavior_types.rebinding import joined, with_changes
 from composer.behavior_types.results import awaited, result_of
-from composer.behavior_types.standard_types import (
-    element_of,
-    exception_type,
-    sliced,
-)
+from composer.behavior_types.standard_types import exception_type, sliced
 from composer.behavior_types.values import (
     ApiValue,
     Collection,
@@ -88,7 +85,8 @@ class FunctionTypes:
             if isinstance(own, OwnClass):
                 return OwnObject(own)
             return exception_type(self.called_name(binding.expression))
-        found = self.type_of(binding.expression)
+        is_context = binding.how is How.CONTEXT
+        found = (entered if is_context else FunctionTypes.type_of)(self, binding.expression)
         if binding.how is How.ELEMENT:
             found = self.element(found)
         for position in binding.positions:
@@ -217,7 +215,7 @@ class FunctionTypes:
         function = function_named(name, home)
         if function is not None:
             return ModuleFunction(function, home)
-        constant = constant_named(name, home)
+        constant = constant_named(name, home) if name not in home.classes else None
         if isinstance(constant, ast.Constant):
             return constant_type(constant.value)
         scope = self.owner.at_module(home)
@@ -253,7 +251,7 @@ class FunctionTypes:
 
     def element(self, owner: Value) -> Value:
         """Return the type of what iterating over a value gives."""
-        found = element_of(owner)
+        found = iterated(self, owner)
         return self.normal(found) if isinstance(found, FieldType) else found
 
     def _at(self, owner: Value, position: int) -> Value:

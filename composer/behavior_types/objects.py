@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from composer.behavior_source import Function, Module
 from composer.behavior_source.flow import is_stub, returns_nothing
 from composer.behavior_source.method_body import argument, dotted
-from composer.behavior_types.bindings import Binding, How, bindings_of, nodes_of
+from composer.behavior_types.bindings import CONTEXTS, Binding, How, bindings_of, nodes_of
 from composer.behavior_types.inferred import inferred_result
 from composer.behavior_types.lineage import lineage
 from composer.behavior_types.literals import constant_type
@@ -179,7 +179,7 @@ def method_value(
         is_only = of is not None and not _may_differ(scope, of, function.name)
         inside = scope.owner.function(function, own.home, own)
         return inferred_result(inside, function) if is_only else ANYTHING
-    if not decorators <= {"staticmethod", "classmethod"} | _OF_METHODS:
+    if not decorators <= {"staticmethod", "classmethod"} | _OF_METHODS | CONTEXTS:
         return ANYTHING
     is_only = (
         of is not None and not is_rclpy(own.home) and not _may_differ(scope, of, function.name)
@@ -271,6 +271,8 @@ def returned_by(
     function, home, parameter = called.node, called.home, called.parameter
     result: Value = ANYTHING
     is_plain = not function.decorator_list
+    if {dotted(item) for item in function.decorator_list} & CONTEXTS:
+        return ANYTHING
     if function.returns is not None:
         result = annotation_in(scope, function.returns, home, parameter)
     elif not is_rclpy(home) and returns_nothing(function):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from composer.behavior_types.api_values import api_result
 from composer.behavior_types.objects import created_object, given_class, returned_by
+from composer.behavior_types.own_classes import is_named_tuple
+from composer.behavior_types.protocols import called_object
 from composer.behavior_types.rclpy_api import is_rclpy
 from composer.behavior_types.standard_types import builtin_result, called, method_result
 from composer.behavior_types.values import (
@@ -50,11 +52,16 @@ def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
             return returned_by(scope, function, node, inside=types if is_known else None)
         case OwnClass() as own:
             return created_object(scope, own, node)
+        case OwnObject() as owner if not is_rclpy(owner.of.home):
+            return called_object(scope, owner, node)
         case BuiltinMethod(python=python, name=name):
             named = {item.arg: scope.type_of(item.value) for item in node.keywords if item.arg}
             return builtin_result(python, name, [scope.type_of(item) for item in node.args], named)
         case CollectionMethod(owner=collection, name=name):
             return method_result(collection, name, [scope.type_of(item) for item in node.args])
+    changed = changed_tuple(scope, node)
+    if changed is not None:
+        return changed
     full = scope.called_name(node.func)
     if full == "super" and not node.args:
         return scope.owner.parent(scope)
@@ -62,6 +69,14 @@ def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
         return ANYTHING
     named = {item.arg: scope.type_of(item.value) for item in node.keywords if item.arg}
     return called(full, [scope.type_of(item) for item in node.args], named)
+
+
+def changed_tuple(scope: FunctionTypes, call: ast.Call) -> OwnObject | None:
+    """Return the named tuple that a call of ``_replace`` changes, None for other calls."""
+    if not isinstance(call.func, ast.Attribute) or call.func.attr != "_replace":
+        return None
+    found = scope.type_of(call.func.value)
+    return found if isinstance(found, OwnObject) and is_named_tuple(found.of) else None
 
 
 def awaited(awaitable: Value) -> Value:

@@ -81,6 +81,7 @@ _COLLECTIONS: Mapping[str, type] = {
     "collections.deque": deque,
     "itertools.cycle": itertools.cycle,
 }
+_COPYING = frozenset({"copy.copy", "copy.deepcopy", "dataclasses.replace"})
 _TEXTS = Collection(list, STRING)
 _OF_TEXT: Mapping[str, Value] = {
     **dict.fromkeys(
@@ -131,7 +132,7 @@ def called(name: str, arguments: Sequence[Value], keywords: Mapping[str, Value])
         return numpy_result(name.removeprefix("numpy."), arguments, keywords)
     if name in _CALLS:
         return _CALLS[name]
-    if name in {"copy.copy", "copy.deepcopy"} and len(arguments) == 1:
+    if name in _COPYING and len(arguments) == 1:
         return arguments[0]
     if name == "range":
         return Collection(range, INTEGER)

@@ -188,6 +188,14 @@ MISTAKES = [
     ("configure", "while True:\n    self.count = 1", "endless-loop", "while", "sleep"),
     ("drive", "while not goal.is_cancel_requested:\n    pass", "endless-loop", "while", None),
     ("drive", "time.sleep(1.0)", "blocking-call", "time.sleep", "self.clock.sleep"),
+    # formats
+    ("odometry", "'{} of {}'.format(self.count)", "invalid-value", "'{} of {}'", None),
+    ("odometry", "'{0} of {2}'.format(1, 2)", "invalid-value", "'{0} of {2}'", None),
+    ("odometry", "'{:{width}}'.format(1, size=2)", "invalid-value", "'{:{width}}'", None),
+    ("odometry", "'{0} of {}'.format(1, 2)", "invalid-value", "'{0} of {}'", None),
+    ("odometry", "'{:.1f}'.format('a')", "invalid-value", "'{:.1f}'", None),
+    ("odometry", "'{: of {}'.format(1)", "invalid-value", "'{: of {}'", None),
+    ("odometry", "'%d times' % self._text()", "invalid-value", None, None),
     # tuples and loops
     ("odometry", "for index, x, y in enumerate([(1.0, 2.0)]):\n    pass", "invalid-value",
      "enumerate([(1.0, 2.0)])", None),

@@ -12,6 +12,8 @@ from tests.unit.support.checking import diagnostics_in, quoted
 SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
 SHAPES = """\
 import abc
+from collections import namedtuple
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum, Flag
 
@@ -19,6 +21,9 @@ import numpy as np
 from geometry_msgs.msg import Point
 
 SIZES = {"small": 1.0, "large": 2.0}
+
+
+Size = namedtuple("Size", "width, height", defaults=[1.0])
 
 
 class Side(Enum):
@@ -93,6 +98,31 @@ class Plan:
         return np.zeros(3)
 
 
+class Filter:
+    def __init__(self, gain):
+        self.gain = gain
+        self.sides = [Side.LEFT]
+
+    def __call__(self, value):
+        return value * self.gain
+
+    def __iter__(self):
+        for side in Side.LEFT, Side.RIGHT:
+            yield side
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        print(error)
+
+
+@contextmanager
+def lit(color):
+    print(color)
+    yield Side.LEFT
+
+
 def nothing():
     print("nothing")
 """
@@ -103,8 +133,10 @@ import shapes
 from geometry_msgs.msg import Point, Pose
 from shapes import Plan
 from shapes import shapes as all_shapes
+from collections import deque
+from dataclasses import replace
 from shapes.shapes import (
-    SIZES, Light, Named, Place, Shape, ShapeError, Side, Square, nothing
+    SIZES, Filter, Light, Named, Place, Shape, ShapeError, Side, Size, Square, lit, nothing
 )
 
 
@@ -135,6 +167,12 @@ RIGHT = [
     "point.x = float(self.plan.values().mean())",
     "print(np.fft.rfft(self.plan.values()), np.some_function_of_the_future)",
     "raise ShapeError(self.square, 'too large')",
+    "print(Size(1.0).height, Size(height=2, width=1)[0], Size(*'ab')._asdict())",
+    "print(Size(1.0)._replace(height='a').height, Size._fields)",
+    "print(replace(Named(1.0), x=2.0, name='b').name)",
+    "print(Filter(2.0)(3.0), [side.name for side in Filter(gain=1)])",
+    "with Filter(1) as filter, lit('red') as side: print(filter.gain, side.is_left)",
+    "print(deque([1], maxlen=5).maxlen)",
 ]
 
 
@@ -164,6 +202,19 @@ RIGHT = [
         ("pose.position = Side.LEFT", "invalid-value", "Side.LEFT"),
         ("point.x = self.plan.values()", "invalid-value", "self.plan.values()"),
         ("print(self.plan.values().average())", "unknown-attribute", "average"),
+        ("Size()", "call-arguments", "Size"),
+        ("Size(1, 2, 3)", "call-arguments", "3"),
+        ("print(Size(1, 2).length)", "unknown-attribute", "length"),
+        ("print(Size(1)._replace(length=2).width)", "call-arguments", "length"),
+        ("replace(Place(1.0), z=2.0)", "call-arguments", "z"),
+        ("replace(Place(1.0), x='a')", "call-arguments", "'a'"),
+        ("Filter(2.0)(1.0, 2.0)", "call-arguments", "2.0"),
+        ("print([side.left for side in Filter(1)])", "unknown-attribute", "left"),
+        ("for side in Place(1.0): print(side)", "invalid-value", "Place(1.0)"),
+        ("with lit() as side: print(side)", "call-arguments", "lit"),
+        ("with lit('red') as side: print(side.left)", "unknown-attribute", "left"),
+        ("with Filter(1) as filter: print(filter.gains)", "unknown-attribute", "gains"),
+        ("deque([1], max=5)", "call-arguments", "max"),
         ("np.columnstack((point.x, point.y))", "unknown-import", "columnstack"),
         ("np.fft.rfftt([1.0])", "unknown-import", "rfftt"),
     ],
@@ -187,6 +238,9 @@ def test_right_code_is_not_reported(statement: str, tmp_path: Path) -> None:
         ("self.size * self.size", "self.size * self.side", "unknown-attribute", "side"),
         ('self.counts["used"] += 1', 'self.counts["use"] += 1', "invalid-value", '"use"'),
         ("self.shape = shape", "self.form = shape", "unknown-attribute", "shape"),
+        ('default=""', "default=[]", "invalid-value", "[]"),
+        ('default=""', "default_factory=[]", "invalid-value", "[]"),
+        ("default=", "defualt=", "call-arguments", "defualt"),
         ("np.zeros(3)", "np.zeroes(3)", "unknown-import", "zeroes"),
         ("self is Side.LEFT", "self is Side.LEFT)", "python-syntax", ")"),
     ],
