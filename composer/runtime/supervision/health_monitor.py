@@ -53,7 +53,9 @@ class HealthMonitor:
         self._report = report
         self._end = threading.Event()
         self._callbacks: dict[FrameType, _ObservedCallback] = {}  # by their calls
-        silences = {name: _NodeSilence(name, node_set) for name in node_set.nodes}
+        # What nodes of other processes send is not known here; those of the system check it there.
+        own = [name for name, node in node_set.nodes.items() if node.model.in_process]
+        silences = {name: _NodeSilence(name, node_set) for name in own}
         self._silences = {name: silence for name, silence in silences.items() if silence.has_limits}
         self._period_s = _period_s(node_set)
         self._checked_s = time.monotonic()
