@@ -207,6 +207,7 @@ class Peer:
         self.context = Context()
         self.context.init([])
         self.node = Node(f"peer_{os.getpid()}", context=self.context)
+        self._joined: list[Node] = []
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self._services = ServiceClients(self.node, wait_until)
@@ -217,11 +218,14 @@ class Peer:
         self._executor.shutdown()
         self.context.try_shutdown()
         self._thread.join(PATIENCE_S)
-        leave(self.node)
+        # Each: a lifecycle node would keep the participant, and so all services, in the ROS graph.
+        for node in (*self._joined, self.node):
+            leave(node)
 
     def join(self, name: str, kind: type[N] = Node) -> N:  # type: ignore[assignment]
         """Return one more node of the same participant."""
         node = kind(f"{name}_{os.getpid()}", context=self.context)
+        self._joined.append(node)
         self._executor.add_node(node)
         return node
 
