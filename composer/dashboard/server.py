@@ -16,6 +16,7 @@ from typing import Any
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from composer.dashboard.access import Refusal
 from composer.dashboard.app import AccessCheck, refusal_page, security_headers
@@ -33,6 +34,8 @@ BACKLOG = 128
 _MAX_HEADERS = 16 * 1024
 #: A browser that has not answered a ping after this time is disconnected.
 _PING_S = 20.0
+#: A browser that has not confirmed the end of its connection after this time is disconnected.
+_CLOSED_WITHIN_S = 2.0
 _END_S = 1
 
 
@@ -71,7 +74,7 @@ def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], Non
     config = uvicorn.Config(
         app,
         http=_GuardedProtocol,
-        ws="websockets-sansio",
+        ws=_WebSocketProtocol,
         loop="asyncio",
         lifespan="off",
         interface="asgi3",
@@ -113,6 +116,14 @@ class _Server(uvicorn.Server):
         await ended.wait()
         self.should_exit = True
         await self._app.close()
+
+
+class _WebSocketProtocol(WebSocketsSansIOProtocol):
+    """Does not wait long for the other side when a connection ends."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.close_timeout = _CLOSED_WITHIN_S
 
 
 class _GuardedProtocol(H11Protocol):

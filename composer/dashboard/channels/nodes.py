@@ -22,6 +22,8 @@ _PERIOD_S = 1.0
 _SOON_S = 0.25
 #: Linux counts the CPU time in steps of 10 ms, so a longer time is also more precise.
 _USAGE_PERIOD_S = 1.8
+#: Without a second measurement, there is no CPU time to show.
+_FIRST_USAGE_PERIOD_S = 0.8
 #: Reports arrive a little earlier or later than after a second.
 _EARLY = 0.8
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
@@ -84,7 +86,8 @@ class NodesFeed(Feed):
             return
         self._last, self._due_s = (states, held_down, activities), now_s + _PERIOD_S * _EARLY
         if now_s >= self._usage_due_s:
-            self._usage_due_s = now_s + _USAGE_PERIOD_S
+            is_first = not self._usage
+            self._usage_due_s = now_s + (_FIRST_USAGE_PERIOD_S if is_first else _USAGE_PERIOD_S)
             self._usage = self._measured(reports.values())
         nodes = [self._managed(name, node) for name, node in managed.values()]
         nodes += [self._other(*item) for item in states.items() if item[0] not in managed]

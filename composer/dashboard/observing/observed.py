@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Set
+from collections.abc import Callable, Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Self
 
 from composer.dashboard.observing.log_lines import LogLines
@@ -33,9 +33,11 @@ _NEW_S = 4.0
 _FIRST_WITHIN_S = 1.0
 _FIRST_REPORTS_WITHIN_S = 1.5
 _FIRST_POLL_S = 0.03
-#: After a change of the graph, endpoints are queried at once if names have changed, else less
-#: often: they take at most this share of a processor.
+#: After a change of the graph, endpoints are queried at once if names have changed, and soon
+#: again, as the endpoints of a new node follow its name; else less often: they take at most this
+#: share of a processor.
 _ENDPOINTS_PERIOD_S = 5.0
+_ENDPOINTS_SOON_S = 1.0
 _SHARE = 0.03
 #: What no feed has looked at for this time is queried again.
 _CERTAIN_S = 10.0
@@ -61,6 +63,7 @@ class Observed:
         ``on_report`` is called on another thread when a system has reported.
         """
         self._session = session
+        self._on_report = on_report
         self.meters = TopicMeters(session)
         self.reports = SystemReports(session, on_report)
         self.log = LogLines(session)
@@ -106,13 +109,16 @@ class Observed:
         names = (graph.nodes(), graph.topics(), graph.services())
         if names == self._names and now_s < self._endpoints_due_s:
             return self._topology
+        has_new_names = names != self._names
         self._names, self._change, self._certain_s = names, change, now_s
         used_s = time.thread_time()
         nodes, counts = self._query()
         if nodes != self._topology.nodes or counts != self._topology.counts:
             self._topology = Topology(self._topology.revision + 1, nodes, counts)
         used_s = time.thread_time() - used_s
-        period_s = _NEW_PERIOD_S if is_new else _ENDPOINTS_PERIOD_S
+        period_s = _ENDPOINTS_SOON_S if has_new_names else _ENDPOINTS_PERIOD_S
+        if is_new:
+            period_s = _NEW_PERIOD_S
         self._endpoints_due_s = time.monotonic() + max(period_s, used_s / _SHARE)
         return self._topology
 
@@ -156,6 +162,11 @@ class Observed:
         }
         others = self.topology().lifecycle_nodes - managed.keys()
         return self._states.of(others) | managed
+
+    def learn_states(self, states: Mapping[str, str]) -> None:
+        """Take over states that nodes have just reached, so that they are shown at once."""
+        self._states.learn(states)
+        self._on_report()
 
 
 def first_topology() -> Topology | None:
@@ -291,8 +302,14 @@ class _States:
         self._session = session
         self._work = work
         self._known: dict[str, str | None] = {}
+        self._learned = 0
         self._due_s = 0.0
         self._is_asking = False
+
+    def learn(self, states: Mapping[str, str]) -> None:
+        """Take over states that are newer than the last answers, on any thread."""
+        self._learned += 1
+        self._known = {**self._known, **states}
 
     def of(self, nodes: Set[str]) -> dict[str, str | None]:
         """Return the states that are known, and ask for new ones if it is time."""
@@ -303,9 +320,15 @@ class _States:
         return {node: self._known.get(node) for node in nodes}
 
     def _ask(self, nodes: list[str]) -> None:
+        learned = self._learned
+        period_s = _STATES_PERIOD_S
         try:
             client = LifecycleClient(self._session, Deadline(_STATES_WITHIN_S))
-            self._known = client.states(nodes)
+            answers = client.states(nodes)
+            if learned == self._learned:
+                self._known = answers
+            else:
+                period_s = 0.0  # some of the answers may be older than what was learned
         finally:
-            self._due_s = time.monotonic() + _STATES_PERIOD_S
+            self._due_s = time.monotonic() + period_s
             self._is_asking = False

@@ -131,7 +131,7 @@ def transition(values: Values, dashboard: Dashboard) -> Prepared:
         batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
         outcomes = batch.run(dependents=dependents)
         return {
-            "outcomes": _completed(outcomes),
+            "outcomes": _completed(ros, outcomes),
             "active_dependents": [] if dependents else list(batch.active_dependents),
         }
 
@@ -153,7 +153,7 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
         for state in ("unconfigured", "active"):
             request = LifecycleRequest(None, state)
             batch = LifecycleBatch(ros.session, deadline, [name], request)
-            outcomes += _completed(batch.run(dependents=True))
+            outcomes += _completed(ros, batch.run(dependents=True))
         return {"outcomes": outcomes, "message": ""}
 
     return run, _RESTART_S
@@ -201,10 +201,12 @@ def command(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _CHANGE_S
 
 
-def _completed(outcomes: Iterable[NodeOutcome]) -> list[dict[str, Any]]:
+def _completed(ros: RosGraphSide, outcomes: Iterable[NodeOutcome]) -> list[dict[str, Any]]:
     """Return all changes. Raises RequestError for the first that failed, after the others."""
     found = list(outcomes)
+    changes = [outcome.result for outcome in found if outcome.result is not None]
+    ros.observed.learn_states({change.node: change.after for change in changes})
     for outcome in found:
         if outcome.error is not None:
             raise from_ros(outcome.error)
-    return [asdict(outcome.result) for outcome in found if outcome.result is not None]
+    return [asdict(change) for change in changes]
