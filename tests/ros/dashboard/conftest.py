@@ -9,7 +9,7 @@ import pytest
 
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import Browser, Dashboard, browser, dashboard
-from tests.ros.support.pages import opened
+from tests.ros.support.pages import allowed, watched
 from tests.ros.support.system_process import REPOSITORY, RunningSystem
 
 if TYPE_CHECKING:
@@ -40,8 +40,15 @@ def page(server: Dashboard) -> Iterator[Browser]:
         yield opened
 
 
+@pytest.fixture(scope="module")
+def context(browser: sync_api.Browser, server: Dashboard) -> Iterator[sync_api.BrowserContext]:
+    """What all pages of a file share: the cookie, and the files of the page."""
+    with allowed(browser, server.address) as shared:
+        yield shared
+
+
 @pytest.fixture
-def view(browser: sync_api.Browser, server: Dashboard) -> Iterator[sync_api.Page]:
-    """The page in a real browser."""
-    with opened(browser, server.address) as opened_page:
-        yield opened_page
+def view(context: sync_api.BrowserContext, server: Dashboard) -> Iterator[sync_api.Page]:
+    """A page in a real browser, before it has loaded a view."""
+    with watched(context, server.address) as page:
+        yield page

@@ -33,6 +33,7 @@ def node(name: str) -> str:
 
 
 def test_the_graph_shows_states_rates_and_details(view: Page) -> None:
+    view.goto("/")
     expect_text(view.locator(f'{node(PLANNER)}[data-state="active"]'), "planner")
     expect_text(view.locator(".world [data-label]"), r"[23]\d\.?\d* Hz")  # about 30
     expect_text(view.locator(node("/lab/talker")), "no lifecycle|talker")
@@ -57,6 +58,7 @@ def test_the_graph_shows_states_rates_and_details(view: Page) -> None:
 
 
 def test_every_view_has_an_address_and_a_key(view: Page) -> None:
+    view.goto("/")
     for number, name in enumerate(VIEWS, 1):
         view.keyboard.press(str(number))
         view.wait_for_url(f"**/{name}")
@@ -69,9 +71,9 @@ def test_every_view_has_an_address_and_a_key(view: Page) -> None:
     view.click("tbody a:has-text('timer control')")
     view.locator(".histogram rect").first.wait_for()
     expect_text(view.locator(".facts:visible"), r"p99[\d.]+ (ms|µs)")
-    view.goto("/graph?view=lifecycle")
+    visit(view, "/graph?view=lifecycle")
     expect_text(view.locator(".world"), "configure")
-    view.goto("/topics")
+    visit(view, "/topics")
     expect_text(view.locator("tr[data-key='/sensor_data'] td"), "^best effort, volatile$")
 
 

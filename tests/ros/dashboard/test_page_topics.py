@@ -164,7 +164,7 @@ def test_images_are_shown(view: Page) -> None:
         )
         assert drawn[0] >= 320
         assert drawn[1] == 255  # opaque: something was drawn
-        view.goto("/topics/camera/compressed?tab=image")
+        visit(view, "/topics/camera/compressed?tab=image")
         expect_text(detail(view), r"1 . 1 png")
 
 
@@ -178,7 +178,7 @@ def test_a_message_is_published_from_a_form(view: Page) -> None:
     expect_text(view.locator(".publish .status"), r"^\d{2,} published to 1 subscription$")
     view.click("form >> text=Stop")
     view.locator("form >> text=Repeat").wait_for()
-    view.goto("/topics/lab/received")
+    visit(view, "/topics/lab/received")
     expect_text(view.locator(".message"), "hello <b>you</b>")
 
 
@@ -198,7 +198,7 @@ def test_a_service_is_called(view: Page) -> None:
     view.click("form >> text=Call")
     expect_text(detail(view), r"Response after [\d.]+ ms")
     expect_text(detail(view).locator(".message"), "trajectory|path|points|success")
-    view.goto("/services/lab/add")
+    visit(view, "/services/lab/add")
     view.get_by_label("data").check()
     view.click("form >> text=Call")
     expect_text(detail(view).locator(".message"), "switched")
@@ -226,6 +226,7 @@ def test_a_request_with_lists_and_ranges(view: Page) -> None:
 
 
 def test_what_is_not_there_is_named(view: Page) -> None:
+    view.goto("/topics")
     for kind in ("topic", "service", "action"):
         visit(view, f"/{kind}s/lab/missing")
         expect_text(detail(view), f"There is no {kind} /lab/missing")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tests.ros.support.dashboard import Address
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Locator, Page
+    from playwright.sync_api import Browser, BrowserContext, Locator, Page
 
 PATIENCE_MS = 60_000
 VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
@@ -19,14 +19,31 @@ _READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
 
 
 @contextmanager
-def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]:
-    """Open the page for the length of the block.
-
-    At the end, it must not have complained, nor requested anything beyond the server.
-    """
+def _new_context(browser: Browser, address: Address, options: Any) -> Iterator[BrowserContext]:
     settings: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}, **options}
     context = browser.new_context(base_url=address.origin, **settings)
     context.set_default_timeout(PATIENCE_MS)
+    try:
+        yield context
+    finally:
+        context.close()
+
+
+@contextmanager
+def allowed(browser: Browser, address: Address) -> Iterator[BrowserContext]:
+    """A context for pages at 1280 x 800, which have the cookie of the dashboard."""
+    with _new_context(browser, address, {}) as context:
+        name, _, value = address.cookie.partition("=")
+        context.add_cookies([{"name": name, "value": value, "url": address.origin}])
+        yield context
+
+
+@contextmanager
+def watched(context: BrowserContext, address: Address) -> Iterator[Page]:
+    """Return a page, on which nothing is loaded yet, for the length of the block.
+
+    At the end, it must not have complained, nor requested anything beyond the server.
+    """
     page = context.new_page()
     complaints: list[str] = []
     requests: list[str] = []
@@ -35,14 +52,21 @@ def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]
     page.on("request", lambda request: requests.append(request.url))
     page.on("websocket", lambda socket: requests.append(socket.url))
     try:
-        page.goto(f"{address.origin}/?token={address.token}")
         yield page
         assert not complaints, complaints
         own = (address.origin, f"ws://{address.host}/ws", f"blob:{address.origin}")
         foreign = [url for url in requests if not url.startswith(own)]
         assert not foreign, foreign
     finally:
-        context.close()
+        page.close()
+
+
+@contextmanager
+def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]:
+    """Open the page, as a user does, for the length of the block."""
+    with _new_context(browser, address, options) as context, watched(context, address) as page:
+        page.goto(f"{address.origin}/?token={address.token}")
+        yield page
 
 
 def visit(page: Page, path: str) -> None:
