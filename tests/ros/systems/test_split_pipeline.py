@@ -24,6 +24,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.remote.systems.local_queries import local_report
 from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.ros.graph import RosGraph, participant
 from tests.ros.support.commands import (
     COMPOSE,
     code_of_end,
@@ -170,6 +171,22 @@ def test_the_ros_graph_is_that_of_one_process(
 def names_of(external: ExternalNode) -> list[str]:
     found = external.node.get_node_names_and_namespaces()
     return [f"{namespace}/{name}" for name, namespace in found]
+
+
+def participants_of(external: ExternalNode) -> str:
+    """Return the participants that have endpoints of the nodes, and which of them still announce.
+
+    Fast DDS has the lower half of the process id in the 5th and 6th byte of the prefix.
+    """
+    announcing = {prefix.hex() for prefix in RosGraph(external.node).participants()}
+    lines = [f"announcing: {sorted(announcing)}"]
+    for topic, _ in external.node.get_topic_names_and_types():
+        for endpoint in external.node.get_publishers_info_by_topic(topic):
+            name, prefix = endpoint.node_name, participant(endpoint)
+            pid = int.from_bytes(prefix[4:6], "little")
+            lines.append(f"{name} publishes {topic}: {prefix.hex()}, process ...{pid}")
+    running = sorted(int(path.name) & 0xFFFF for path in Path("/proc").glob("[0-9]*"))
+    return "\n".join([*lines, f"running: {running}"])
 
 
 def test_it_behaves_as_in_one_process(split: RunningSystem, external: ExternalNode) -> None:
@@ -349,7 +366,11 @@ def test_any_process_is_killed_fifty_times(
         wait_until(lambda: is_up(path), "all nodes", SOAK_PATIENCE_S)
         # Killed processes remain in the ROS graph for 20 s.
         external.spin_until(lambda: sorted(set(NODES) & set(names_of(external))) == sorted(NODES))
-        external.spin_until(lambda: all(names_of(external).count(n) == 1 for n in NODES), 60.0)
+        try:
+            external.spin_until(lambda: all(names_of(external).count(n) == 1 for n in NODES), 60.0)
+        except AssertionError as error:
+            error.add_note(f"listed: {names_of(external)}\n{participants_of(external)}")
+            raise
         for name in sorted(runs):  # the coordinating one first
             assert runs[name].stop()[0] == code_of_end(runs[name].output)
     wait_until(lambda: not processes_of(path), "the end of all processes")
