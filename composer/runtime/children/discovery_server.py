@@ -16,8 +16,8 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from composer.model import Discovery, LogLevel
@@ -31,9 +31,11 @@ _PROGRAM = "fast-discovery-server"
 _PROFILE = Path(__file__).parents[1] / "process" / "discovery_server.xml"
 #: The lease in the profile, and the time until clients have noticed its end.
 RESTART_DELAY_S = 6.0
-#: Until the server has passed on that the nodes have left. If it ends meanwhile, clients may not
-#: discover the nodes of the next start: see docs/decisions/0066-discovery.md.
-_LEAVING_S = 0.2
+#: A server that was idle for so long has passed on that the nodes have left. If it ends earlier,
+#: clients may not discover the nodes of the next start: see docs/decisions/0066-discovery.md.
+_IDLE_S = 0.2
+_IDLE_WITHIN_S = 1.0
+_POLL_S = 0.02
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
 _LOGGER = "composer"
@@ -108,13 +110,31 @@ def _outlast_lost(servers: list[_Server], wait_until: Callable[[float], bool]) -
 
 def _end(servers: list[_Server], children: ChildProcesses) -> None:
     """End all servers at the same time, and the launcher of their processes."""
-    if any(server.is_running for server in servers):
-        time.sleep(_LEAVING_S)
+    _wait_until_idle([pid for server in servers if (pid := server.pid) is not None])
     for server in servers:
         server.end()
     children.close(time.monotonic() + _ENDS_WITHIN_S + _KILLED_WITHIN_S)
     for server in servers:
         server.close()
+
+
+def _wait_until_idle(pids: Sequence[int]) -> None:
+    """Wait until processes have had nothing to do for a moment, on a busy computer a longer one."""
+    end_s = time.monotonic() + _IDLE_WITHIN_S
+    idle_s = time.monotonic() + _IDLE_S
+    while pids and time.monotonic() < min(idle_s, end_s):
+        time.sleep(_POLL_S)
+        if any(map(has_work, pids)):
+            idle_s = time.monotonic() + _IDLE_S
+
+
+def has_work(pid: int) -> bool:
+    """Return whether a thread of a process runs, or waits for a processor."""
+    states = []
+    for thread in Path(f"/proc/{pid}/task").glob("*/stat"):
+        with suppress(OSError):  # it has ended
+            states.append(thread.read_text(encoding="utf-8").rpartition(") ")[2][:1])
+    return "R" in states
 
 
 class _Server:
@@ -149,9 +169,9 @@ class _Server:
         return self._record.is_lost
 
     @property
-    def is_running(self) -> bool:
-        """Whether a server that was started here runs."""
-        return self._child is not None
+    def pid(self) -> int | None:
+        """The process id of a server that was started here."""
+        return None if self._child is None else self._child.pid
 
     def announce_delay(self) -> None:
         """Say why the server is not started at once."""
