@@ -37,6 +37,7 @@ class RunningSystem:
     """
 
     def __init__(self, system: str, *options: str, program: Sequence[str] = ()) -> None:
+        self.path = REPOSITORY / system
         command = ("run", system, *options)
         environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
         self.process = (

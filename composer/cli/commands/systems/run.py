@@ -288,7 +288,13 @@ def _run(
     from composer.runtime.process import StartRefused
     from composer.runtime.process.instance_lock import ALREADY_RUNS, AlreadyRunning
     from composer.runtime.process.service_manager import ALIVE, READY, STOPPING, ServiceManager
-    from composer.runtime.supervision.events import BroughtUp, Event, Logged, Stopping
+    from composer.runtime.supervision.events import (
+        BroughtUp,
+        Event,
+        Logged,
+        NodeFailed,
+        Stopping,
+    )
 
     with ExitStack() as stack:
         stack.enter_context(queued_output())
@@ -302,9 +308,10 @@ def _run(
         service_manager = ServiceManager()
 
         def report(event: Event) -> None:
-            # The process that has started this one prints the states of its nodes.
-            is_known = options.started_by and not isinstance(event, Logged)
-            if not is_known or severity_of(event) != "INFO":
+            # The process that has started this one prints the states of its nodes, and which have
+            # failed: it decides what follows.
+            is_known = not isinstance(event, Logged) and severity_of(event) == "INFO"
+            if not is_child or not (is_known or isinstance(event, NodeFailed)):
                 progress.show(event)
             log.show(event)
             if isinstance(event, BroughtUp | Stopping):
