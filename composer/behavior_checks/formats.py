@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 from collections.abc import Iterator
-from string import Formatter
 
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -73,7 +73,8 @@ def _replacements(text: str) -> Iterator[tuple[str, str]]:
 
     A field with an attribute, an index or a conversion may be written in any way: "".
     """
-    for _, field, spec, conversion in Formatter().parse(text):
+    formatter = importlib.import_module("string").Formatter()  # it takes time to import
+    for _, field, spec, conversion in formatter.parse(text):
         if field is None:
             continue
         name = re.split(r"[.\[]", field, maxsplit=1)[0]

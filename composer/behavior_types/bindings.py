@@ -49,6 +49,8 @@ class Bindings:
     receiver: str | None = None
     #: The names that the function asks for their class, so that they are of several.
     distinguished: set[str] = field(default_factory=set)
+    #: The names that the function asks for anything about their class, anywhere.
+    asked: set[str] = field(default_factory=set)
     #: The arguments of lambdas that get the elements of a list.
     elements: set[ast.AST] = field(default_factory=set)
     #: The annotations of the arguments of functions within the function, by name.
@@ -174,6 +176,14 @@ def _bind(node: ast.AST, found: Bindings) -> None:
             found.name(name)
         case ast.Call():
             _bind_keys(node, found)
+            match node:
+                case ast.Call(func=ast.Name(id=asking), args=[ast.Name(id=name), *_]):
+                    found.asked.update({name} if asking in _ASKING else ())
+        case ast.Match(subject=ast.Name(id=name)):
+            found.asked.add(name)
+        case ast.Try(body=body, handlers=handlers) if any(map(_tries, handlers)):
+            names = (item for item in walk(body) if isinstance(item, ast.Name))
+            found.asked.update(item.id for item in names)
         case ast.arg(arg=name, annotation=annotation) if node not in found.elements:
             # of a nested function or a lambda
             found.inner.setdefault(name, []).append(annotation)
@@ -227,6 +237,18 @@ def _bind_keys(call: ast.Call, found: Bindings) -> None:
             ):
                 found.elements.add(argument)
                 found.bind(ast.Name(argument.arg), items, How.ELEMENT)
+
+
+_ASKING = frozenset({"callable", "getattr", "hasattr", "isinstance", "issubclass", "type"})
+
+
+def _tries(handler: ast.ExceptHandler) -> bool:
+    """Return whether a handler expects a value of another class."""
+    caught = walk([handler.type]) if handler.type is not None else ()
+    return any(isinstance(item, ast.Name) and item.id in _OF_CLASSES for item in caught)
+
+
+_OF_CLASSES = frozenset({"AttributeError", "TypeError"})
 
 
 def _distinguished(test: ast.expr) -> Iterator[str]:

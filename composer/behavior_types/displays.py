@@ -30,8 +30,9 @@ def computed(scope: FunctionTypes, node: ast.expr) -> Value:
             return Collection(list, _common(scope, items), is_empty=not items)
         case ast.Tuple(elts=items):
             types = tuple(scope.type_of(item) for item in items)
-            has_more = any(isinstance(item, ast.Starred) for item in items)
-            return Collection(tuple, join_all(types), items=None if has_more else types)
+            # '()' is often the place of another tuple
+            is_open = not items or any(isinstance(item, ast.Starred) for item in items)
+            return Collection(tuple, join_all(types), items=None if is_open else types)
         case ast.GeneratorExp(elt=item):
             return Collection(GeneratorType, scope.type_of(item))
         case ast.Starred(value=value):

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING
 
-from composer.behavior_source import Module, helper_named
+from composer.behavior_source import Function, Module, helper_named
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.annotations import annotated
 from composer.behavior_types.bindings import Binding, Bindings, How
 from composer.behavior_types.displays import computed
+from composer.behavior_types.fillings import filled, fillings_of, is_fresh, without_none
 from composer.behavior_types.lineage import class_named
 from composer.behavior_types.literals import constant_type, integer_constant
 from composer.behavior_types.members import attribute_of
@@ -64,6 +65,8 @@ class FunctionTypes:
     arguments: Mapping[str, Value]
     #: The class of the method, if it is not that of the behavior.
     of_class: OwnClass | None = None
+    #: The function itself, if it is one.
+    function: Function | None = None
     _known: dict[int, Value] = field(default_factory=dict)
     _names: dict[str, Value] = field(default_factory=dict)
 
@@ -183,7 +186,7 @@ class FunctionTypes:
             return self._of_module(name)
         if name in self.bindings.distinguished:
             return ANYTHING
-        found = self.before_changes(name)
+        found = self._filled(name, self.before_changes(name))
         found = with_changes(
             found,
             ((op, self.type_of(value)) for op, value in self.bindings.name_changes.get(name, ())),
@@ -197,6 +200,18 @@ class FunctionTypes:
             return given
         # The annotation is reported; which of the two the function means is not known.
         return ANYTHING if isinstance(given, Message) else found
+
+    def _filled(self, name: str, found: Value) -> Value:
+        """Return the type of a name, with the elements that the function puts into it."""
+        if self.function is None or not isinstance(found, Collection) or not found.is_empty:
+            return found
+        if not all(is_fresh(item.expression) for item in self.bindings.names[name]):
+            return found
+        known = fillings_of(self.function, self.home)
+        fillings = known.found.get(name, ())
+        if not fillings or name in known.passed_on:
+            return found
+        return without_none(filled(found, ((self, item) for item in fillings)))
 
     def before_changes(self, name: str) -> Value:
         """Return the type of a name of the function without what '+=' and the like do to it."""

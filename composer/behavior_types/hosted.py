@@ -12,7 +12,7 @@ from composer.behavior_source.traversal import walk
 from composer.behavior_types.bindings import Bindings, nodes_of
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.handlers import Handler
-from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.inference import Assumed, BehaviorTypes
 from composer.behavior_types.literals import constant_type
 from composer.behavior_types.members import attribute_of
 from composer.behavior_types.names import own_name
@@ -132,8 +132,8 @@ class HostedTypes(BehaviorTypes):
             if found == self.handlers and lambdas == self.lambdas:
                 return
             self.handlers, self.lambdas = found, lambdas
-            self.forget()
-            del self.assigned
+            self.assumed = Assumed()
+            self.start_again()
         super().infer()
 
     def of_base(self, name: str) -> Value:

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from composer.behavior_source import BehaviorSource, Function, Method, Module
 from composer.behavior_source.method_body import dotted
@@ -18,6 +19,13 @@ from composer.behavior_types.bindings import (
     is_class_method,
 )
 from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.fillings import (
+    Filling,
+    filled,
+    fillings_of,
+    is_fresh,
+    without_none,
+)
 from composer.behavior_types.handlers import Handler, handlers_of
 from composer.behavior_types.lineage import class_named
 from composer.behavior_types.objects import method_value
@@ -26,7 +34,9 @@ from composer.behavior_types.project_classes import ProjectClasses, takes_object
 from composer.behavior_types.rebinding import joined, with_changes
 from composer.behavior_types.self_attributes import escapes, self_attributes
 from composer.behavior_types.values import (
+    NONE,
     ApiValue,
+    Collection,
     OwnClass,
     OwnMethod,
     OwnObject,
@@ -39,12 +49,33 @@ from composer.field_types import ANYTHING
 from composer.interfaces import Interfaces
 from composer.model import Node, PortKind
 
+if TYPE_CHECKING:
+    from composer.behavior_types.call_sites import CallSites
+
 #: ``self.publishers`` and the like.
 CONTAINERS: Mapping[str, PortKind] = {
     "publishers": PortKind.PUBLISHER,
     "clients": PortKind.CLIENT,
     "action_clients": PortKind.ACTION_CLIENT,
 }
+
+
+#: How often types are inferred, until they rest on nothing that has changed.
+_ROUNDS = 6
+
+
+@dataclass(slots=True)
+class Assumed:
+    """What a round of inference takes from the one before it.
+
+    These are the types of arguments, by the id of the function and by name, and of the attributes
+    that are empty at first. ``filled`` are the latter without their elements.
+    """
+
+    arguments: dict[tuple[int, str], Value] = field(default_factory=dict)
+    fillings: dict[str, Collection] = field(default_factory=dict)
+    filled: dict[str, Collection] = field(default_factory=dict)
+    is_settled: bool = True
 
 
 @dataclass()
@@ -61,6 +92,7 @@ class BehaviorTypes:
     #: The types of what functions without annotations return, by the id of the function.
     results: dict[int, Value] = field(default_factory=dict)
     depth: int = 0
+    assumed: Assumed = field(default_factory=Assumed)
     _at_modules: dict[int, FunctionTypes] = field(default_factory=dict)
     _functions: dict[int, FunctionTypes] = field(default_factory=dict)
 
@@ -69,8 +101,9 @@ class BehaviorTypes:
         if method.node is None:
             return None
         if id(method.node) not in self.scopes:
+            bindings, arguments = bindings_of(method.node), self.arguments_of(method)
             self.scopes[id(method.node)] = FunctionTypes(
-                self, home, bindings_of(method.node), self.arguments_of(method)
+                self, home, bindings, arguments, function=method.node
             )
         return self.scopes[id(method.node)]
 
@@ -86,8 +119,14 @@ class BehaviorTypes:
                     arguments = {positional[0].arg: OwnObject(own)} if is_object else {}
                 elif is_class_method(node):
                     arguments = {positional[0].arg: own}
-            self._functions[id(node)] = FunctionTypes(self, home, bindings, arguments, own)
+            arguments |= self.inferred_arguments(node)
+            self._functions[id(node)] = FunctionTypes(self, home, bindings, arguments, own, node)
         return self._functions[id(node)]
+
+    def inferred_arguments(self, function: Function) -> dict[str, Value]:
+        """Return the types of the arguments that all calls of a function pass."""
+        inferred = self.assumed.arguments
+        return {name: type_ for (key, name), type_ in inferred.items() if key == id(function)}
 
     @cached_property
     def project_classes(self) -> ProjectClasses:
@@ -158,8 +197,74 @@ class BehaviorTypes:
 
         A type that rests on itself, as in ``self.count = self.count + 1``, is found only so.
         """
+        for _ in range(_ROUNDS):
+            self.infer_attributes()
+            if not self.learn():
+                break
+            self.start_again()
+        else:
+            self.assumed = Assumed(is_settled=False)
+            self.start_again()
+            self.infer_attributes()
+
+    def start_again(self) -> None:
+        """Forget all types, and infer them again with what has been found."""
+        self.forget()
+        self.__dict__.pop("assigned", None)
+
+    def infer_attributes(self) -> None:
+        """Infer the types of all attributes, from what the last round has found."""
         for name in self.assigned:
             self.attribute(name)
+
+    def learn(self) -> bool:
+        """Return whether the types of arguments and elements have changed in this round."""
+        before = self.assumed
+        fillings = {
+            name: filled(empty, self._fillings(name)) for name, empty in before.filled.items()
+        }
+        arguments = self.call_sites.arguments() if self.has_open_functions else {}
+        self.assumed = Assumed(arguments, fillings)
+        if self.assumed == Assumed(before.arguments, before.fillings):
+            known = {name: without_none(found) for name, found in fillings.items()}
+            self.assumed = Assumed(self.assumed.arguments, known)
+            if known != fillings:
+                self.start_again()
+                self.infer_attributes()
+            return False
+        return True
+
+    def _fillings(self, name: str) -> list[tuple[FunctionTypes, Filling]]:
+        """Return what the methods put into ``self.<name>``, nothing if other code may as well."""
+        found: list[tuple[FunctionTypes, Filling]] = []
+        for scope in self.scopes.values():
+            if scope.function is not None:
+                known = fillings_of(scope.function, scope.home)
+                if f".{name}" in known.passed_on:
+                    return []
+                found += ((scope, item) for item in known.found.get(f".{name}", ()))
+        return found
+
+    @cached_property
+    def call_sites(self) -> CallSites:
+        """The calls of functions without annotations."""
+        from composer.behavior_types.call_sites import CallSites  # noqa: PLC0415 (start-up time)
+
+        return CallSites(self)
+
+    @cached_property
+    def has_open_functions(self) -> bool:
+        """Whether the files have functions with parameters that have no annotation."""
+        return any(
+            _is_open(function)
+            for home in self.source.own_modules
+            for functions in (
+                home.tree.body,
+                *((method.node for method in known.methods) for known in home.classes.values()),
+            )
+            for function in functions
+            if isinstance(function, Function)
+        )
 
     def forget(self) -> None:
         """Forget all types, since those of arguments have become known."""
@@ -227,6 +332,11 @@ class BehaviorTypes:
             of_itself = scope.reads_attribute(binding.expression, name)
             (computed if of_itself else plain).append((scope, binding))
         found = joined((scope.bound(binding), binding.how) for scope, binding in plain)
+        if isinstance(found, Collection) and found.is_empty and self.assumed.is_settled:
+            is_own = all(is_fresh(binding.expression) for _, binding in plain)
+            if is_own and self._fillings(name) and not self.self_escapes:
+                self.assumed.filled[name] = found
+                found = self.assumed.fillings.get(name, Collection(found.python, NONE, NONE))
         self._known[name] = found
         found = joined([(found, How.VALUE)] + [(s.bound(item), item.how) for s, item in computed])
         if found != self._known[name]:
@@ -267,7 +377,18 @@ class BehaviorTypes:
     def arguments_of(self, method: Method) -> Mapping[str, Value]:
         """Return the types of the arguments that the composer passes to a handler."""
         handler = self.handlers.get(method.name)
-        return dict(zip(method.arguments, handler.arguments if handler else (), strict=False))
+        given = dict(zip(method.arguments, handler.arguments if handler else (), strict=False))
+        return self.inferred_arguments(method.node) | given if method.node is not None else given
+
+
+def _is_open(function: Function) -> bool:
+    """Return whether a parameter other than the object has no annotation."""
+    arguments = function.args
+    positional = (*arguments.posonlyargs, *arguments.args)
+    parameters = (*positional[1:], *arguments.kwonlyargs, *positional[:1])
+    first = positional[0].arg if positional else ""
+    is_method = first in {"self", "cls"}
+    return any(item.annotation is None for item in parameters[: -1 if is_method else None])
 
 
 def _of_class(node: ast.ClassDef) -> Iterator[tuple[str, Binding]]:

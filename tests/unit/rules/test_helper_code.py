@@ -67,3 +67,93 @@ def _found(statement: str, inside: str, folder: Path) -> list[Diagnostic]:
     code = CODE.replace("{statement}", statement).replace("{inside}", inside)
     (folder / "code.py").write_text(code, encoding="utf-8")
     return diagnostics_in(SYSTEM, folder)
+
+
+WITHOUT_ANNOTATIONS = """\
+from collections import deque
+
+from geometry_msgs.msg import Point, PoseStamped
+from helper import Floor
+
+
+def gap(first, second, offset=0.0):
+    return first.x - second.x + offset
+
+
+class Code:
+    def on_configure(self):
+        self.points = []
+        self.floors = {}
+        self.recent = deque(maxlen=5)
+        self.raw = {}
+
+    def on_tick(self):
+        self.add("a", Floor(1.0))
+        self.points.append(Point())
+        lines = []
+        for point in self.points:
+            lines.append(self.line(point))
+            self.recent.append(gap(point, Point()))
+        self.show(lines[-1].upper(), Point())
+
+    def add(self, name, floor):
+        known = self.floors.get(name)
+        if known is None:
+            self.floors[name] = floor
+        self.raw[name] = [floor.height, name.title()]
+
+    def line(self, point):
+        return "at %.1f" % point.x
+
+    def show(self, text, item):
+        print(text.upper(), max(self.recent).real, self.floors["a"].height)
+        if hasattr(item, "header"):
+            print(item.header)
+        try:
+            print(item.pose)
+        except AttributeError:
+            self.recent.clear()
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule", "text"),
+    [
+        ("first.x", "first.w", "unknown-field", "w"),
+        ("point.x", "point.z.x", "unknown-field", "x"),
+        ("floor.height", "floor.heigth", "unknown-attribute", "heigth"),
+        ("name.title", "name.titel", "unknown-field", "titel"),
+        ("gap(point, Point())", "gap(point, PoseStamped())", "unknown-field", "x"),
+        ("append(self.line(point))", "append(gap(point, point))", "unknown-field", "upper"),
+        ('floors["a"].height', 'floors["a"].tall', "unknown-attribute", "tall"),
+        ("max(self.recent).real", "max(self.recent).value", "unknown-field", "value"),
+    ],
+)
+def test_what_calls_pass_is_the_type_of_an_argument(
+    old: str, new: str, rule: str, text: str, tmp_path: Path
+) -> None:
+    (tmp_path / "helper.py").write_text(HELPER, encoding="utf-8")
+    (tmp_path / "code.py").write_text(WITHOUT_ANNOTATIONS.replace(old, new, 1), encoding="utf-8")
+    [diagnostic] = diagnostics_in(SYSTEM, tmp_path)
+    assert (diagnostic.rule.name, quoted(diagnostic)) == (rule, text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("None", "None"),
+        # passed on: it may be called with anything, or be filled with anything
+        ("lines = []", "lines = sorted([], key=self.line)"),
+        ("lines = []", "lines = []\n        self.lines = lines"),
+        ("self.points.append(Point())", "self.points.append(Point()); getattr(self, 'line')(5)"),
+        # called with several types
+        ("def on_tick(self):", "def on_tick(self):\n        gap(Floor(1.0), Floor(1.0))"),
+        ("self.points.append(Point())", "self.points += [Point(), 5, 'a']"),
+    ],
+)
+def test_arguments_and_elements_that_may_be_others_are_not_reported(
+    old: str, new: str, tmp_path: Path
+) -> None:
+    (tmp_path / "helper.py").write_text(HELPER, encoding="utf-8")
+    (tmp_path / "code.py").write_text(WITHOUT_ANNOTATIONS.replace(old, new, 1), encoding="utf-8")
+    assert diagnostics_in(SYSTEM, tmp_path) == []
