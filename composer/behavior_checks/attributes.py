@@ -102,7 +102,9 @@ def attribute_problem(types: BehaviorTypes, owner: Value, name: str) -> Found | 
             hint = "write str(...)" if name == "message" else suggestion(name, dir(python))
             return Kind.ATTRIBUTE, f"{python.__name__} has no attribute '{name}'", hint
         case Collection(python=python) if not isabstract(python) and not hasattr(python, name):
-            return Kind.ATTRIBUTE, f"a {python.__name__} has no attribute '{name}'", None
+            close = nearest(name, dir(python))
+            hint = f"did you mean '{close}'?" if close is not None else None
+            return Kind.ATTRIBUTE, f"a {python.__name__} has no attribute '{name}'", hint
         case OwnClass() | OwnObject():
             return _of_own_class(types, owner, name)
         case OwnModule(module=module):
@@ -241,7 +243,9 @@ def _of_field(type_: FieldType, name: str, interfaces: Interfaces) -> Found | No
         python = _PYTHON_TYPES.get(type_.name)
         if python is None or hasattr(python, name):
             return None
-        return Kind.FIELD, f"{described(type_)} has no attribute '{name}'", None
+        close = nearest(name, dir(python))
+        hint = f"did you mean '{close}'?" if close is not None else None
+        return Kind.FIELD, f"{described(type_)} has no attribute '{name}'", hint
     element = interfaces.message(type_.name)
     if hasattr(list, name) or (element is None and name in _OF_ARRAYS):
         return None

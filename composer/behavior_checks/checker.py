@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from composer.behavior_checks.attributes import attribute_problem
 from composer.behavior_checks.awaiting import (
@@ -38,6 +39,7 @@ from composer.behavior_checks.rclpy_calls import transition_problems
 from composer.behavior_checks.returns import must_return, return_problems
 from composer.behavior_source import BehaviorSource, Function
 from composer.behavior_source.flow import returned_values
+from composer.behavior_source.method_body import dotted
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of
 from composer.behavior_types.annotations import annotated
@@ -60,6 +62,9 @@ from composer.interfaces import Interfaces, Message
 from composer.model import Node
 from composer.source import Span
 
+if TYPE_CHECKING:
+    from composer.behavior_checks.blame import Blame
+
 #: Attributes of awaitables that code may use instead of awaiting them.
 _OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exception", "send"})
 
@@ -79,9 +84,10 @@ def behavior_problems(
         yield from undeclared_parameters(types)
         yield from transition_problems(types)
     missing: set[str] = set()
+    blame = _blame(types)
     for checker in _checkers(types, source):
         try:
-            problems = list(distinct(checker.problems()))
+            problems = list(checker.blamed(blame))
         except RecursionError:  # too deeply nested to be checked
             continue
         for problem in problems:
@@ -92,6 +98,14 @@ def behavior_problems(
     yield from changing_attributes(types)
     yield from class_problems(types)
     yield from misspelled_attributes(source)
+
+
+def _blame(types: BehaviorTypes) -> Blame | None:
+    if not types.has_open_functions:
+        return None
+    from composer.behavior_checks.blame import Blame  # noqa: PLC0415 (start-up time)
+
+    return Blame(types.call_sites)
 
 
 def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_FunctionChecker]:
@@ -122,6 +136,17 @@ class _FunctionChecker:
     scope: FunctionTypes
     function: Function
     handler: Handler | None = None
+
+    def blamed(self, blame: Blame | None) -> Iterator[CodeProblem]:
+        """Yield the problems of the function, or of the calls that cause them."""
+        if blame is None:
+            return distinct(self.problems())
+        types, function, handler = self.types, self.function, self.handler
+        return blame.problems(
+            function,
+            self.scope,
+            lambda scope: _FunctionChecker(types, scope, function, handler).problems(),
+        )
 
     def problems(self) -> Iterator[CodeProblem]:
         """Yield the problems of the function."""
@@ -176,7 +201,10 @@ class _FunctionChecker:
             span = attribute_span(node, self.scope.home.source)
             if kind is Kind.VALUE:  # the value is wrong where it was stored
                 span = self._span(self._origin(node.value))
-            yield CodeProblem(kind, message, span, hint, about=scalar_name(node.value, owner))
+            about = scalar_name(node.value, owner)
+            if not (hint or "").startswith("did you mean"):
+                about = about or dotted(node.value)  # its other attributes have the same cause
+            yield CodeProblem(kind, message, span, hint, about=about)
 
     def _origin(self, node: ast.expr) -> ast.expr:
         """Return the expression that a name was assigned, if there is exactly one."""

@@ -63,9 +63,10 @@ def distinct(problems: Iterable[CodeProblem]) -> Iterator[CodeProblem]:
     for problem in problems:
         if problem.kind in _OF_VALUES:
             about = problem.about or _named(problem.span)
-            if about in blamed or any(_is_within(problem.span, other) for other in wrong):
+            is_same = problem.kind is Kind.FIELD and problem.message in blamed
+            if about in blamed or is_same or any(_is_within(problem.span, at) for at in wrong):
                 continue
-            blamed.update({about} - {""})
+            blamed.update({about, problem.message} - {""})
             wrong.append(problem.span)
         yield problem
 

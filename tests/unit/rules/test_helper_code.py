@@ -72,7 +72,7 @@ def _found(statement: str, inside: str, folder: Path) -> list[Diagnostic]:
 WITHOUT_ANNOTATIONS = """\
 from collections import deque
 
-from geometry_msgs.msg import Point, PoseStamped
+from geometry_msgs.msg import Point, PoseStamped, Vector3
 from helper import Floor
 
 
@@ -123,12 +123,16 @@ class Code:
         ("point.x", "point.z.x", "unknown-field", "x"),
         ("floor.height", "floor.heigth", "unknown-attribute", "heigth"),
         ("name.title", "name.titel", "unknown-field", "titel"),
-        ("gap(point, Point())", "gap(point, PoseStamped())", "unknown-field", "x"),
+        ("gap(point, Point())", "gap(point, PoseStamped())", "call-arguments", "PoseStamped()"),
+        ("self.show(lines[-1].upper()", "self.show(5", "call-arguments", "5"),
+        ("gap(point, Point())", "gap(point, Point(), 'a')", "call-arguments", "'a'"),
+        ("self.line(point))", "self.line(point)); lines.append(self.line(1.0))", "call-arguments",
+         "1.0"),
         ("append(self.line(point))", "append(gap(point, point))", "unknown-field", "upper"),
         ('floors["a"].height', 'floors["a"].tall', "unknown-attribute", "tall"),
         ("max(self.recent).real", "max(self.recent).value", "unknown-field", "value"),
     ],
-)
+)  # fmt: skip
 def test_what_calls_pass_is_the_type_of_an_argument(
     old: str, new: str, rule: str, text: str, tmp_path: Path
 ) -> None:
@@ -147,7 +151,7 @@ def test_what_calls_pass_is_the_type_of_an_argument(
         ("lines = []", "lines = []\n        self.lines = lines"),
         ("self.points.append(Point())", "self.points.append(Point()); getattr(self, 'line')(5)"),
         # called with several types
-        ("def on_tick(self):", "def on_tick(self):\n        gap(Floor(1.0), Floor(1.0))"),
+        ("def on_tick(self):", "def on_tick(self):\n        gap(Vector3(), Vector3())"),
         ("self.points.append(Point())", "self.points += [Point(), 5, 'a']"),
     ],
 )
