@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 from composer.behavior_checks.problems import CodeProblem, Kind, distinct
 from composer.behavior_source import Function
+from composer.behavior_source.flow import always_executed
 from composer.behavior_source.spans import attribute_span, span_of
-from composer.behavior_source.traversal import walk
 from composer.behavior_types.bindings import nodes_of
 from composer.behavior_types.call_sites import CallSite, CallSites
 from composer.behavior_types.expressions import FunctionTypes
@@ -103,7 +103,7 @@ def _of_differing(
         type_ = site.given[name][1]
         if type_ is not ANYTHING and type_ is not NONE and type_ not in types:
             types.append(type_)
-    certain = _certain_lines(function, name)
+    certain = always_executed(function, lambda test: _is_of_others(test, name))
     if len(sites) < 2 or not certain:
         return []
     without = {_key(item) for item in check(_with(scope, name, ANYTHING))}
@@ -165,37 +165,6 @@ def _is_used(
                 if (span.line, span.column) not in wrong:
                     return True
     return False
-
-
-def _certain_lines(function: Function, name: str) -> frozenset[int]:
-    """Return the lines that each call of a function executes.
-
-    What follows a comparison of the argument with None or another value counts as executed.
-    """
-    found: set[int] = set()
-    pending: list[ast.stmt] = [*function.body][::-1]
-    while pending:
-        statement = pending.pop()
-        match statement:
-            case ast.For(body=body, iter=head):
-                pending += body[::-1]
-            case ast.With(body=body, items=[ast.withitem(context_expr=head), *_]):
-                pending += body[::-1]
-            case ast.If(test=head, orelse=[]) if _is_of_others(head, name):
-                pass
-            case ast.If() | ast.Try() | ast.Match() | ast.While():
-                return frozenset(found)
-            case _:
-                head = None  # type: ignore[assignment]  # the statement itself
-        last = (head or statement).end_lineno or statement.lineno
-        found.update(range(statement.lineno, last + 1))
-        found -= {
-            line
-            for node in walk([head or statement])
-            if isinstance(node, ast.IfExp | ast.BoolOp | ast.Lambda)
-            for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
-        }
-    return frozenset(found)
 
 
 def _is_of_others(test: ast.expr, name: str) -> bool:

@@ -26,6 +26,7 @@ from composer.behavior_checks.formats import text_problems
 from composer.behavior_checks.function_calls import CallChecker
 from composer.behavior_checks.iteration import iteration_problems
 from composer.behavior_checks.message_values import ValueChecker
+from composer.behavior_checks.missing_values import missing_values, unset_attributes
 from composer.behavior_checks.misspelled_attributes import misspelled_attributes
 from composer.behavior_checks.node_classes import missing_constructors, undeclared_parameters
 from composer.behavior_checks.operations import (
@@ -95,6 +96,8 @@ def behavior_problems(
                 yield problem
             if problem.kind is Kind.ATTRIBUTE:
                 missing.add(problem.message)
+    if not is_hosted:  # rclpy calls some callbacks only after another one
+        yield from unset_attributes(types)
     yield from changing_attributes(types)
     yield from class_problems(types)
     yield from misspelled_attributes(source)
@@ -160,6 +163,7 @@ class _FunctionChecker:
             for node in ast.walk(annotation):
                 if isinstance(node, ast.Attribute):
                     yield from self._attribute(node)
+        yield from missing_values(self.function, self.scope)
         for pending in used_without_await(self.function, self.scope):
             yield missing_await(pending, self.function, self.scope)
         calls = CallChecker(self.scope, self._values)

@@ -27,6 +27,7 @@ class Kind(Enum):
     RETURN = "a function that may not return what its annotation says"
     INDEX = "an element that an array parameter does not have"
     CHANGED = "an attribute that gets a value of another kind"
+    NONE = "a value that may be None"
     ANNOTATION = "a handler that annotates its argument with another type"
     SIGNATURE = "a callback that does not accept the arguments it is called with"
     PARAMETER = "a parameter that a class reads, but does not declare"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from composer.behavior_source.method_body import Function, dotted
 from composer.behavior_source.traversal import children, walk
@@ -90,6 +90,42 @@ def is_stub(function: Function) -> bool:
         or (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant))
         for item in function.body
     )
+
+
+def always_executed(
+    function: Function, is_false: Callable[[ast.expr], bool] = lambda _: False
+) -> frozenset[int]:
+    """Return the lines that each call of a function executes, if no statement raises.
+
+    ``is_false`` says which conditions to regard as false.
+    """
+    found: set[int] = set()
+    pending: list[ast.stmt] = [*function.body][::-1]
+    while pending:
+        statement = pending.pop()
+        head: ast.AST = statement
+        match statement:
+            case ast.For(body=body, iter=iterated):
+                head = iterated
+                if any(isinstance(node, ast.If | ast.Break | ast.Return) for node in walk(body)):
+                    return frozenset(found)
+                pending += body[::-1]
+            case ast.With(body=body, items=[ast.withitem(context_expr=context), *_]):
+                head = context
+                pending += body[::-1]
+            case ast.If(test=test, orelse=[]) if is_false(test):
+                head = test
+            case ast.If() | ast.Try() | ast.Match() | ast.While() | ast.FunctionDef():
+                return frozenset(found)
+        found.update(_lines(statement.lineno, head))
+        for node in walk([head]):
+            if isinstance(node, ast.IfExp | ast.BoolOp | ast.Lambda | ast.ListComp):
+                found.difference_update(_lines(node.lineno, node))
+    return frozenset(found)
+
+
+def _lines(first: int, node: ast.AST) -> range:
+    return range(first, (getattr(node, "end_lineno", None) or first) + 1)
 
 
 def endless_loops(function: Function) -> Iterator[ast.While]:

@@ -256,6 +256,16 @@ MISTAKES = [
     ("odometry", "self.count = message", "attribute-kind", "message", "annotate"),
     ("odometry", "self.count = message.pose.covariance", "attribute-kind", None, None),
     ("odometry", "self.statistics = [0.1]", "attribute-kind", "[0.1]", None),
+    # values that may be None
+    ("odometry", "points = {'a': Point()}\npoints.get('b').x", "unchecked-none",
+     "points.get('b')", "is not None"),
+    ("odometry", "points = {'a': Point()}\npoint = points.get('b')\npoint.x, point.y",
+     "unchecked-none", "point", None),
+    ("odometry", "re.match('a+', self._text()).group()", "unchecked-none", None, None),
+    ("odometry", "NAME.search(self._text())[0]", "unchecked-none", None, None),
+    ("odometry", "self.find('a').x", "unchecked-none", "self.find('a')", None),
+    ("odometry", "self.longest().upper()", "unchecked-none", "self.longest()", None),
+    ("reset", "response.message = self.last.child_frame_id", "unchecked-none", "self.last", None),
     # what is iterated over, counted and caught
     ("odometry", "range(0, self.parameters.names, 2)", "invalid-value", "self.parameters.names",
      "range(len(...))"),

@@ -121,6 +121,18 @@ RIGHT = [
     ("odometry", "(1.0, 2.0)[-2]\n(1.0, *self.parameters.names)[5]"),
     ("odometry", "try:\n    pass\nexcept TimeoutError:\n    pass\nexcept OSError:\n    pass"),
     ("odometry", "try:\n    pass\nexcept OSError:\n    pass\nexcept IOError:\n    pass"),
+    ("odometry", "points = {'a': Point()}\nif point := points.get('b'):\n    point.x"),
+    ("odometry", "point = {'a': Point()}.get('b')\nif self.count and not point:\n    return\n"
+     "point.x"),
+    ("odometry", "point = {'a': Point()}.get('b')\nassert point is not None\npoint.x"),
+    ("odometry", "points = {'a': Point()}\nif 'b' in points:\n    points.get('b').x"),
+    ("odometry", "points = {'a': Point()}\nif points.get('b'):\n    points.get('b').x"),
+    ("odometry", "points = {'a': Point()}\ntry:\n    points.get('b').x\nexcept AttributeError:\n"
+     "    pass"),
+    ("odometry", "re.match(r'\\s*', self._text()).group()"),
+    ("odometry", "point = self.find('a')\nprint(point.x if point else 0)"),
+    ("reset", "if self.count:\n    return response\nresponse.message = self.last.child_frame_id"),
+    ("odometry", "self.last.child_frame_id"),
     ("odometry", "point = message\ndef inner(point: Point):\n    point.x\npoint.pose"),
     ("odometry", "def one(it: Point):\n    it.x\ndef two(it):\n    it.pose"),
 ]  # fmt: skip

@@ -32,6 +32,7 @@ nodes:
 CODE = """\
 import asyncio
 import math
+import re
 import threading
 import time
 from dataclasses import dataclass, field
@@ -50,6 +51,7 @@ from composer.behavior import Behavior, CallError, Goal, SentGoal
 
 
 NANOSECONDS = 1_000_000_000
+NAME = re.compile("[a-z]+")
 
 
 class Reference:
@@ -121,6 +123,15 @@ class Code(Behavior):
     @classmethod
     def title(cls):
         return cls.__name__
+
+    def find(self, name) -> Point | None:
+        return Point() if name else None
+
+    def longest(self):
+        found = None
+        for name in self.parameters.names:
+            found = name if found is None or len(name) > len(found) else found
+        return found
 
     def _text(self) -> str:
         return "text"

@@ -1,0 +1,295 @@
+"""Finds values that may be None, and are used without asking for it anywhere in the function."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function
+from composer.behavior_source.flow import always_executed, empty_returns, returned_values
+from composer.behavior_source.method_body import dotted
+from composer.behavior_source.spans import span_of
+from composer.behavior_source.traversal import walk
+from composer.behavior_types.bindings import How, bindings_of, nodes_of
+from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.names import constant_named
+from composer.behavior_types.values import (
+    BuiltinMethod,
+    CollectionMethod,
+    ModuleFunction,
+    OwnMethod,
+    Self,
+)
+
+_MATCHING = frozenset({"fullmatch", "match", "search"})
+_CAUGHT = frozenset({"AttributeError", "BaseException", "Exception", "TypeError"})
+_LONGEST = 200
+_FIRST = ("__init__", "on_configure", "on_activate")
+
+
+def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the first use of each value in a function that may be None."""
+    nodes = nodes_of(function)
+    if not any(isinstance(node, ast.Call) for node in nodes):
+        return
+    reasons = {
+        name: reason
+        for name, bindings in scope.bindings.names.items()
+        if len(bindings) == 1 and bindings[0].how is How.VALUE and not bindings[0].positions
+        if (reason := _reason(bindings[0].expression, scope)) is not None
+    }
+    uses = [node for node in nodes if isinstance(node, ast.Attribute | ast.Subscript)]
+    direct = [node for node in uses if isinstance(node.value, ast.Call)]
+    if (not reasons and not direct) or _expects_none(function):
+        return
+    tested = _tested_names(function)
+    seen = set(tested)
+    for node in uses:
+        owner = node.value
+        name = owner.id if isinstance(owner, ast.Name) else ""
+        reason = reasons.get(name) if name not in seen else None
+        if isinstance(owner, ast.Call) and ast.unparse(owner) not in seen:
+            reason, name = _reason(owner, scope), ast.unparse(owner)
+        if reason is not None:
+            seen.add(name)
+            span = span_of(owner, scope.home.source)
+            hint = "check it first, as in 'if ... is not None'"
+            yield CodeProblem(Kind.NONE, f"this may be None: {reason}", span, hint)
+
+
+def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
+    """Return why a value may be None, None if it is not known to be."""
+    call = node.value if isinstance(node, ast.Await) else node
+    if not isinstance(call, ast.Call):
+        return None
+    name = scope.called_name(call.func)
+    if name.startswith("re.") and name.removeprefix("re.") in _MATCHING and call.args:
+        return None if _may_be_empty(call.args[0]) else f"'{name}' returns None without a match"
+    match scope.type_of(call.func):
+        case CollectionMethod(owner=owner, name="get") if owner.python is dict:
+            is_plain = len(call.args) == 1 and not call.keywords
+            return "'get' returns None for a missing key" if is_plain else None
+        case BuiltinMethod(python=python, name=method) if python is re.Pattern:
+            is_known = method in _MATCHING and not _may_be_empty(_pattern(call.func, scope))
+            return f"'{method}' returns None without a match" if is_known else None
+        case OwnMethod(method=own) if own.node is not None:
+            return _of_function(own.node)
+        case ModuleFunction(node=function):
+            return _of_function(function)
+        case _:
+            return None
+
+
+def _pattern(function: ast.expr, scope: FunctionTypes) -> ast.expr | None:
+    """Return what a pattern of the file is compiled from, None if it is not known."""
+    owner = function.value if isinstance(function, ast.Attribute) else None
+    name = owner.id if isinstance(owner, ast.Name) else ""
+    constant = None if scope.is_local(name) else constant_named(name, scope.home)
+    return constant.args[0] if isinstance(constant, ast.Call) and constant.args else None
+
+
+def _may_be_empty(pattern: ast.expr | None) -> bool:
+    """Return whether a pattern matches nothing as well, so that it may match everywhere."""
+    text = pattern.value if isinstance(pattern, ast.Constant) else None
+    if not isinstance(text, str) or len(text) > _LONGEST:
+        return True
+    try:
+        return re.compile(text).match("") is not None
+    except (re.error, RecursionError, OverflowError):
+        return True
+
+
+def _of_function(function: Function) -> str | None:
+    if function.decorator_list or any(
+        isinstance(node, ast.Yield | ast.YieldFrom) for node in nodes_of(function)
+    ):
+        return None
+    message = f"'{function.name}' returns None in some cases"
+    if function.returns is not None:
+        return message if _names_none(function.returns) else None
+    values = list(returned_values(function))
+    if not values or any(isinstance(node, ast.Raise) for node in nodes_of(function)):
+        return None
+    is_named = any(_is_none_at_first(value, function) for value in values)
+    return message if is_named or any(True for _ in empty_returns(function)) else None
+
+
+def _names_none(annotation: ast.expr) -> bool:
+    match annotation:
+        case ast.BinOp(left=left, op=ast.BitOr(), right=right):
+            return any(
+                isinstance(item, ast.Constant) and item.value is None for item in (left, right)
+            )
+        case ast.Subscript(value=name):
+            return dotted(name) in {"Optional", "typing.Optional"}
+        case _:
+            return False
+
+
+def _is_none_at_first(value: ast.expr, function: Function) -> bool:
+    """Return whether a result is a name that is set to None, and then perhaps, in a loop."""
+    bindings = bindings_of(function, is_method=False).names
+    found = bindings.get(value.id, []) if isinstance(value, ast.Name) else []
+    starts = [item for item in found if _is_none(item.expression) and item.how is How.VALUE]
+    if not starts or len(found) == len(starts) or not isinstance(value, ast.Name):
+        return False
+    if value.id in {item.arg for item in walk([function.args]) if isinstance(item, ast.arg)}:
+        return False
+    in_loops = {
+        id(node)
+        for loop in nodes_of(function)
+        if isinstance(loop, ast.For | ast.AsyncFor)
+        for node in walk(loop.body)
+    }
+    stored = [
+        node
+        for node in nodes_of(function)
+        if isinstance(node, ast.Name) and node.id == value.id and isinstance(node.ctx, ast.Store)
+    ]
+    outside = sum(id(node) not in in_loops for node in stored)
+    tests = (node.test for node in nodes_of(function) if isinstance(node, ast.If))
+    asked = (test for test in tests if id(test) not in in_loops)
+    return outside == len(starts) == 1 and not any(value.id in _direct(test) for test in asked)
+
+
+def _is_none(node: ast.expr | None) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None
+
+
+def _expects_none(function: Function) -> bool:
+    """Return whether a function catches what a use of None raises, or looks for keys."""
+    for node in nodes_of(function):
+        match node:
+            case ast.ExceptHandler(type=caught):
+                parts = walk([caught]) if caught is not None else ()
+                names = {item.id for item in parts if isinstance(item, ast.Name)}
+                names = names if caught is not None else {*_CAUGHT}
+                if names & _CAUGHT:
+                    return True
+            case ast.Compare(ops=operators):
+                if any(isinstance(item, ast.In | ast.NotIn) for item in operators):
+                    return True
+            case ast.Name(id="suppress") | ast.Attribute(attr="suppress"):
+                return True
+    return False
+
+
+def _tested_names(function: Function) -> set[str]:
+    """Return the names and calls whose values a function asks for."""
+    found: set[str] = set()
+    for node in nodes_of(function):
+        match node:
+            case (
+                ast.If(test=test)
+                | ast.While(test=test)
+                | ast.IfExp(test=test)
+                | ast.Assert(test=test)
+            ):
+                found |= _direct(test)
+            case ast.BoolOp(values=values):
+                found.update(*map(_direct, values))
+            case ast.UnaryOp() | ast.Compare():
+                found |= _direct(node)
+            case ast.comprehension(ifs=tests):
+                found.update(*map(_direct, tests))
+            case ast.NamedExpr(target=ast.Name(id=name)):
+                found.add(name)
+            case ast.Match(subject=subject):
+                found |= _direct(subject)
+            case ast.Call(args=arguments):  # another function may ask
+                found.update(item.id for item in arguments if isinstance(item, ast.Name))
+    return found
+
+
+def _direct(test: ast.expr) -> set[str]:
+    """Return the names in a test, and its calls, but not those whose attributes it reads."""
+    owners: set[int] = set()
+    found: set[str] = set()
+    for node in walk([test]):
+        if isinstance(node, ast.Attribute | ast.Subscript):
+            owners.add(id(node.value))
+        if id(node) in owners:
+            continue
+        if isinstance(node, ast.Name):
+            found.add(node.id)
+        elif isinstance(node, ast.Call):
+            found.add(ast.unparse(node))
+    return found
+
+
+def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
+    """Yield the attributes that a handler uses, although another one may not have set them yet."""
+    if not types.source.complete or types.self_escapes:
+        return
+    methods = {
+        method.name: method.node
+        for _, known in reversed(types.source.classes)
+        for method in known.methods
+        if method.node is not None
+    }
+    none, values = _stored(methods)
+    first = _reached(_FIRST, methods)
+    unset = {
+        name: setters
+        for name, setters in values.items()
+        if none.get(name, set()) & set(_FIRST) and not setters & first
+    }
+    for handler in types.handlers:
+        function = methods.get(handler)
+        scope = types.scopes.get(id(function))
+        if function is None or scope is None or handler.startswith("accept_") or not unset:
+            continue
+        reached = _reached((handler,), methods)
+        lines = always_executed(function)
+        for node in nodes_of(function):
+            match node:
+                case (
+                    ast.Attribute(value=ast.Attribute(attr=name) as owner)
+                    | ast.Subscript(value=ast.Attribute(attr=name) as owner)
+                ) if name in unset and owner.lineno in lines:
+                    setters = unset[name]
+                    is_accepted = any(item.startswith("accept_") for item in setters)
+                    is_own = isinstance(scope.type_of(owner.value), Self)
+                    if is_own and not is_accepted and not setters & reached:
+                        del unset[name]
+                        setter = min(setters)
+                        message = f"this may be None: '{setter}' sets it, perhaps later"
+                        span = span_of(owner, scope.home.source)
+                        hint = f"check it first, as in 'if self.{name} is not None'"
+                        yield CodeProblem(Kind.NONE, message, span, hint)
+
+
+def _stored(
+    methods: dict[str, Function],
+) -> tuple[dict[str, set[str]], dict[str, set[str]]]:
+    """Return the methods that set an attribute of the object to None, and to other values."""
+    none: dict[str, set[str]] = {}
+    values: dict[str, set[str]] = {}
+    for method, function in methods.items():
+        to_none: set[int] = set()
+        for node in nodes_of(function):
+            match node:
+                case ast.Assign(targets=targets, value=value) if _is_none(value):
+                    to_none.update(map(id, targets))
+                case ast.AnnAssign(target=target, value=value) if value is None or _is_none(value):
+                    to_none.add(id(target))
+                case ast.Attribute(attr=name, ctx=ast.Store()):
+                    found = none if id(node) in to_none else values
+                    found.setdefault(name, set()).add(method)
+    return none, values
+
+
+def _reached(names: tuple[str, ...], methods: dict[str, Function]) -> set[str]:
+    """Return the methods that these methods name, and these themselves."""
+    found: set[str] = set()
+    pending = list(names)
+    while pending:
+        name = pending.pop()
+        if name not in found and name in methods:
+            found.add(name)
+            inside = nodes_of(methods[name])
+            pending += [node.attr for node in inside if isinstance(node, ast.Attribute)]
+    return found
