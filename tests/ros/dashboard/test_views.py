@@ -239,12 +239,10 @@ def test_goals_are_followed_canceled_and_rejected(page: Browser) -> None:
         goal = {"target": {"x": 1.0}, "max_velocity": velocity}
         return page.subscribe("goal", action="/lab/navigate", goal=goal)
 
-    done = send(1.0)
-    page.until(done, lambda data: data["status"] == "executing" and data["feedback"])
-    finished = page.until(done, lambda data: data["status"] == "succeeded")
+    finished = page.until(send(1.0), lambda data: data["status"] == "succeeded")
     assert finished["result"]["distance_traveled"] == 2.5
     endless = send(-1.0)
-    page.until(endless, lambda data: data["status"] == "executing")
+    page.until(endless, lambda data: data["status"] == "executing" and data["feedback"])
     page.ok("cancel", sub=endless)
     assert page.until(endless, lambda data: data["status"] == "canceled")["result"]["message"]
     assert page.failure(send(0.0))["code"] == "rejected"

@@ -263,7 +263,7 @@ class Stress:
 
 
 @pytest.mark.parametrize(
-    "rounds", [4, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+    "rounds", [2, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
 )
 def test_external_nodes_do_not_disturb_in_process_delivery(tmp_path: Path, rounds: int) -> None:
     with running(TEXT, tmp_path, stress=MODULE) as system:
