@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from composer.behavior_checks.problems import CodeProblem, Kind
-from composer.behavior_source import Class, Function, Module
+from composer.behavior_source import BehaviorSource, Class, Function, Module
 from composer.behavior_source.method_body import argument, dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.syntax import name_span
@@ -63,35 +63,23 @@ def undeclared_parameters(types: HostedTypes) -> Iterator[CodeProblem]:
     """
     if not types.source.complete or not types.bases:
         return
-    declared: set[str] = set()
+    declared = declared_names(types.source)
     reads: list[tuple[str, ast.expr, Module]] = []
-    calls = mentions = 0
-    for home in types.source.own_modules:
+    for home in types.source.own_modules if declared is not None else ():
         for node in walk(home.tree.body):
-            if isinstance(node, ast.keyword) and node.arg in _UNDECLARED:
-                return
             if isinstance(node, ast.ExceptHandler) and _is_of_parameters(node):
                 return
-            mentions += isinstance(node, ast.Attribute) and node.attr in _DECLARING
             if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
                 continue
             name = node.func.attr
-            if name in _DECLARING:
-                calls += 1
-                found = _declared_by(node)
-                if found is None:
-                    return
-                declared |= found
-            elif name in {"has_parameter", "get_parameters_by_prefix"}:
+            if name in {"has_parameter", "get_parameters_by_prefix"}:
                 return
-            elif name in _READING and node.args and _is_self(node.func.value):
+            if name in _READING and node.args and _is_self(node.func.value):
                 first = node.args[0]
                 if isinstance(first, ast.Constant) and isinstance(first.value, str):
                     reads.append((first.value, first, home))
-    if mentions > calls:  # the method is passed on, or has another name
-        return
     for name, where, home in reads:
-        if name in declared | _DECLARED or name.startswith("qos_overrides."):
+        if declared is None or is_declared(name, declared):
             continue
         close = nearest(name, declared)
         if close is None and types.self_escapes:
@@ -99,6 +87,31 @@ def undeclared_parameters(types: HostedTypes) -> Iterator[CodeProblem]:
         hint = f"did you mean '{close}'?" if close else f"declare it: declare_parameter('{name}')"
         message = f"the class does not declare the parameter '{name}'"
         yield CodeProblem(Kind.PARAMETER, message, span_of(where, home.source), hint)
+
+
+def declared_names(source: BehaviorSource) -> set[str] | None:
+    """Return the names of the parameters that a class declares; None if it may have others."""
+    declared: set[str] = set()
+    calls = mentions = 0
+    for home in source.own_modules:
+        for node in walk(home.tree.body):
+            if isinstance(node, ast.keyword) and node.arg in _UNDECLARED:
+                return None
+            mentions += isinstance(node, ast.Attribute) and node.attr in _DECLARING
+            match node:
+                case ast.Call(func=ast.Attribute(attr=name)) if name in _DECLARING:
+                    calls += 1
+                    found = _declared_by(node)
+                    if found is None:
+                        return None
+                    declared |= found
+    # or else the method is passed on, or has another name
+    return declared if mentions == calls else None
+
+
+def is_declared(name: str, declared: set[str]) -> bool:
+    """Return whether a class has a parameter: one of these, or one of every node."""
+    return name in declared | _DECLARED or name.startswith("qos_overrides.")
 
 
 def _is_of_parameters(handler: ast.ExceptHandler) -> bool:

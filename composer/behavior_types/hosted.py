@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
-from composer.behavior_source import Method, Module
+from composer.behavior_source import BehaviorSource, Method, Module
 from composer.behavior_source.method_body import argument
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.bindings import Bindings, nodes_of
@@ -121,7 +121,7 @@ class HostedTypes(BehaviorTypes):
     @cached_property
     def self_escapes(self) -> bool:
         """Whether other code than that of ROS may set further attributes."""
-        return escapes(self.source, _takes_nodes)
+        return passes_node_on(self.source)
 
     def infer(self) -> None:
         """Infer the types of all attributes, and of what rclpy passes to callbacks."""
@@ -260,6 +260,11 @@ def callbacks_of(call: ast.Call, scope: FunctionTypes) -> Iterator[Callback]:
 def _of_default(value: ast.expr | None) -> Value:
     """Return the type of a parameter with that default; rclpy does not let it change."""
     return constant_type(value.value) if isinstance(value, ast.Constant) else ANYTHING
+
+
+def passes_node_on(source: BehaviorSource) -> bool:
+    """Return whether a class passes its object to other code than that of ROS."""
+    return escapes(source, _takes_nodes)
 
 
 def _takes_nodes(full: str) -> bool:

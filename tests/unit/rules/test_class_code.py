@@ -301,3 +301,48 @@ def test_functions_may_have_attributes(tmp_path: Path) -> None:
 def test_a_transition_gets_the_state(tmp_path: Path) -> None:
     code = _code("tick", "pass").replace("def on_activate(self, state)", "def on_activate(self)")
     assert _found(tmp_path, code) == [("handler-signature", "on_activate")]
+
+
+DECLARING = """\
+from rclpy.node import Node
+from rcl_interfaces.msg import ParameterDescriptor
+from std_msgs.msg import String
+
+
+class Declaring(Node):
+    def __init__(self):
+        super().__init__("declaring")
+        self.declare_parameter("offset", -1.5)
+        self.declare_parameter("gains", [1.0, 2.0])
+        self.declare_parameter("any", 1, ParameterDescriptor(dynamic_typing=True))
+        self.declare_parameters("arm", [("length", 1.0)])
+        self.create_publisher(String, "~/text", 10)
+        self.create_service(self.text_type, "text", self.on_text)
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "rule"),
+    [
+        ("parameters: {offset: {type: double, default: 1.0}}", None),
+        ("parameters: {offset: {type: integer, default: 1}}", "class-parameter-type"),
+        ("parameters: {gains: {type: double_array, default: [1.0]}}", None),
+        ("parameters: {gains: {type: double, default: 1.0}}", "class-parameter-type"),
+        ("parameters: {any: {type: string, default: a}}", None),
+        ("parameters: {arm.length: {type: double, default: 1.0}}", None),
+        ("parameters: {length: {type: double, default: 1.0}}", "class-parameter"),
+        ("parameters: {use_sim_time: {type: bool, default: true}}", None),
+        ("publishers: {text: {type: std_msgs/msg/String, topic: ~/text, external: true}}", None),
+        ("publishers: {text: {type: std_msgs/msg/Int32, topic: ~/text, external: true}}",
+         "class-port-type"),
+        ("publishers: {text: {type: std_msgs/msg/Int32, topic: text, external: true}}", None),
+    ],
+)  # fmt: skip
+def test_parameters_and_ports_agree_with_the_class(
+    line: str, rule: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "declaring.py").write_text(DECLARING, encoding="utf-8")
+    system = f"system: a\nnodes:\n  n:\n    class: declaring:Declaring\n    {line}\n"
+    rules = {"class-parameter", "class-parameter-type", "class-port-type"}
+    found = [item.rule.name for item in diagnostics_in(system, tmp_path)]
+    assert [name for name in found if name in rules] == ([rule] if rule is not None else [])
