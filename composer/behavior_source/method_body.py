@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 
 from composer.behavior_source.spans import span_of
@@ -108,9 +108,9 @@ class _BodyVisitor:
     aliases: list[tuple[str, str]] = field(default_factory=list)
     assigned: Counter[str] = field(default_factory=Counter)
 
-    def visit(self, node: ast.AST, deferred: bool) -> list[ast.AST]:
+    def visit(self, node: ast.AST, deferred: bool) -> Sequence[ast.AST]:
         """Record ``node``, and return the children that remain to be visited."""
-        below: list[ast.AST] = []
+        below: Sequence[ast.AST] = []
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
                 self.mentioned.append(name)

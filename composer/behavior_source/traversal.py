@@ -12,9 +12,22 @@ _OTHER_FIELDS = frozenset(
     | {"op", "ops", "rest", "simple", "type_comment"}
 )
 
+#: The attribute of a node with the nodes below it.
+_KEPT = "_children"
 
-def children(node: ast.AST) -> list[ast.AST]:
-    """Return the nodes directly below ``node``, in source order, without contexts and operators."""
+
+def children(node: ast.AST) -> Sequence[ast.AST]:
+    """Return the nodes directly below ``node``, in source order, without contexts and operators.
+
+    The tree must not change afterwards: they are kept, because checks visit each node many times.
+    """
+    known: Sequence[ast.AST] | None = node.__dict__.get(_KEPT)
+    if known is None:
+        known = node.__dict__[_KEPT] = _children(node)
+    return known
+
+
+def _children(node: ast.AST) -> Sequence[ast.AST]:
     found: list[ast.AST] = []
     for name in _fields(node.__class__):  # type: ignore[arg-type]  # a class is hashable
         value = getattr(node, name, None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -301,7 +301,7 @@ def references_in(module: Module) -> dict[str, list[Reference]]:
     return found
 
 
-def _evaluated(node: ast.AST) -> list[ast.AST]:
+def _evaluated(node: ast.AST) -> Sequence[ast.AST]:
     """Return the nodes below one, without annotations, and what belongs outside of a function."""
     match node:
         case ast.FunctionDef(body=body) | ast.AsyncFunctionDef(body=body):
