@@ -58,7 +58,7 @@ def picture(scene: Scene, view: View, page: Size) -> dict[str, Any]:
 
     ``page`` is the size of its place in pixels. All texts in the fragment are escaped.
     """
-    graph = build_graph(scene, view)
+    graph = build_graph(_without_qos(scene) if view is View.NODES else scene, view)
     if view is View.DEPLOYMENT:
         graph = replace(graph, clusters=tuple(map(_with_place_for_process, graph.clusters)))
     directions = [graph.direction]
@@ -74,6 +74,15 @@ def picture(scene: Scene, view: View, page: Size) -> dict[str, Any]:
         "things": {thing.key: _facts(thing) for thing in _things(graph)},
         "executors": _nodes_by_executor(graph) if view is View.DEPLOYMENT else {},
     }
+
+
+def _without_qos(scene: Scene) -> Scene:
+    """Leave QoS to the details and to the view of ports: without it, all other texts are larger."""
+    nodes = (
+        replace(node, ports=tuple(replace(port, qos="") for port in node.ports))
+        for node in scene.nodes
+    )
+    return replace(scene, nodes=tuple(nodes))
 
 
 def _with_place_for_process(cluster: Cluster) -> Cluster:

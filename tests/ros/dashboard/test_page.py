@@ -36,6 +36,7 @@ def test_the_graph_shows_states_rates_and_details(view: Page) -> None:
     view.goto("/")
     expect_text(view.locator(f'{node(PLANNER)}[data-state="active"]'), "planner")
     expect_text(view.locator(".world [data-label]"), r"[23]\d\.?\d* Hz")  # about 30
+    assert view.evaluate(LEAST_SIZE) >= 9.5
     expect_text(view.locator(node("/lab/talker")), "no lifecycle|talker")
     view.click(node(PLANNER))
     for expected in (
@@ -55,6 +56,18 @@ def test_the_graph_shows_states_rates_and_details(view: Page) -> None:
     expect_text(view.locator(".matches"), r"\d+ found")
     view.keyboard.press("Enter")
     expect_text(detail(view), "/motor_commands")
+    visit(view, "/graph?view=connections")
+    expect_text(view.locator(".world [data-label]"), r"/sensor_data[^/]*[23]\d\.?\d* Hz")
+
+
+#: The size of the smallest letters of the diagram, in pixels of the screen.
+LEAST_SIZE = """() => {
+    const texts = [...document.querySelectorAll(".world text")];
+    const shown = texts.filter(one => one.checkVisibility());
+    return Math.min(...shown.map(
+        one => parseFloat(getComputedStyle(one).fontSize) * one.getScreenCTM().a
+    ));
+}"""
 
 
 def test_every_view_has_an_address_and_a_key(view: Page) -> None:

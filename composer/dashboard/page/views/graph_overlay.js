@@ -37,9 +37,13 @@ export function createOverlay(picture, things, executors) {
     if (rate) rates.set(line.key, rate);
   }
   for (const text of rates.values()) {
+    const label = text.parentElement;
+    const lines = [...label.querySelectorAll("text")];
     text.textContent = "";
-    text.parentElement.classList.add("unmeasured");
-    text.parentElement.classList.toggle("alone", text.parentElement.querySelectorAll("text").length === 1);
+    label.classList.add("unmeasured");
+    label.classList.toggle("alone", lines.length === 1);
+    label.style.setProperty("--kept", (lines.length - 0.8) / lines.length);
+    for (const above of lines.slice(0, lines.indexOf(text))) above.classList.add("above");
   }
 
   function nodeOf(item, texts) {
@@ -79,7 +83,9 @@ export function createOverlay(picture, things, executors) {
     element.dataset.state = found.state;
   }
 
-  function rateOf(key, live) {
+  /** A line of the view of ports goes from a publisher to a subscription: `publisher:… -> subscription:…`. */
+  function rateOf(line, live) {
+    const [key] = line.split(" -> ");
     if (live.edges[key]?.rate_hz !== undefined) return live.edges[key].rate_hz;
     const topic = things[key]?.channel;
     if (live.topics[topic]?.rate_hz !== undefined) return live.topics[topic].rate_hz;
@@ -102,7 +108,7 @@ export function createOverlay(picture, things, executors) {
         text.parentElement.classList.toggle("unmeasured", rate === null);
       }
       for (const line of picture.lines) {
-        const edge = live.edges[line.key];
+        const edge = live.edges[line.key.split(" -> ").at(-1)];
         if (edge?.dropped_total !== undefined) showDrops(line, edge.dropped_total);
       }
     },

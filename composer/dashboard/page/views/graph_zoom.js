@@ -6,8 +6,15 @@
  */
 import { isNode } from "../graph/filter.js";
 
-/** From there on, everything is shown as it is drawn. */
+/** From there on, everything is shown where it is drawn. */
 const NEAR_PIXELS_PER_UNIT = 0.7;
+/** Texts have at least these sizes in pixels then, but no more than this part beyond their room. */
+const LEAST_NAME = 11;
+const LEAST_SMALL = 10;
+const MOST_ENLARGED = 1.25;
+/** Their sizes as they are drawn, in SVG units. */
+const DRAWN_NAME = 12;
+const DRAWN_SMALL = 10;
 /** Names have the same place within a step. */
 const STEP = 1.04;
 /** Sizes in pixels of the screen. */
@@ -45,12 +52,15 @@ export function createZoomLevels(picture) {
 
   return (pixelsPerUnit) => {
     const isFar = pixelsPerUnit < NEAR_PIXELS_PER_UNIT;
-    const level = isFar ? Math.floor(Math.log(pixelsPerUnit) / Math.log(STEP)) : "near";
+    const level = Math.floor(Math.log(isFar ? pixelsPerUnit : Math.min(pixelsPerUnit, 1)) / Math.log(STEP));
     if (level === shown) return;
     shown = level;
     svg.classList.toggle("far", isFar);
     const unit = isFar ? STEP ** -level : 1;
     world.style.setProperty("--unit", unit);
+    const enlarged = (least, drawn) => (isFar ? 1 : Math.min(Math.max(least / drawn / STEP ** level, 1), MOST_ENLARGED));
+    world.style.setProperty("--name", enlarged(LEAST_NAME, DRAWN_NAME));
+    world.style.setProperty("--small", enlarged(LEAST_SMALL, DRAWN_SMALL));
     for (const head of heads) {
       head.setAttribute("markerWidth", Math.max(DRAWN_HEAD, HEAD * unit));
       head.setAttribute("markerHeight", Math.max(DRAWN_HEAD, HEAD * unit));
