@@ -28,6 +28,11 @@ function fill(element, attributes, children) {
   return element;
 }
 
+/** Return a name that is broken after `/` and `_` where it has no room on one line. */
+export function breakable(name) {
+  return name.split(/(?<=[/_])/).flatMap((part, index) => (index === 0 ? [part] : [h("wbr"), part]));
+}
+
 /** Set the text of an element, unless it is the same: an update must not end a selection. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;

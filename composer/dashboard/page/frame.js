@@ -35,7 +35,9 @@ export function createFrame(app) {
   const banner = document.getElementById("banner");
   const title = h("h1", {}, "…");
   const activity = h("p", { class: "activity" });
-  const figures = h("p", { class: "figures" });
+  const load = h("span");
+  const up = h("span", { class: "up" });
+  const figures = h("p", { class: "figures" }, load, up);
   const commands = h("div", { class: "commands" });
   const theme = h("button", { type: "button", class: "quiet", id: "appearance", title: "Light or dark" }, "Theme: auto");
   const readOnly = h("span", { class: "badge" }, "read-only");
@@ -101,7 +103,8 @@ export function createFrame(app) {
     if (!system) {
       setText(activity, data.nodes.length === 1 ? "1 node" : `${data.nodes.length} nodes`);
       activity.dataset.activity = "none";
-      figures.replaceChildren();
+      setText(load, "");
+      setText(up, "");
       commands.replaceChildren();
       return;
     }
@@ -111,7 +114,8 @@ export function createFrame(app) {
     activity.title = system.message;
     const { process } = system;
     const [cpu, memory] = usage(process ?? {});
-    setText(figures, process ? `CPU ${cpu}   memory ${memory}   up ${duration(process.up_s)}` : `on ${system.host}`);
+    setText(load, process ? `CPU ${cpu}   memory ${memory}` : `on ${system.host}`);
+    setText(up, process ? `   up ${duration(process.up_s)}` : "");
     figures.title = process?.processes > 1 ? `${process.processes} processes on ${system.host}` : `process ${system.pid} on ${system.host}`;
     showCommands(system);
   }

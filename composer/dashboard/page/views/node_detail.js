@@ -167,6 +167,11 @@ export function createNodeDetail(app) {
     return [...found];
   }
 
+  /** No time is known before the first call. */
+  function timesOf({ calls_hz: hz, count: calls, mean_ms: mean, p99_ms: p99, longest_ms: longest }) {
+    return [hertz(hz), ...[mean, p99, longest].map((time) => milliseconds(calls > 0 ? time : null))];
+  }
+
   function showTiming({ systems }) {
     const own = systems.flatMap((system) => system.callbacks).filter((callback) => callback.node === name);
     if (own.length === 0) return;
@@ -174,7 +179,7 @@ export function createNodeDetail(app) {
       "tr",
       {},
       h("th", { scope: "row" }, `${callback.kind} ${callback.name}`),
-      [hertz(callback.calls_hz), milliseconds(callback.mean_ms), milliseconds(callback.p99_ms), milliseconds(callback.longest_ms)].map((text) => h("td", { class: "number" }, text)),
+      timesOf(callback).map((text) => h("td", { class: "number" }, text)),
     );
     timings.replaceChildren(h(
       "table",

@@ -1,5 +1,5 @@
 /** The parameters of a node: edit them, and read why a value was refused. */
-import { button, empty, h, setText } from "../dom.js";
+import { breakable, button, empty, h, setText } from "../dom.js";
 import { pathOf } from "../router.js";
 import { rangeOf } from "../widgets/form.js";
 import { dropNote, detailHead, matches, searchField, split, stateBadge } from "../widgets/parts.js";
@@ -111,7 +111,7 @@ function createLine(app, node, first) {
   const element = h(
     "form",
     { class: "parameter", data: { name: first.name }, novalidate: true, autocomplete: "off" },
-    h("label", { for: editor.input.id }, first.name, " ", h("span", { class: "type" }, first.type)),
+    h("label", { for: editor.input.id }, breakable(first.name), " ", h("span", { class: "type" }, first.type)),
     h("div", { class: "value" }, editor.element, first.unit && h("span", { class: "unit" }, first.unit), set, undo),
     hint,
     declared,

@@ -1,5 +1,5 @@
 /** The plan of the bring-up with the cause of each step, and the drift against the declaration. */
-import { button, empty, h } from "../dom.js";
+import { breakable, button, empty, h } from "../dom.js";
 import { pathOf } from "../router.js";
 import { attempt } from "../widgets/notices.js";
 import { facts } from "../widgets/parts.js";
@@ -22,13 +22,13 @@ export function createPlan(app) {
   function plan() {
     return load("plan", ({ steps }) => h(
       "table",
-      { class: "data", "aria-label": "Plan of the bring-up" },
-      h("thead", {}, h("tr", {}, ["Step", "Node", "Transition", "Because"].map((text) => h("th", { scope: "col" }, text)))),
+      { class: "data plan", "aria-label": "Plan of the bring-up" },
+      h("thead", {}, h("tr", {}, ["Step", "Node", "Transition", "Because"].map((text, index) => h("th", { scope: "col", class: index === 0 ? "number" : null }, text)))),
       h("tbody", {}, steps.map((step) => h(
         "tr",
         {},
         h("td", { class: "number" }, String(step.number)),
-        h("th", { scope: "row" }, h("a", { href: pathOf("nodes", step.node) }, step.node)),
+        h("th", { scope: "row" }, h("a", { href: pathOf("nodes", step.node) }, breakable(step.node))),
         h("td", {}, step.transition),
         h("td", { class: "wrap" }, step.cause, step.after?.length ? h("span", { class: "muted" }, ` after step ${step.after.join(", ")}`) : null),
       ))),

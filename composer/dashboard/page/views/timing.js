@@ -7,17 +7,25 @@ import { detailHead, facts, matches, searchField, split, tabs } from "../widgets
 import { createTable } from "../widgets/table.js";
 
 const keyOf = ({ node, kind, name }) => `${node} ${kind} ${name}`;
-const ms = (id, label, value, level = 1, tone = null) =>
-  ({ id, label, number: true, level, value, text: (row) => milliseconds(value(row)), tone });
+const ms = (id, label, timeOf, level = 1) => {
+  const value = (row) => (row.count > 0 ? timeOf(row) : null); // none is known before the first call
+  return { id, label, number: true, level, value, text: (row) => milliseconds(value(row)) };
+};
 const COLUMNS = [
-  { id: "name", label: "Callback", text: ({ kind, name }) => `${kind} ${name}` },
+  // Where the column of nodes is left out, the node is below the callback.
+  {
+    id: "name",
+    label: "Callback",
+    text: ({ kind, name }) => `${kind} ${name}`,
+    render: ({ kind, name, node }) => h("span", {}, `${kind} ${name}`, h("span", { class: "below" }, node)),
+  },
   { id: "node", label: "Node", level: 2, text: ({ node }) => node },
   { id: "calls", label: "Calls", number: true, level: 2, value: ({ calls_hz: hz }) => hz, text: ({ calls_hz: hz }) => hertz(hz) },
   { id: "busy", label: "Busy", number: true, level: 3, value: ({ busy }) => busy, text: ({ busy }) => percent(busy) },
   ms("mean", "Mean", (row) => row.mean_ms, 3),
   ms("p99", "p99", (row) => row.p99_ms),
   ms("max", "Max", (row) => row.longest_ms, 2),
-  { ...ms("late", "Late p99", (row) => (row.kind === "timer" ? row.late_p99_ms : null)) },
+  ms("late", "Late p99", (row) => (row.kind === "timer" ? row.late_p99_ms : null)),
   { id: "over", label: "Over budget", number: true, level: 3, value: ({ overruns }) => overruns, text: ({ overruns }) => count(overruns), tone: ({ overruns }) => (overruns > 0 ? "bad" : "") },
   { id: "dropped", label: "Dropped", number: true, level: 3, value: ({ dropped }) => dropped, text: ({ dropped }) => count(dropped), tone: ({ dropped }) => (dropped > 0 ? "warn" : "") },
 ];
@@ -116,9 +124,7 @@ export function createView(app) {
         figures.replaceChildren(facts([
           ["calls", `${count(row.count)}, ${hertz(row.calls_hz)}`],
           ["busy", percent(row.busy)],
-          ["mean", milliseconds(row.mean_ms)],
-          ["p99", milliseconds(row.p99_ms)],
-          ["max", milliseconds(row.longest_ms)],
+          ...(row.count > 0 ? [["mean", milliseconds(row.mean_ms)], ["p99", milliseconds(row.p99_ms)], ["max", milliseconds(row.longest_ms)]] : []),
           ["late, p99", row.kind === "timer" ? milliseconds(row.late_p99_ms) : null],
           ["late, max", row.kind === "timer" ? milliseconds(row.late_longest_ms) : null],
           ["over budget", count(row.overruns)],

@@ -40,7 +40,7 @@ export function createView(app) {
     toolbar: h(
       "div",
       { class: "toolbar" },
-      searchField("Search topics and types ( / )", (text) => { searched = text; update(); }),
+      searchField("Search topics ( / )", (text) => { searched = text; update(); }),
       toggle("Show hidden", false, (on) => { withHidden = on; measure(true); }, { title: "Show topics of services, actions, managers and tools" }),
     ),
     list: table.element,

@@ -74,8 +74,7 @@ export function createTable({ label, columns, keyOf, hrefOf, sortBy = null, noth
     const column = columns.find(({ id }) => id === sort.id);
     if (!column) return rows;
     const value = column.value ?? column.text;
-    const sign = SORTS[sort.direction];
-    return [...rows].sort((one, other) => sign * compare(value(one), value(other)));
+    return [...rows].sort((one, other) => compare(value(one), value(other), SORTS[sort.direction]));
   }
 
   function show() {
@@ -148,9 +147,10 @@ function follow(event, link) {
   link.click();
 }
 
-function compare(one, other) {
+/** What is missing comes last in both directions. */
+function compare(one, other, sign) {
   const isMissing = (value) => value === null || value === undefined || Number.isNaN(value);
   if (isMissing(one) || isMissing(other)) return Number(isMissing(one)) - Number(isMissing(other));
-  if (typeof one === "number") return one - other;
-  return String(one).localeCompare(String(other), "en", { numeric: true });
+  if (typeof one === "number") return sign * (one - other);
+  return sign * String(one).localeCompare(String(other), "en", { numeric: true });
 }
