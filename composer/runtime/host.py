@@ -94,7 +94,7 @@ class Host:
         report: Report | None = None,
     ) -> None:
         self._system = system
-        self._down = down
+        self._up, self._down = up, down
         self._options = options or HostOptions()
         self._main_queue: MainQueue[Item] = MainQueue()
         self._reporter = Reporter(report)
@@ -220,6 +220,11 @@ class Host:
         """Limit a phase that may take this long, which may be infinite, with a minute to spare."""
         self._limit(phase_s + _HANGS_AFTER_S if math.isfinite(phase_s) else None)
 
+    def _longest_bring_up_s(self) -> float:
+        """Return how long it may take, one step after the other, and the same for a roll-back."""
+        steps_s = sum(self._node_set.timeout_s(step.node) for step in self._up.steps)
+        return min(steps_s, self._options.bring_up_within_s) + steps_s
+
     def _limit(self, limit_s: float | None) -> None:
         """End the process after this time, unless the time to its end is limited already."""
         if not self._is_end_limited:
@@ -235,7 +240,7 @@ class Host:
     def _create(self, process: ProcessContext) -> bool:
         try:
             self._node_set.create(process, self._limit_start)
-            self._limit_phase(self._options.bring_up_within_s)
+            self._limit_phase(self._longest_bring_up_s())
         except CreationFailed as error:
             at_s = self._reporter.elapsed_s
             self._reporter.report(events.RollingBack(at_s, error.node, str(error)))

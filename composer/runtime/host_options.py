@@ -27,9 +27,9 @@ class HostOptions:
     ``end_within(seconds)`` has to end the process after that time, whatever hangs in it; None
     cancels that. It is called with ``grace_s`` as soon as the system stops, and never canceled
     then: the end of Python may hang as well. It also limits each call of the start that may never
-    return from the middleware, and with a minute to spare the bring-up and the run if they have a
-    limit. ``ends_process`` promises that the process ends after the run, by
-    ``os._exit`` if the outcome requires it. ``on_alive()`` is called every second.
+    return from the middleware and, with a minute to spare, the bring-up and a run of ``run_for_s``.
+    ``ends_process`` promises that the process ends after the run, by ``os._exit`` if the outcome
+    requires it. ``on_alive()`` is called every second.
     """
 
     run_for_s: float | None = None

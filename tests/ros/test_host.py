@@ -129,7 +129,7 @@ def test_a_system_stops_after_its_run_time(tmp_path: Path) -> None:
     up, stopping = system.reported(BroughtUp)[0], system.reported(Stopping)[0]
     assert stopping.elapsed_s - up.elapsed_s >= 0.3
     # The start, with a limit for each node; the bring-up and the run, if they hang; the end.
-    assert limits == [10.0, 10.0, 10.0, 10.0, 90.0, 60.3, 10.0]
+    assert limits == [10.0, 10.0, 10.0, 10.0, 150.0, 60.3, 10.0]
 
 
 HANG = """

@@ -24,6 +24,7 @@ _LOG_TAIL_LINES = 20
 _READ_BYTES = 4096
 _MIN_DELAY_S = 0.001
 _LAST_RESORT_S = 1.0
+_LONGEST_LIMIT_S = 1e8  # three years, within the range of C's timers
 
 
 def compose_command() -> tuple[str, ...]:
@@ -105,7 +106,8 @@ def end_within(limit_s: float | None) -> None:
     faulthandler.cancel_dump_traceback_later()
     signal.setitimer(signal.ITIMER_REAL, 0.0)
     if limit_s is not None:
-        faulthandler.dump_traceback_later(max(limit_s, _MIN_DELAY_S), exit=True, file=crash_fd())
+        limit_s = min(max(limit_s, _MIN_DELAY_S), _LONGEST_LIMIT_S)
+        faulthandler.dump_traceback_later(limit_s, exit=True, file=crash_fd())
         signal.setitimer(signal.ITIMER_REAL, limit_s + _LAST_RESORT_S)
 
 

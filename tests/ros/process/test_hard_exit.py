@@ -103,7 +103,10 @@ def test_an_end_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
 
 def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:
     path = tmp_path / "worker.yaml"
-    path.write_text('system: worker\nnodes: {worker: {behavior: "worker:Worker"}}\n')
+    path.write_text(
+        "system: worker\nlifecycle: {timeout_ms: 1.0e+15}\n"  # longer than any timer of C
+        'nodes: {worker: {behavior: "worker:Worker"}}\n'
+    )
     path.with_suffix(".py").write_text(
         dedent(
             """
