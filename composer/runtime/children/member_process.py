@@ -311,8 +311,7 @@ class MemberProcess:
             return
         life.lost = ""
         goals = self._context.goals.on_report(report.goals)
-        if goals is not None:
-            self.requests.keep(goals)
+        self.requests.on_report(report.participant, goals)
         for name, reported in report.nodes.items():
             member = self._members.get(name)
             if member is not None and report.number > life.answered.get(name, -1):

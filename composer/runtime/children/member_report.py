@@ -37,7 +37,8 @@ class MemberReport:
     """One report. ``started_by`` identifies the start by a coordinating process, or is empty.
 
     ``number`` counts the reports of the process. ``goals`` are those of the whole system that it
-    keeps. ``host``, ``pid`` and ``started_s`` (seconds since 1970) are those of the process.
+    keeps. ``host``, ``pid`` and ``started_s`` (seconds since 1970) are those of the process, and
+    ``participant`` is the prefix of the ids of its endpoints, in hexadecimal digits.
     """
 
     activity: str
@@ -47,6 +48,7 @@ class MemberReport:
     started_by: str
     number: int
     goals: str
+    participant: str
     nodes: Mapping[str, MemberState]
 
     @property
@@ -83,6 +85,7 @@ def parse_report(content: bytes) -> MemberReport | None:
         started_by=values.get("started_by", ""),
         number=number,
         goals=values.get("goals", ""),
+        participant=values.get("participant", ""),
         nodes={status.name.partition(": ")[2]: _node(status.values, host) for status in nodes},
     )
 

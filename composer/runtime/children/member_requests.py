@@ -2,6 +2,9 @@
 
 A plan moves many nodes at once. A request for each would take a second for some hundred nodes, and
 most of them would be lost: a service keeps the last 10 that it has not taken yet.
+
+A process that was killed is known for 20 s more, with its service. If that counted as ready, a
+request might be sent before the service of the next process is discovered, and be lost.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from time import monotonic
 from typing import Any
 
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
@@ -17,6 +21,7 @@ from rclpy.node import Node as RosNode
 
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import FIGURES, GOALS, LAST_STEPS, STEPS
 
 _MAX_STEPS = 500  # per request; a service takes up to 1000
@@ -25,6 +30,9 @@ _POLL_S = 0.01
 #: A request without steps is answered at once, unless it or its response is lost: rmw drops a
 #: response if it has not discovered the client yet.
 _ANSWERED_WITHIN_S = 5.0
+#: How long to wait for the service of a process that has reported. With other middleware, ids may
+#: differ between processes.
+_DISCOVERED_WITHIN_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +64,12 @@ class MemberRequests:
         """``on_figures(text)`` receives the timings that were requested."""
         self._ros = ros
         self._loop = loop
+        self._service = service
         self._client = ros.create_client(SetParameters, service)
+        self._participant = ""  # that of the process, once it has reported
+        self._is_discovered = True  # the service of this participant
+        self._awaited_until_s = 0.0
+        self._is_polling = False
         self._on_figures = on_figures
         self._holds = 0
         self._unsent: list[_Wanted] = []
@@ -80,6 +93,15 @@ class MemberRequests:
         if len(self._unsent) == 1:  # otherwise, sending is due already
             self._loop.call_soon(self._send)
         return wanted.result
+
+    def on_report(self, participant_of_process: str, goals: str | None) -> None:
+        """Receive which participant has reported, and the goals that it has to keep, if any."""
+        if self._participant != participant_of_process:
+            self._participant = participant_of_process
+            self._is_discovered = False
+            self._awaited_until_s = monotonic() + _DISCOVERED_WITHIN_S
+        if goals is not None:
+            self.keep(goals)
 
     def keep(self, goals: str) -> None:
         """Request that the process keeps the goals of the system.
@@ -136,9 +158,10 @@ class MemberRequests:
             and not self._holds
             and len(self._sent) < _MAX_REQUESTS
         ):
-            if not self._client.service_is_ready():
-                if self._unsent:
-                    self._loop.call_later(_POLL_S, self._send)
+            if not self._is_ready():
+                if not self._is_polling:
+                    self._is_polling = True
+                    self._loop.call_later(_POLL_S, self._poll)
                 return
             sent = self._next()
             pending = self._client.call_async(self._message(sent))
@@ -146,6 +169,20 @@ class MemberRequests:
             pending.add_done_callback(self._on_response)
             if not sent.batch:
                 self._loop.call_later(_ANSWERED_WITHIN_S, partial(self._forget, pending))
+
+    def _poll(self) -> None:
+        self._is_polling = False
+        self._send()
+
+    def _is_ready(self) -> bool:
+        """Return whether the service is there, and is that of the process that has reported."""
+        if not self._client.service_is_ready():
+            return False
+        if not self._is_discovered:
+            found = {participant(server).hex() for server in servers_of(self._ros, self._service)}
+            is_found = self._participant in found
+            self._is_discovered = is_found or monotonic() >= self._awaited_until_s
+        return self._is_discovered
 
     def _next(self) -> _Sent:
         """Return the next request: a message, which is answered at once, or steps."""

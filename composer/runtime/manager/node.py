@@ -175,6 +175,7 @@ class ManagerNode:
             on_older=host.on_older_instance,
             on_permanent=self._warn_of_instance,
         )
+        self._participant = self._instances.participant if is_member else ""
         if is_member:
             callbacks = MemberCallbacks(
                 host.nodes,
@@ -353,7 +354,8 @@ class ManagerNode:
 
     def _status_message(self) -> list[Diagnostic]:
         chains = self._host.chains()
-        return status_message(self._status.snapshot(), self._uptime_s, chains, self._number)
+        status, uptime_s = self._status.snapshot(), self._uptime_s
+        return status_message(status, uptime_s, chains, self._number, self._participant)
 
     def _publish_now(self) -> None:
         start_s = time.monotonic()

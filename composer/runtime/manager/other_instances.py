@@ -23,6 +23,7 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
 
 #: Discovery of another participant takes up to three seconds; later, this system is not refused.
@@ -100,6 +101,11 @@ class OtherInstances:
         self._reported: set[str] = set()  # the services of instances that were reported
         self._add_service()
         self._loop.call_later(_CHECK_PERIOD_S, self._check_start)
+
+    @property
+    def participant(self) -> str:
+        """The prefix of the ids of all endpoints of this process, in hexadecimal digits."""
+        return "".join(participant(own).hex() for own in servers_of(self._node, self._name))
 
     def check(self) -> None:
         """Look for other instances, and ask those that are not known."""

@@ -12,14 +12,22 @@ _MAX_LENGTH = 500
 
 
 def status_message(
-    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures], number: int
+    status: SystemStatus,
+    uptime_s: float,
+    chains: Iterable[ChainFigures],
+    number: int,
+    participant: str = "",
 ) -> list[Status]:
     """Return the status of a system, followed by those of its nodes.
 
     ``number`` is that of the last message on the topic ``state``, this one included.
+    ``participant`` is the prefix of the ids of its endpoints, if another process needs it.
     """
     nodes = (_of_node(status.system, node) for node in status.nodes)
-    return [_of_system(status, uptime_s, chains, number), *nodes]
+    system = _of_system(status, uptime_s, chains, number)
+    if participant:
+        system = system._replace(values={**system.values, "participant": participant})
+    return [system, *nodes]
 
 
 def _of_system(

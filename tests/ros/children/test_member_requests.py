@@ -12,6 +12,7 @@ from composer.model import ExecutorKind
 from composer.runtime.children import member_requests
 from composer.runtime.children.member_requests import MemberRequests
 from composer.runtime.executors.loop import Reply
+from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import FIGURES, GOALS
 from tests.ros.support.loops import Bench, bench, wait_until
 
@@ -102,3 +103,29 @@ def test_timings_and_goals_need_no_steps() -> None:
         wait_until(lambda: figures == ["[]"], "the timings")
         assert not requests.has_messages
         assert (process.goals, process.asked, process.steps) == (["1 stopped active"], 1, [])
+
+
+KILLED = "00" * 12
+
+
+@pytest.mark.parametrize("is_discovered", [True, False])
+def test_a_request_waits_for_the_service_of_the_process_that_has_reported(
+    is_discovered: bool,
+) -> None:
+    """Not for that of a killed one, nor forever: other middleware may have other ids."""
+    with bench(ExecutorKind.EVENTS) as on:
+        process = Process(on)
+        process.answers = True
+        requests = client(on, [])
+        on.loop.run(lambda: requests.on_report(KILLED, None))
+        result = on.loop.run(lambda: requests.request("/arm", "activate"))
+        assert not on.loop.run(requests._is_ready)
+        assert not requests._sent
+        if is_discovered:
+            (server,) = servers_of(on.node, SERVICE)
+            on.loop.run(lambda: requests.on_report(participant(server).hex(), "1 running active"))
+        else:
+            requests._awaited_until_s = 0.0
+        wait_until(result.done, "the response")
+        wait_until(lambda: not requests.has_messages, "the response to the goals")
+        assert process.goals == ["1 running active"] * is_discovered

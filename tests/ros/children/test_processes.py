@@ -11,6 +11,7 @@ import pytest
 from lifecycle_msgs.srv import GetState
 from std_srvs.srv import Trigger
 
+from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.supervision.events import NodeFailed, Restarted, RollingBack
 from tests.ros.children.split_robot import TEXT, split, states
 from tests.ros.support.in_process import Peer, RunningSystem, wait_until
@@ -102,6 +103,8 @@ def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
 def test_a_killed_process_is_a_failure_of_its_nodes(tmp_path: Path) -> None:
     with split(tmp_path) as system:
         other, killed = pid_of(system, "detector"), pid_of(system, "camera")
+        requests = system.host._node_set.other_processes._processes["sensing"].requests
+        participant_before = requests._participant
         os.kill(killed, signal.SIGKILL)
         failed = wait_for_restart(system, "/lab/camera")
         # Noticed by the end of the process, not by missing reports.
@@ -110,6 +113,12 @@ def test_a_killed_process_is_a_failure_of_its_nodes(tmp_path: Path) -> None:
             assert system.states(name)[-2:] == [f"{name} inactive", f"{name} active"]
         assert pid_of(system, "detector") == other
         assert pid_of(system, "camera") != killed
+        # Requests go to the service of the new process, not to that which DDS still knows.
+        known = {
+            participant(server).hex() for server in servers_of(requests._ros, requests._service)
+        }
+        assert participant_before != requests._participant
+        assert requests._participant in known
 
 
 def test_a_failed_node_of_another_process_is_restarted(tmp_path: Path, peer: Peer) -> None:

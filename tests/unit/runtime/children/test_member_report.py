@@ -9,7 +9,14 @@ import pytest
 from composer.runtime.children.member_report import NodeFigures, parse_report
 from composer.runtime.ros.diagnostic_arrays import Level, Status, write_array
 
-SYSTEM = {"activity": "running", "host": "vm", "pid": "7", "started": "12.5", "started_by": "ab"}
+SYSTEM = {
+    "activity": "running",
+    "host": "vm",
+    "pid": "7",
+    "started": "12.5",
+    "started_by": "ab",
+    "participant": "010f",
+}
 NODE = {
     "state": "active",
     "held_down": "",
@@ -38,6 +45,7 @@ def test_a_report_has_the_process_and_its_nodes() -> None:
     report = parse_report(message(("robot/sensing", SYSTEM), ("robot/sensing: /camera", NODE)))
     assert report is not None
     assert report.identity == ("vm", "7", 12.5)
+    assert report.participant == "010f"
     assert (report.started_by, report.is_starting, report.is_stopping) == ("ab", False, False)
     camera = report.nodes["/camera"]
     assert (camera.state, camera.held_down) == ("active", "")
