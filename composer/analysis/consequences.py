@@ -14,6 +14,9 @@ from composer.source import Span
 
 _QUOTED = re.compile(r"'([^']*)'")
 _WORD = re.compile(r"\w+")
+_NAMESPACE = re.compile(r"\bnamespace\b")
+#: What is only reported because nodes are not in their namespaces.
+_OF_NAMESPACES = frozenset({"duplicate-server", "port-connected-twice"})
 _SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER})
 
 #: What depends on the names that connections give to ports.
@@ -38,6 +41,8 @@ _OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-i
 #: Rules, and others whose reports may follow from theirs. A warning does not hide errors: they may
 #: have another cause, and the system would run with them.
 _FOLLOWING = {
+    "class-port-type": frozenset({"type-mismatch"}),
+    "invalid-include": frozenset({"invalid-ros-name", "unknown-node", "unknown-port"}),
     "invalid-namespace": _OF_CONNECTIONS | {"unmatched-parameters"},
     "node-as-behavior": frozenset(
         {"attribute-kind", "handler-signature", "handler-without-port", "missing-handler"}
@@ -75,6 +80,8 @@ class Consequences:
                 self._all |= _OF_FOLDERS
             elif rules is not None and item.rule.name in _WITHOUT_NAMES:
                 self._all |= rules
+            elif item.rule.name == "unknown-variable" and _is_of_namespace(item.primary):
+                self._all |= _OF_NAMESPACES
             elif rules is not None:
                 self._add(rules, _names(item, context))
             if item.rule.name in _WRONG_ENDS or item.rule.name == "invalid-ros-name":
@@ -99,6 +106,10 @@ class Consequences:
         return names is not None and not names.isdisjoint(_mentioned(item))
 
 
+def _is_of_namespace(span: Span) -> bool:
+    return _NAMESPACE.search(span.file.line(span.line)[: span.column]) is not None
+
+
 def quoted(text: str | None) -> list[str]:
     """Return the names in a message."""
     return _QUOTED.findall(text or "")
@@ -121,6 +132,9 @@ def _names(item: Diagnostic, context: Context) -> Iterator[str]:
             namespace = quoted(item.message)[0]
             inside = [node for node in nodes if _is_inside(node.namespace.value, namespace)]
             yield from _names_around(inside, context)
+        case "class-port-type":
+            ports_at = (port for node in nodes for port in node.ports)
+            yield from (port.full_name for port in ports_at if port.interface.span == item.primary)
         case "unknown-key" if "lifecycle" in item.message:
             yield item.primary.file.path
         case "node-as-behavior":

@@ -13,6 +13,7 @@ from composer.diagnostics import Diagnostic, Label, Severity
 _MAX_PLACES = 3  # in the labels of one diagnostic
 _MANY = 3  # different unknown names: a file or a section is probably missing
 _MAX_UNKNOWN = 20  # further unknown names in the labels of one diagnostic
+_NEARBY_LINES = 3  # between the ends of a connection
 _NODE = "a node of this system"
 _PORT = re.compile(r"'(?:[^'.]*\.)?(?:on_|accept_)?([^'.]+)'")
 _INTERFACE = re.compile(r"^([a-z][a-z0-9_]*)/\w+/\w+ has no ")
@@ -54,7 +55,7 @@ def without_follow_ups(
         and not (item.rule.name in _OF_WRONG_KIND and _mentions(item, wrong_ports))
         and not (item.rule.name in _UNUSED and item.primary.file.path in wrong_files)
     ]
-    return _joined(_without_sections(kept), context)
+    return _joined(_without_ports(_without_sections(kept)), context)
 
 
 def _names_no_node(item: Diagnostic) -> bool:
@@ -71,6 +72,26 @@ def _without_sections(found: list[Diagnostic]) -> list[Diagnostic]:
         if item.rule.name != "unmatched-parameters"
         or not unknown.intersection(name.rpartition("/")[2] for name in _named(item)[:1])
     ]
+
+
+def _without_ports(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Leave out unknown ports in a loop of connections, with a node of the same wrong value."""
+    nodes = [item for item in found if _is_in_loop(item, "unknown-node")]
+    return [
+        item
+        for item in found
+        if not _is_in_loop(item, "unknown-port")
+        or not any(
+            _named(item)[-1] in _named(node)[-1]
+            and node.primary.file == item.primary.file
+            and abs(node.primary.line - item.primary.line) <= _NEARBY_LINES
+            for node in nodes
+        )
+    ]
+
+
+def _is_in_loop(item: Diagnostic, rule: str) -> bool:
+    return item.rule.name == rule and "${" in item.primary.text
 
 
 def _named(item: Diagnostic) -> list[str]:

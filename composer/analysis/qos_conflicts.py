@@ -92,8 +92,8 @@ def _is_offer_wrong(
     """Return whether the offer is probably wrong, not the requests.
 
     It is a guess: built-in types are not edited, several endpoints that agree are right more often
-    than one, transient-local is never requested by default, and the file of the system is nearer
-    to what a user changes than a file that several systems share.
+    than one, the file of the system is nearer to what a user changes than a file that several
+    systems share, and transient-local is never requested by default.
     """
     policy = problems[0].policy
     offer, request = (_origin(context, ends[0], policy) for ends in (offers, requests))
@@ -104,7 +104,9 @@ def _is_offer_wrong(
     )
     if min(len(offered), len(requested)) == 1 != max(len(offered), len(requested)):
         return len(offered) == 1
-    return any(item.policy == "durability" for item in problems) or offer < request
+    if offer is not request:
+        return offer < request
+    return any(item.policy == "durability" for item in problems)
 
 
 def _origin(context: Context, endpoint: PortOfNode, policy: str) -> _Origin:

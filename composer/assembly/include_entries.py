@@ -54,9 +54,13 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     if entry is None:
         return Include(file, Placement(), {}, None, file.span)
     variables, overrides = entry.get("variables"), entry.get("overrides")
+    before = len(diagnostics)
+    namespace = _namespace(entry, diagnostics)
+    # the value of a loop may be in both; it is reported once
+    found = diagnostics if len(diagnostics) == before else []
     return Include(
         file,
-        Placement(_prefix(entry, diagnostics), _namespace(entry, diagnostics)),
+        Placement(_prefix(entry, found), namespace),
         {item.name: item for item in variables} if isinstance(variables, Mapping) else {},
         overrides if isinstance(overrides, Mapping) else None,
         file.span if (prefix := entry.get("prefix")) is None else prefix.span,

@@ -84,6 +84,7 @@ def _copies(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substituti
         unknown = {entry.name: Declared(entry.key, None) for entry in names}
         yield substitution.within(substitution.scope.inner(unknown, is_known=False)), tree
         return
+    values = [(key, _distinct(choices, substitution.diagnostics)) for key, choices in values]
     substitution.grow_copies(prod(len(choices) for _, choices in values), for_each.value)
     body = Mapping(tuple(entry for entry in tree if entry is not for_each), tree.span)
     for chosen in product(*(choices for _, choices in values)):
@@ -98,6 +99,22 @@ def _values(loops: Tree) -> list[tuple[Scalar, tuple[Tree, ...]]] | None:
         return None
     found = [(entry.key, _choices(entry.value)) for entry in loops]
     return found if all(choices for _, choices in found) else None
+
+
+def _distinct(choices: tuple[Tree, ...], diagnostics: list[Diagnostic]) -> tuple[Tree, ...]:
+    """Return the values without those that are there twice; each of these is reported once."""
+    found: dict[object, Tree] = {}
+    for choice in choices:
+        value = choice.value if isinstance(choice, Scalar) else None
+        earlier = found.setdefault((type(value), value), choice)
+        if earlier is choice:
+            continue
+        message = f"'for_each' has the value '{shown(str(value))}' twice"
+        label = Label(earlier.span, "the other one")
+        problem = Diagnostic(rules.DUPLICATE_NODE_NAME, message, choice.span, (label,))
+        if all(str(item.primary) != str(problem.primary) for item in diagnostics):
+            diagnostics.append(problem)
+    return tuple(found.values())
 
 
 def _choices(tree: Tree) -> tuple[Tree, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from composer.loading import collect_diagnostics, load
 from tests.unit.rules.test_follow_ups import system
 from tests.unit.support.checking import diagnostics_in, rules_broken
@@ -111,3 +113,65 @@ def test_a_port_in_the_wrong_section_is_reported_where_it_is_used(tmp_path: Path
     paths = [tmp_path / "system.yaml", tmp_path / "nodes" / "user.yaml"]
     found = collect_diagnostics([load(path) for path in paths])
     assert [item.rule.name for item in found] == ["wrong-port-kind", "wrong-port-kind"]
+
+
+PART = """\
+system: part
+variables: {unit: a}
+nodes:
+  driver:
+    publishers: {odom: {type: std_msgs/msg/String, qos: command, required: false}}
+    services: {stop: {type: std_srvs/srv/Trigger, external: true, respond: {}}}
+    timers: {tick: {period_ms: 100, publish: {odom: {data: "${unit}"}}}}
+"""
+FLEET = """\
+system: fleet
+include:
+  - {file: part.yaml, for_each: {unit: [a, b]}, prefix: "${unit}_", namespace: "${unit}",
+     variables: {unit: "${unit}"}}
+nodes:
+  monitor:
+    subscriptions:
+      a: {type: std_msgs/msg/String, qos: command, log: a}
+      b: {type: std_msgs/msg/String, qos: command, log: b}
+connections:
+  - {topic: "${unit}/odom", for_each: {unit: [a, b]}, from: "${unit}_driver.odom",
+     to: "monitor.${unit}"}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule", "text"),
+    [
+        ("{unit: [a, b]}, prefix", "{unit: [a, b, a]}, prefix", "duplicate-node-name", "a"),
+        ("{unit: [a, b]}, from", "{unit: [a, b, b]}, from", "duplicate-node-name", "b"),
+        ("[a, b]}, prefix", "[a, b, 3c]}, prefix", "invalid-include", "3c"),
+        ("[a, b]}, from", "[a, b, c]}, from", "unknown-node", "${unit}_driver.odom"),
+        ('namespace: "${unit}"', 'namespace: "${unti}"', "unknown-variable", "${unti}"),
+        # durability: the file of the system is wrong, not the included one
+        ("b: {type: std_msgs/msg/String, qos: command", "b: {type: std_msgs/msg/String, qos: state",
+         "qos-incompatible", "state"),
+    ],
+)  # fmt: skip
+def test_a_wrong_value_of_a_loop_is_reported_once(
+    old: str, new: str, rule: str, text: str, tmp_path: Path
+) -> None:
+    (tmp_path / "part.yaml").write_text(PART, encoding="utf-8")
+    assert diagnostics_in(FLEET, tmp_path) == []
+    [found] = diagnostics_in(FLEET.replace(old, new), tmp_path)
+    assert (found.rule.name, found.primary.text) == (rule, text)
+
+
+def test_a_type_that_contradicts_the_class_is_reported_once(tmp_path: Path) -> None:
+    (tmp_path / "camera.py").write_text(
+        "from rclpy.node import Node\nfrom std_msgs.msg import String\n\n\nclass Camera(Node):\n"
+        "    def __init__(self):\n        super().__init__('camera')\n"
+        "        self.create_publisher(String, 'text', 10)\n",
+        encoding="utf-8",
+    )
+    text = system(
+        "camera: {class: 'camera:Camera', publishers: {text: {type: std_msgs/msg/Int32}}}",
+        "sink: {subscriptions: {text: {type: std_msgs/msg/String, log: a}}}",
+    )
+    assert "class-port-type" in rules_broken(text, tmp_path)
+    assert "type-mismatch" not in rules_broken(text, tmp_path)
