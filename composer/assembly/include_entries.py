@@ -57,13 +57,15 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     before = len(diagnostics)
     namespace = _namespace(entry, diagnostics)
     # the value of a loop may be in both; it is reported once
-    found = diagnostics if len(diagnostics) == before else []
+    written, prefix = _text(entry.get("namespace")), _text(entry.get("prefix"))
+    is_same = written is not None and prefix is not None and written.value in prefix.value
+    found = [] if is_same and len(diagnostics) > before else diagnostics
     return Include(
         file,
         Placement(_prefix(entry, found), namespace),
         {item.name: item for item in variables} if isinstance(variables, Mapping) else {},
         overrides if isinstance(overrides, Mapping) else None,
-        file.span if (prefix := entry.get("prefix")) is None else prefix.span,
+        file.span if (given := entry.get("prefix")) is None else given.span,
     )
 
 
