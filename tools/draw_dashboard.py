@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ FOLDER = ROOT / "docs" / "pictures"
 SYSTEM = "systems/pipeline.yaml"
 COMPOSE = Path(sys.executable).with_name("compose")
 _PLOTTED_S = 9.0
+#: The rates of the first reports include the bring-up.
+_SETTLED_S = 4.0
 _PLANNER = "/planning/planner"
 _POSITION = "/sensor_data:pose.pose.position"
 #: The CPU time of a process is known only after a second measurement. Narrow pages do not show it.
@@ -59,7 +62,7 @@ def _refuse(page: Page, _: float) -> None:
 PICTURES = (
     Picture("dashboard-graph.png", "/graph", '[data-label]:has-text("Hz")', height=440),
     Picture("dashboard-details.png", f"/graph{_PLANNER}", ".detail h3:has-text('Parameters')"),
-    Picture("dashboard-nodes.png", f"/nodes{_PLANNER}", ".small", dark=True),
+    Picture("dashboard-nodes.png", f"/nodes{_PLANNER}", ".small td:has-text('Hz')", dark=True),
     Picture(
         "dashboard-plot.png",
         f"/topics/sensor_data?tab=plot&series={_POSITION}.x+{_POSITION}.y",
@@ -109,6 +112,7 @@ def main() -> None:
         if process.stdout is None or not (url := process.stdout.readline().strip()):
             raise SystemExit("the dashboard did not start")
         playwright = stack.enter_context(sync_playwright())
+        time.sleep(_SETTLED_S)
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         stack.callback(browser.close)
         take(browser, url, FOLDER)
