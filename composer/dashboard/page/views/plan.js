@@ -9,8 +9,8 @@ export function createPlan(app) {
   const again = button("Compare again", () => attempt(again, drift));
   let tab = "";
 
-  async function load(what, draw) {
-    content.replaceChildren(empty("Loading …"));
+  async function load(what, waiting, draw) {
+    content.replaceChildren(empty(waiting));
     try {
       const found = await app.connection.request(what);
       if (what === tab) content.replaceChildren(draw(found));
@@ -20,7 +20,7 @@ export function createPlan(app) {
   }
 
   function plan() {
-    return load("plan", ({ steps }) => h(
+    return load("plan", "Loading the plan …", ({ steps }) => h(
       "table",
       { class: "data plan", "aria-label": "Plan of the bring-up" },
       h("thead", {}, h("tr", {}, ["Step", "Node", "Transition", "Because"].map((text, index) => h("th", { scope: "col", class: index === 0 ? "number" : null }, text)))),
@@ -36,7 +36,7 @@ export function createPlan(app) {
   }
 
   function drift() {
-    return load("drift", ({ differences }) => h(
+    return load("drift", "Comparing the running system with its file …", ({ differences }) => h(
       "div",
       {},
       h("div", { class: "toolbar" }, again),
