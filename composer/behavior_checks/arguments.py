@@ -211,6 +211,12 @@ _LIBRARY = frozenset({"copy", "json", "random"})
 _OF_FIELD = frozenset(inspect.signature(dataclasses.field).parameters)
 _BY_NAME: Mapping[str, Signature] = {
     "collections.deque": Signature("deque", ("iterable", "maxlen"), (), frozenset()),
+    "collections.namedtuple": Signature(
+        "namedtuple",
+        ("typename", "field_names"),
+        ("defaults", "module", "rename"),
+        frozenset({"field_names", "typename"}),
+    ),
     "dataclasses.field": Signature("field", (), tuple(sorted(_OF_FIELD)), frozenset()),
 }
 

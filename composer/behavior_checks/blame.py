@@ -63,6 +63,8 @@ class Blame:
         others = {_key(item) for item in check(_with(scope, name, ANYTHING))}
         caused = [item for item in found if _key(item) not in others]
         is_misspelled = any(map(_is_misspelled, caused))
+        if not site.is_complete:  # another check reports the call
+            return [item for item in found if item not in caused], []
         if not caused or is_misspelled or _is_used(name, function, scope, caused):
             return found, []
         argument, at = self._first(site, name)

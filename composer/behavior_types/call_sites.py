@@ -12,7 +12,7 @@ from composer.behavior_source.method_body import dotted
 from composer.behavior_source.traversal import children
 from composer.behavior_types.bindings import CONTEXTS, bindings_of, is_class_method, is_static
 from composer.behavior_types.fillings import plain
-from composer.behavior_types.lineage import PLAIN_BASES, lineage
+from composer.behavior_types.lineage import NAMED_TUPLE, PLAIN_BASES, lineage
 from composer.behavior_types.own_classes import constructor_of
 from composer.behavior_types.values import (
     NONE,
@@ -64,6 +64,8 @@ class CallSite:
     call: ast.Call
     scope: FunctionTypes
     given: Mapping[str, tuple[ast.expr | None, Value]]
+    #: Whether it passes all that is needed.
+    is_complete: bool = True
 
 
 class CallSites:
@@ -174,7 +176,8 @@ def _open_functions(types: BehaviorTypes) -> Iterator[OpenFunction]:
 
 def _is_own(own: OwnClass) -> bool:
     """Return whether no other code calls the methods of a class."""
-    return lineage(own).others <= PLAIN_BASES and not own.definition.node.keywords
+    others = lineage(own).others
+    return others <= PLAIN_BASES | {NAMED_TUPLE} and not own.definition.node.keywords
 
 
 def _is_related(name: str, own: OwnClass, types: BehaviorTypes) -> bool:
@@ -251,15 +254,17 @@ def _site(
     given: dict[str, ast.expr] = dict(zip(positional, call.args, strict=False))
     given.update({item.arg: item.value for item in call.keywords if item.arg is not None})
     found: dict[str, tuple[ast.expr | None, Value]] = {}
+    is_complete = True
     for name in known.parameters:
         if name in given:
             found[name] = given[name], plain(scope.type_of(given[name]))
         else:
             default = _default(known.node, name)
+            is_complete = is_complete and default is not None
             inside = scope.owner.at_module(known.home)
             type_ = inside.type_of(default) if default is not None else ANYTHING
             found[name] = None, plain(type_)
-    return CallSite(call, scope, found)
+    return CallSite(call, scope, found, is_complete)
 
 
 def _default(function: Function, name: str) -> ast.expr | None:

@@ -9,10 +9,11 @@ from functools import cached_property
 from composer.behavior_source import BehaviorSource, Method, Module
 from composer.behavior_source.method_body import argument
 from composer.behavior_source.traversal import walk
+from composer.behavior_types.assumptions import Assumed
 from composer.behavior_types.bindings import Bindings, nodes_of
 from composer.behavior_types.expressions import FunctionTypes
 from composer.behavior_types.handlers import Handler
-from composer.behavior_types.inference import Assumed, BehaviorTypes
+from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.literals import constant_type
 from composer.behavior_types.members import attribute_of
 from composer.behavior_types.names import own_name

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from composer.behavior_source import BehaviorSource, Function, Method, Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.api import attribute_class
+from composer.behavior_types.assumptions import Assumed, is_open, lacks
 from composer.behavior_types.bindings import (
     Binding,
     Bindings,
@@ -62,20 +63,6 @@ CONTAINERS: Mapping[str, PortKind] = {
 
 #: How often types are inferred, until they rest on nothing that has changed.
 _ROUNDS = 6
-
-
-@dataclass(slots=True)
-class Assumed:
-    """What a round of inference takes from the one before it.
-
-    These are the types of arguments, by the id of the function and by name, and of the attributes
-    that are empty at first. ``filled`` are the latter without their elements.
-    """
-
-    arguments: dict[tuple[int, str], Value] = field(default_factory=dict)
-    fillings: dict[str, Collection] = field(default_factory=dict)
-    filled: dict[str, Collection] = field(default_factory=dict)
-    is_settled: bool = True
 
 
 @dataclass()
@@ -256,7 +243,7 @@ class BehaviorTypes:
     def has_open_functions(self) -> bool:
         """Whether the files have functions with parameters that have no annotation."""
         return any(
-            _is_open(function)
+            is_open(function)
             for home in self.source.own_modules
             for functions in (
                 home.tree.body,
@@ -338,6 +325,7 @@ class BehaviorTypes:
                 self.assumed.filled[name] = found
                 found = self.assumed.fillings.get(name, Collection(found.python, NONE, NONE))
         self._known[name] = found
+        computed = [pair for pair in computed if not lacks(found, pair[1].expression, name)]
         found = joined([(found, How.VALUE)] + [(s.bound(item), item.how) for s, item in computed])
         if found != self._known[name]:
             self.forget_expressions()
@@ -379,16 +367,6 @@ class BehaviorTypes:
         handler = self.handlers.get(method.name)
         given = dict(zip(method.arguments, handler.arguments if handler else (), strict=False))
         return self.inferred_arguments(method.node) | given if method.node is not None else given
-
-
-def _is_open(function: Function) -> bool:
-    """Return whether a parameter other than the object has no annotation."""
-    arguments = function.args
-    positional = (*arguments.posonlyargs, *arguments.args)
-    parameters = (*positional[1:], *arguments.kwonlyargs, *positional[:1])
-    first = positional[0].arg if positional else ""
-    is_method = first in {"self", "cls"}
-    return any(item.annotation is None for item in parameters[: -1 if is_method else None])
 
 
 def _of_class(node: ast.ClassDef) -> Iterator[tuple[str, Binding]]:

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Sequence
 from typing import TypeGuard
 
+from composer.behavior_types.lineage import NAMED_TUPLE, lineage
 from composer.behavior_types.numpy_types import ARRAY, array_operation
 from composer.behavior_types.own_classes import is_plain, known_attributes
 from composer.behavior_types.rclpy_api import is_time, order_of_rclpy, time_arithmetic
@@ -145,6 +146,8 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
     for value in (left, right):
         if isinstance(value, OwnObject) and not is_defined and is_plain(value.of):
             return f"a {value.of.definition.name} has no operator '{sign}'"
+        if _is_tuple(value) and sign not in _OF_TUPLES and not _has_own(left, right, name):
+            return f"a {value.of.definition.name} has no operator '{sign}'"
     is_repeated = isinstance(operator, ast.Mult) and (is_integer(left) or is_integer(right))
     for first, second in ((left, right), (right, left)):
         is_sequence = _is_list(second) and second.python in (list, tuple)
@@ -162,6 +165,22 @@ def _problem_of_times(left: Value, sign: str, right: Value) -> str | None:
     if "" in names or time_arithmetic(left, sign, right) is not ANYTHING:
         return None
     return f"operator '{sign}' on {names[0]} and {names[1]}"
+
+
+def _is_tuple(value: Value) -> TypeGuard[OwnObject]:
+    """Return whether a value is a named tuple, or of a class that is derived from one."""
+    return isinstance(value, OwnObject) and lineage(value.of).others == {NAMED_TUPLE}
+
+
+def _has_own(left: Value, right: Value, name: str) -> bool:
+    """Return whether a class may define an operator for two values."""
+    for value, method in ((left, f"__{name}__"), (right, f"__r{name}__")):
+        known = known_attributes(value.of) if isinstance(value, OwnObject) else frozenset()
+        if known is None or method in known:
+            return True
+    return not all(
+        is_number(value) or is_text(value) or _is_tuple(value) for value in (left, right)
+    )
 
 
 def _defines(value: Value, method: str) -> bool:
@@ -227,6 +246,8 @@ def _may_order(type_: OwnObject) -> bool:
     return options or bool(own & {"__lt__", "__le__", "__gt__", "__ge__"})
 
 
+#: What tuples and numbers have in common; numpy takes tuples for arrays.
+_OF_TUPLES = frozenset({"+", "*", "%"})
 _NAMES: dict[type[ast.operator], str] = {
     ast.Add: "add",
     ast.Sub: "sub",

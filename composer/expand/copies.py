@@ -24,6 +24,7 @@ from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 FOR_EACH = "for_each"
 
+_DIFFERENT = "give 'for_each' values that make the names different"
 _DEPTH = 2  # of the entries of a section
 
 
@@ -111,7 +112,7 @@ def _distinct(choices: tuple[Tree, ...], diagnostics: list[Diagnostic]) -> tuple
             continue
         message = f"'for_each' has the value '{shown(str(value))}' twice"
         label = Label(earlier.span, "the other one")
-        problem = Diagnostic(rules.DUPLICATE_NODE_NAME, message, choice.span, (label,))
+        problem = Diagnostic(rules.DUPLICATE_NODE_NAME, message, choice.span, (label,), _DIFFERENT)
         if all(str(item.primary) != str(problem.primary) for item in diagnostics):
             diagnostics.append(problem)
     return tuple(found.values())
@@ -142,7 +143,7 @@ def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
     if entry is earlier and isinstance(loops, Mapping):
         used = set(references(entry.key))
         unused = [f"${{{shown(loop.name)}}}" for loop in loops if loop.name not in used]
-        hint = "give 'for_each' values that make the names different"
+        hint = _DIFFERENT
         if unused:
             hint = f"make the names unique: '{'_'.join((shown(entry.name), *unused))}'"
         message = f"copies of this node have the same name, '{shown(name)}'"

@@ -133,7 +133,7 @@ import shapes
 from geometry_msgs.msg import Point, Pose
 from shapes import Plan
 from shapes import shapes as all_shapes
-from collections import deque
+from collections import deque, namedtuple
 from dataclasses import replace
 from shapes.shapes import (
     SIZES, Filter, Light, Named, Place, Shape, ShapeError, Side, Size, Square, lit, nothing
@@ -169,6 +169,8 @@ RIGHT = [
     "raise ShapeError(self.square, 'too large')",
     "print(Size(1.0).height, Size(height=2, width=1)[0], Size(*'ab')._asdict())",
     "print(Size(1.0)._replace(height='a').height, Size._fields)",
+    "print(Size(1, 2) * 2, Size(1, 2) + (3,), np.zeros(2) / Size(1, 2))",
+    "self.square = self.square.scaled(2.0)",
     "print(replace(Named(1.0), x=2.0, name='b').name)",
     "print(Filter(2.0)(3.0), [side.name for side in Filter(gain=1)])",
     "with Filter(1) as filter, lit('red') as side: print(filter.gain, side.is_left)",
@@ -206,6 +208,9 @@ RIGHT = [
         ("Size(1, 2, 3)", "call-arguments", "3"),
         ("print(Size(1, 2).length)", "unknown-attribute", "length"),
         ("print(Size(1)._replace(length=2).width)", "call-arguments", "length"),
+        ("print(Size(1, 2) / 2)", "invalid-value", "Size(1, 2) / 2"),
+        ("namedtuple('Extent', 'a b', default=[1])", "call-arguments", "default"),
+        ("self.square = self.square.scale(2.0)", "unknown-attribute", "scale"),
         ("replace(Place(1.0), z=2.0)", "call-arguments", "z"),
         ("replace(Place(1.0), x='a')", "call-arguments", "'a'"),
         ("Filter(2.0)(1.0, 2.0)", "call-arguments", "2.0"),
