@@ -126,9 +126,11 @@ def set_all(ros: RosGraphSide, deadline: Deadline, settings: Iterable[Setting]) 
 def _read_everything(ros: RosGraphSide, deadline: Deadline) -> Found:
     from composer.remote.snapshot import GraphObserver
 
-    topology = ros.observed.known()
+    # Nodes that have just ended would be waited for.
+    present = {name for name, _ in ros.session.graph.names("node")}
+    nodes = {name: ends for name, ends in ros.observed.known().nodes.items() if name in present}
     with GraphObserver(ros.session) as observer:
-        found = observer.parameters(topology.nodes, deadline)
+        found = observer.parameters(nodes, deadline)
     parameters = [
         parameter(full_name(node, name), value)
         for node in sorted(found)
