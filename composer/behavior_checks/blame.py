@@ -18,6 +18,7 @@ from composer.field_types import ANYTHING
 #: The problems that a value of a wrong type causes.
 _OF_TYPES = frozenset({Kind.ATTRIBUTE, Kind.CALL, Kind.FIELD, Kind.VALUE})
 _DEEPEST = 4
+_MOST_TYPES = 4
 
 #: Returns all problems of a function, with these types of its arguments.
 Check = Callable[[FunctionTypes], Iterable[CodeProblem]]
@@ -105,6 +106,8 @@ def _of_differing(
         type_ = site.given[name][1]
         if type_ is not ANYTHING and type_ is not NONE and type_ not in types:
             types.append(type_)
+        if len(types) > _MOST_TYPES:
+            return []
     certain = always_executed(function, lambda test: _is_of_others(test, name))
     if len(sites) < 2 or not certain:
         return []

@@ -19,7 +19,7 @@ class Assumed:
     that are empty at first. ``filled`` are the latter without their elements.
     """
 
-    arguments: dict[tuple[int, str], Value] = field(default_factory=dict)
+    arguments: dict[int, dict[str, Value]] = field(default_factory=dict)
     fillings: dict[str, Collection] = field(default_factory=dict)
     filled: dict[str, Collection] = field(default_factory=dict)
     is_settled: bool = True

@@ -95,16 +95,16 @@ class CallSites:
         for item in self._by_name[name]:
             self.functions.pop(id(item.node), None)
 
-    def arguments(self) -> dict[tuple[int, str], Value]:
+    def arguments(self) -> dict[int, dict[str, Value]]:
         """Return the types of the parameters whose calls all agree, by function and name."""
-        found: dict[tuple[int, str], Value] = {}
+        found: dict[int, dict[str, Value]] = {}
         for key, sites in self.sites().items():
             for name in self.functions[key].parameters:
                 types: Value = NONE
                 for site in sites:
                     types = join(types, site.given[name][1])
                 if types is not NONE and types is not ANYTHING:
-                    found[key, name] = types
+                    found.setdefault(key, {})[name] = types
         return found
 
     def sites(self) -> dict[int, list[CallSite]]:
@@ -138,15 +138,19 @@ class CallSites:
         known = types.scopes.get(id(function))
         if known is not None:
             return known
-        own = _class_of(function, reference.home)
+        own = _classes_of(reference.home).get(id(function))
         return types.function(function, reference.home, own)
 
 
-def _class_of(function: Function, home: Module) -> OwnClass | None:
-    for known in home.classes.values():
-        if any(method.node is function for method in known.methods):
-            return OwnClass(known, home)
-    return None
+@lru_cache(maxsize=128)
+def _classes_of(home: Module) -> dict[int, OwnClass]:
+    """Return the classes of the methods in a file, by the id of the method."""
+    return {
+        id(method.node): OwnClass(known, home)
+        for known in home.classes.values()
+        for method in known.methods
+        if method.node is not None
+    }
 
 
 def _open_functions(types: BehaviorTypes) -> Iterator[OpenFunction]:

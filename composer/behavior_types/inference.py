@@ -112,8 +112,7 @@ class BehaviorTypes:
 
     def inferred_arguments(self, function: Function) -> dict[str, Value]:
         """Return the types of the arguments that all calls of a function pass."""
-        inferred = self.assumed.arguments
-        return {name: type_ for (key, name), type_ in inferred.items() if key == id(function)}
+        return dict(self.assumed.arguments.get(id(function), {}))
 
     @cached_property
     def project_classes(self) -> ProjectClasses:
@@ -223,14 +222,24 @@ class BehaviorTypes:
 
     def _fillings(self, name: str) -> list[tuple[FunctionTypes, Filling]]:
         """Return what the methods put into ``self.<name>``, nothing if other code may as well."""
-        found: list[tuple[FunctionTypes, Filling]] = []
-        for scope in self.scopes.values():
-            if scope.function is not None:
-                known = fillings_of(scope.function, scope.home)
-                if f".{name}" in known.passed_on:
-                    return []
-                found += ((scope, item) for item in known.found.get(f".{name}", ()))
-        return found
+        return [(self.scopes[key], item) for key, item in self._all_fillings.get(name, ())]
+
+    @cached_property
+    def _all_fillings(self) -> dict[str, list[tuple[int, Filling]]]:
+        """What the methods put into attributes, each with the id of the method."""
+        found: dict[str, list[tuple[int, Filling]]] = {}
+        passed_on: set[str] = set()
+        for home, known in self.source.classes:
+            for function in (method.node for method in known.methods if method.node is not None):
+                inside = fillings_of(function, home)
+                passed_on |= inside.passed_on
+                for name, items in inside.found.items():
+                    found.setdefault(name, []).extend((id(function), item) for item in items)
+        return {
+            name[1:]: items
+            for name, items in found.items()
+            if name.startswith(".") and name not in passed_on
+        }
 
     @cached_property
     def call_sites(self) -> CallSites:
