@@ -20,6 +20,7 @@ export function createViewport(picture, onscale = () => {}) {
   let scale = 1;
   let shownScale = null;
   let shift = { x: 0, y: 0 };
+  let dragged = { x: 0, y: 0 };
 
   function pixelsPerUnit() {
     const { width, height } = svg.getBoundingClientRect();
@@ -68,6 +69,19 @@ export function createViewport(picture, onscale = () => {}) {
     show();
   }
 
+  /** Move the picture by pixels until it is dropped, which is quick: nothing is painted again. */
+  function drag(x, y) {
+    dragged = { x: dragged.x + x, y: dragged.y + y };
+    svg.style.transform = `translate(${dragged.x}px, ${dragged.y}px)`;
+  }
+
+  function drop() {
+    const units = 1 / pixelsPerUnit();
+    svg.style.transform = "";
+    if (dragged.x || dragged.y) pan(dragged.x * units, dragged.y * units);
+    dragged = { x: 0, y: 0 };
+  }
+
   /** Center a box, given in SVG units, and make it large enough to read. */
   function center(box) {
     scale = Math.max(scale, MIN_READABLE_PIXELS_PER_UNIT / pixelsPerUnit());
@@ -98,7 +112,7 @@ export function createViewport(picture, onscale = () => {}) {
   }
 
   listenToWheel(svg, zoomAt, pointAt);
-  listenToPointers(svg, { zoomAt, pan, pointAt });
+  listenToPointers(svg, { zoomAt, drag, drop, pointAt });
   return { fit, zoom, center, reveal, uncover, rescale };
 }
 
@@ -139,13 +153,13 @@ function listenToPointers(svg, viewport) {
     }
     const other = [...pointers.values()].find((one) => one.pointerId !== event.pointerId);
     if (other) pinch(before, event, other);
-    else drag(before, event);
+    else viewport.drag(event.clientX - before.clientX, event.clientY - before.clientY);
     pointers.set(event.pointerId, event);
   });
 
   for (const name of ["pointerup", "pointercancel"]) {
     svg.addEventListener(name, (event) => {
-      pointers.delete(event.pointerId);
+      if (pointers.delete(event.pointerId)) viewport.drop();
       svg.classList.remove("dragged");
     });
   }
@@ -153,13 +167,8 @@ function listenToPointers(svg, viewport) {
   // The end of a drag must not be a click on the element below the pointer.
   svg.addEventListener("click", (event) => { if (dragging) event.stopPropagation(); }, true);
 
-  function drag(before, event) {
-    const from = viewport.pointAt(before.clientX, before.clientY);
-    const to = viewport.pointAt(event.clientX, event.clientY);
-    viewport.pan(to.x - from.x, to.y - from.y);
-  }
-
   function pinch(before, event, other) {
+    viewport.drop();
     const distance = (one) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
     if (distance(before) === 0) return;
     const middle = [(event.clientX + other.clientX) / 2, (event.clientY + other.clientY) / 2];
