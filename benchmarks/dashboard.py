@@ -206,7 +206,7 @@ def running_dashboard(
                 raise ProgramFailed("the dashboard has not started")
             yield process, address
         finally:
-            process.kill()
+            process.terminate()  # killed, it would stay in the graph for 20 s
 
 
 def _connected(address: re.Match[bytes]) -> connect:

@@ -177,7 +177,9 @@ class RosSide:
 
 def _import() -> None:
     import composer.dashboard.observing.observed
-    import composer.dashboard.pictures  # noqa: F401 - for the first diagram
+    import composer.dashboard.pictures  # for the first diagram
+    import composer.remote.shared_session
+    import composer.runtime.process.dds_announcements  # noqa: F401
 
 
 def _logged(function: Callable[[], None]) -> None:
