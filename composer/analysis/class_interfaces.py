@@ -13,21 +13,21 @@ from composer.behavior_types.bindings import nodes_of
 from composer.behavior_types.names import full_name, interface_name
 from composer.fast_dataclass import dataclass
 from composer.model import PortKind
+from composer.resolve.parameters import rclpy_type
 from composer.source import Located, Span
 
-_TYPES: tuple[tuple[type, str], ...] = (
-    (bool, "bool"),
-    (int, "integer"),
-    (float, "double"),
-    (str, "string"),
-)
-#: The methods that create ports: their kind, and their arguments for the type and the name.
-_CREATORS = {
-    "create_publisher": (PortKind.PUBLISHER, "msg_type", "topic"),
-    "create_lifecycle_publisher": (PortKind.PUBLISHER, "msg_type", "topic"),
-    "create_subscription": (PortKind.SUBSCRIPTION, "msg_type", "topic"),
-    "create_service": (PortKind.SERVICE, "srv_type", "srv_name"),
-    "create_client": (PortKind.CLIENT, "srv_type", "srv_name"),
+_TOPIC = ("msg_type", "topic", "qos_profile")
+_SERVICE = ("srv_type", "srv_name")
+#: The methods that create ports: their kind, and their arguments in order.
+CREATORS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
+    "create_publisher": (PortKind.PUBLISHER, _TOPIC),
+    "create_lifecycle_publisher": (PortKind.PUBLISHER, _TOPIC),
+    "create_subscription": (
+        PortKind.SUBSCRIPTION,
+        ("msg_type", "topic", "callback", "qos_profile"),
+    ),
+    "create_service": (PortKind.SERVICE, _SERVICE),
+    "create_client": (PortKind.CLIENT, _SERVICE),
 }
 
 
@@ -61,10 +61,10 @@ def parameter_types(found: ClassOfNode) -> dict[str, Located[str]]:
 def created_ports(found: ClassOfNode) -> Iterator[CreatedPort]:
     """Yield the ports that a class creates with a constant type and name."""
     for module, call in _calls(found.source):
-        creator = _CREATORS.get(call.func.attr) if isinstance(call.func, ast.Attribute) else None
+        creator = CREATORS.get(call.func.attr) if isinstance(call.func, ast.Attribute) else None
         if creator is None:
             continue
-        kind, of_type, of_name = creator
+        kind, (of_type, of_name, *_) = creator
         type_, name = argument(call, 0, of_type), argument(call, 1, of_name)
         interface, rest = interface_name(full_name(dotted(type_), module)) if type_ else ("", "")
         if interface and not rest and isinstance(name, ast.Constant):
@@ -97,13 +97,7 @@ def _may_change(call: ast.Call) -> bool:
 
 def _type_of(default: ast.expr) -> str | None:
     """Return the type of a parameter with a default, None if it is not constant."""
-    value = default.operand if isinstance(default, ast.UnaryOp) else default
-    match value:
-        case ast.Constant(value=constant):
-            return next((name for kind, name in _TYPES if type(constant) is kind), None)
-        case ast.List(elts=[_, *_] as items):
-            found = {_type_of(item) for item in items}
-            only = found.pop() if len(found) == 1 else None
-            return f"{only}_array" if only is not None else None
-        case _:
-            return None
+    try:
+        return rclpy_type(ast.literal_eval(default))
+    except ValueError:
+        return None

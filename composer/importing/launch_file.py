@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from composer.importing.found import FoundNode, FoundParameter, FoundSystem
-from composer.importing.live import parameter_type
 from composer.names import join_node_name, parameter_name_problem
+from composer.resolve.parameters import rclpy_type
 from composer.tree import Plain
 
 _DEFAULT_NAME = "node"
@@ -74,7 +74,7 @@ def _declared(
     values: Mapping[str, Plain], full_name: str, left_out: list[str]
 ) -> Iterable[FoundParameter]:
     for name, value in values.items():
-        kind = parameter_type(value)
+        kind = rclpy_type(value)
         if kind is None or parameter_name_problem(name):
             left_out.append(f"parameter {name} of {full_name}: its type is not known")
         else:

@@ -10,6 +10,7 @@ from composer.importing.found import FoundNode, FoundParameter, FoundPort, Found
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
 from composer.names import parameter_name_problem, split_node_name, topic_name_problem
 from composer.qos import PRESETS, QosProfile
+from composer.resolve.parameters import rclpy_type
 from composer.tree import Plain
 
 _IS_ACTIVE = "/manager/is_active"
@@ -139,7 +140,7 @@ def _parameters(
         if is_of_every_node(name) or (name == USE_SIM_TIME and not value):
             continue
         described = dict(settings.get(name, {}))
-        kind = described.pop("type", None) or parameter_type(value)
+        kind = described.pop("type", None) or rclpy_type(value)
         if parameter_name_problem(name):
             problem = parameter_name_problem(name)
             left_out.append(f"parameter {name!r} of {node.full_name}: the name {problem}")
@@ -147,24 +148,6 @@ def _parameters(
             left_out.append(f"parameter {name} of {node.full_name}: it has no value")
         else:
             yield FoundParameter(name, str(kind), value, described)
-
-
-def parameter_type(value: Plain) -> str | None:
-    """Return the type of a parameter with a value; None if no parameter has such a value."""
-    match value:
-        case list():
-            kinds = {parameter_type(item) for item in value}
-            return f"{kinds.pop()}_array" if len(kinds) == 1 else None
-        case bool():
-            return "bool"
-        case int():
-            return "integer"
-        case float():
-            return "double"
-        case str():
-            return "string"
-        case _:
-            return None
 
 
 def _keys(node: ObservedNode) -> dict[str, Plain]:

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from composer.analysis.class_interfaces import CREATORS
 from composer.analysis.hosted_classes import is_rclpy_node
 from composer.behavior_source import (
     BehaviorSource,
@@ -19,27 +20,16 @@ from composer.behavior_source import (
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
-from composer.importing.live import parameter_type
 from composer.importing.python_values import NotLiteral, Scope
 from composer.model import BehaviorReference, PortKind
 from composer.project import Project
+from composer.resolve.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
 
 T = TypeVar("T")
 
-#: The methods and classes that create endpoints: their kind, and their arguments in order.
-_TOPIC = ("msg_type", "topic", "qos_profile")
-_CREATORS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
-    "create_publisher": (PortKind.PUBLISHER, _TOPIC),
-    "create_lifecycle_publisher": (PortKind.PUBLISHER, _TOPIC),
-    "create_subscription": (
-        PortKind.SUBSCRIPTION,
-        ("msg_type", "topic", "callback", "qos_profile"),
-    ),
-    "create_service": (PortKind.SERVICE, ("srv_type", "srv_name")),
-    "create_client": (PortKind.CLIENT, ("srv_type", "srv_name")),
-}
+#: The classes that create endpoints: their kind, and their arguments in order.
 _ACTIONS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
     "rclpy.action.ActionServer": (PortKind.ACTION_SERVER, ("node", "action_type", "action_name")),
     "rclpy.action.server.ActionServer": (
@@ -142,8 +132,8 @@ class _ClassReader:
             place = f"{scope.module.path.name}:{call.lineno}"
             name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
             full_name = scope.full_name(call.func)
-            if name in _CREATORS and full_name.startswith("self."):
-                self._add_port(scope, call, _CREATORS[name], place)
+            if name in CREATORS and full_name.startswith("self."):
+                self._add_port(scope, call, CREATORS[name], place)
             elif full_name in _ACTIONS:
                 self._add_port(scope, call, _ACTIONS[full_name], place)
             elif full_name == "self.declare_parameter":
@@ -224,7 +214,7 @@ class _ClassReader:
             value = self._try(
                 lambda: scope.literal(value_node), f"{place}: the default of parameter {name}"
             )
-        kind = parameter_type(value)
+        kind = rclpy_type(value)
         if kind is None and value_node is not None:
             kind = _type_of_node(scope, value_node)
         if kind is None:

@@ -73,10 +73,18 @@ def with_values(
 
 def inferred_type(value: Plain) -> str | None:
     """Return the parameter type of ``value``; None for null, maps and mixed lists."""
+    if isinstance(value, list) and {type(item) for item in value} == {int, float}:
+        return "double_array"
+    return rclpy_type(value)
+
+
+def rclpy_type(value: object) -> str | None:
+    """Return the type that rclpy infers from ``value``; None if it refuses it.
+
+    Unlike in YAML files, a list of integers and doubles is refused.
+    """
     if isinstance(value, list):
         kinds = {_SCALAR_TYPES.get(type(item)) for item in value}
-        if kinds == {"integer", "double"}:
-            kinds = {"double"}
         kind = kinds.pop() if len(kinds) == 1 else None
         return f"{kind}_array" if kind is not None else None
     return _SCALAR_TYPES.get(type(value))

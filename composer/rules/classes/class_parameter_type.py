@@ -26,14 +26,12 @@ nodes:
     parameters: {rate_hz: {type: integer, default: 5}}
 # file: robot_nodes.py
 from rclpy.node import Node
-from std_msgs.msg import Float64
 
 
 class Lidar(Node):
     def __init__(self):
         super().__init__("lidar")
         self.declare_parameter("rate_hz", 10.0)
-        self.range = self.create_publisher(Float64, "range", 10)
 """,
         good="""\
 # file: system.yaml
@@ -44,14 +42,12 @@ nodes:
     parameters: {rate_hz: {type: double, default: 5.0}}
 # file: robot_nodes.py
 from rclpy.node import Node
-from std_msgs.msg import Float64
 
 
 class Lidar(Node):
     def __init__(self):
         super().__init__("lidar")
         self.declare_parameter("rate_hz", 10.0)
-        self.range = self.create_publisher(Float64, "range", 10)
 """,
     )
 )

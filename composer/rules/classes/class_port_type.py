@@ -31,7 +31,6 @@ from std_msgs.msg import Float64
 class Lidar(Node):
     def __init__(self):
         super().__init__("lidar")
-        self.declare_parameter("rate_hz", 10.0)
         self.range = self.create_publisher(Float64, "range", 10)
 """,
         good="""\
@@ -49,7 +48,6 @@ from std_msgs.msg import Float64
 class Lidar(Node):
     def __init__(self):
         super().__init__("lidar")
-        self.declare_parameter("rate_hz", 10.0)
         self.range = self.create_publisher(Float64, "range", 10)
 """,
     )
