@@ -123,7 +123,7 @@ def _wait_until_idle(pids: Sequence[int]) -> None:
     end_s = time.monotonic() + _IDLE_WITHIN_S
     idle_s = time.monotonic() + _IDLE_S
     while pids and time.monotonic() < min(idle_s, end_s):
-        time.sleep(_POLL_S)
+        time.sleep(_POLL_S)  # no event says that a process is idle
         if any(map(has_work, pids)):
             idle_s = time.monotonic() + _IDLE_S
 

@@ -13,7 +13,7 @@ from composer.runtime.process.dds_participants import count_participants
 from composer.runtime.process.query_socket import KINDS, GraphView
 from composer.runtime.ros.action_info import action_info
 from composer.runtime.ros.endpoints_by_node import endpoints, node_names
-from composer.runtime.ros.graph import SETTLE_S, RosGraph, participant
+from composer.runtime.ros.graph import SETTLE_S, RosGraph
 from composer.runtime.ros.node_info import node_info
 
 #: How long to wait for a process that has just started; commands wait longer than that.
@@ -33,10 +33,10 @@ class GraphObserver:
     and if they have been known for a while or nothing changes anymore.
     """
 
-    def __init__(self, node: Node, own_topic: str) -> None:
-        """``own_topic`` is a topic that ``node`` publishes, by its full name."""
+    def __init__(self, node: Node, own_participant: bytes) -> None:
+        """``own_participant`` is the prefix of the ids of the endpoints of ``node``."""
         self._node = node
-        self._own_topic = own_topic
+        self._own_host = own_participant[_HOST]
         self._domain_id = node.context.get_domain_id()
         self._recent: frozenset[bytes] = frozenset()
         self._settled: frozenset[bytes] = frozenset()
@@ -123,12 +123,4 @@ class GraphObserver:
 
     def _count_local(self, known: frozenset[bytes]) -> int:
         """Return how many of the participants are on this computer."""
-        host = self._own_host()
-        return sum(prefix[_HOST] == host for prefix in known)
-
-    def _own_host(self) -> bytes | None:
-        name = self._node.get_name()
-        for endpoint in self._node.get_publishers_info_by_topic(self._own_topic):
-            if endpoint.node_name == name:
-                return participant(endpoint)[_HOST]
-        return None
+        return sum(prefix[_HOST] == self._own_host for prefix in known)

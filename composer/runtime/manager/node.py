@@ -175,7 +175,8 @@ class ManagerNode:
             on_older=host.on_older_instance,
             on_permanent=self._warn_of_instance,
         )
-        self._participant = self._instances.participant if is_member else ""
+        own_participant = self._instances.participant
+        self._reported_participant = own_participant.hex() if is_member else ""
         if is_member:
             callbacks = MemberCallbacks(
                 host.nodes,
@@ -189,7 +190,7 @@ class ManagerNode:
             MemberService(self._node, self._loop, callbacks)
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
-        self._graph = GraphObserver(self._node, self._state.topic_name)
+        self._graph = GraphObserver(self._node, own_participant)
         queries = ManagerQueries(
             self._loop,
             self._graph,
@@ -355,7 +356,7 @@ class ManagerNode:
     def _status_message(self) -> list[Diagnostic]:
         chains = self._host.chains()
         status, uptime_s = self._status.snapshot(), self._uptime_s
-        return status_message(status, uptime_s, chains, self._number, self._participant)
+        return status_message(status, uptime_s, chains, self._number, self._reported_participant)
 
     def _publish_now(self) -> None:
         start_s = time.monotonic()

@@ -103,9 +103,9 @@ class OtherInstances:
         self._loop.call_later(_CHECK_PERIOD_S, self._check_start)
 
     @property
-    def participant(self) -> str:
-        """The prefix of the ids of all endpoints of this process, in hexadecimal digits."""
-        return "".join(participant(own).hex() for own in servers_of(self._node, self._name))
+    def participant(self) -> bytes:
+        """The prefix of the ids of all endpoints of this process: no other has this service."""
+        return b"".join(map(participant, servers_of(self._node, self._name)))
 
     def check(self) -> None:
         """Look for other instances, and ask those that are not known."""

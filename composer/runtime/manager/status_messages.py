@@ -24,14 +24,15 @@ def status_message(
     ``participant`` is the prefix of the ids of its endpoints, if another process needs it.
     """
     nodes = (_of_node(status.system, node) for node in status.nodes)
-    system = _of_system(status, uptime_s, chains, number)
-    if participant:
-        system = system._replace(values={**system.values, "participant": participant})
-    return [system, *nodes]
+    return [_of_system(status, uptime_s, chains, number, participant), *nodes]
 
 
 def _of_system(
-    status: SystemStatus, uptime_s: float, chains: Iterable[ChainFigures], number: int
+    status: SystemStatus,
+    uptime_s: float,
+    chains: Iterable[ChainFigures],
+    number: int,
+    participant: str,
 ) -> Status:
     level = Level.OK
     if status.failed:
@@ -49,6 +50,8 @@ def _of_system(
         "number": str(number),
         "started_by": status.started_by,
     }
+    if participant:
+        values["participant"] = participant
     values |= {f"chain {chain.chain}": chain.text for chain in chains}
     goals = {"goals": status.goals} if status.goals else {}  # not cut either
     name = status.system
