@@ -79,7 +79,15 @@ def call_service(session: Session, deadline: Deadline, request: ServiceRequest) 
 
 
 class _ActionClient(ActionClient):
-    """Takes all feedback before the result: rclpy drops the feedback that is left after it."""
+    """Takes all feedback before the result: rclpy drops the feedback that is left after it.
+
+    If another thread destroys it, the executor gets InvalidHandle, as for other entities.
+    """
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Add its entities. Raises InvalidHandle if it is destroyed; rclpy goes on, and fails."""
+        with self:
+            super().add_to_wait_set(wait_set)
 
     def take_data(self) -> Any:
         """Take the data that is ready; leave the result while there is feedback."""

@@ -6,10 +6,13 @@ from collections.abc import Iterator
 from functools import partial
 
 import pytest
+from composer_interfaces.action import Navigate
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.remote.shared_session import SharedSession
+from composer.remote.calls import _ActionClient
+from composer.remote.session import Session
+from composer.remote.shared_session import InvalidHandle, SharedSession
 from tests.ros.support.in_process import Peer, wait_until
 
 QOS = QoSProfile(depth=10)
@@ -87,3 +90,14 @@ def test_a_callback_that_raises_is_logged_and_ends_nothing(
         publisher.publish(String(data=text))
     wait_until(lambda: len(received) == len(TEXTS), "the messages")
     wait_until(lambda: caplog.text.count("ValueError: not this one") == len(TEXTS), "the log")
+
+
+def test_an_action_client_may_end_when_the_executor_is_about_to_wait() -> None:
+    """It is then still in the list of what the executor waits for."""
+    with Session() as session:
+        client = _ActionClient(session.node, Navigate, "/navigate")
+        client.destroy()
+        session.node.add_waitable(client)
+        with pytest.raises(InvalidHandle):
+            session._executor.spin_once(timeout_sec=0.0)
+        session.node.remove_waitable(client)
