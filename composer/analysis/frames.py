@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 from typing import TypeAlias
 
-from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
-from composer.behavior_checks.frame_uses import BROADCAST, FrameUse, frame_uses
+from composer.analysis.python.behaviors import behaviors
+from composer.behavior_checks.messages.frame_uses import BROADCAST, FrameUse, frame_uses
 from composer.behavior_source import BehaviorSource
 from composer.diagnostics import Label
 from composer.fast_dataclass import dataclass

@@ -6,49 +6,49 @@ import ast
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from composer.behavior_checks.attributes import attribute_problem
-from composer.behavior_checks.awaiting import (
+from composer.behavior_checks.attributes.changing_attributes import changing_attributes
+from composer.behavior_checks.attributes.misspelled_attributes import misspelled_attributes
+from composer.behavior_checks.attributes.unknown_attributes import attribute_problem
+from composer.behavior_checks.calls.collection_calls import (
+    key_problems,
+    stored_problems,
+)
+from composer.behavior_checks.calls.rclpy_calls import transition_problems
+from composer.behavior_checks.classes import class_problems
+from composer.behavior_checks.declared_keys import key_problems_of
+from composer.behavior_checks.fitting import argument_problem
+from composer.behavior_checks.function_calls import CallChecker
+from composer.behavior_checks.messages.elements import element_problems
+from composer.behavior_checks.messages.message_values import ValueChecker
+from composer.behavior_checks.missing_values import missing_values, unset_attributes
+from composer.behavior_checks.node_classes import missing_constructors, undeclared_parameters
+from composer.behavior_checks.operations.awaiting import (
     missing_await,
     pending_value,
     unawaited,
     used_without_await,
 )
-from composer.behavior_checks.changing_attributes import changing_attributes
-from composer.behavior_checks.classes import class_problems
-from composer.behavior_checks.collection_calls import (
-    key_problems,
-    stored_problems,
-)
-from composer.behavior_checks.declared_keys import key_problems_of
-from composer.behavior_checks.elements import element_problems
-from composer.behavior_checks.fitting import argument_problem
-from composer.behavior_checks.formats import text_problems
-from composer.behavior_checks.function_calls import CallChecker
-from composer.behavior_checks.iteration import iteration_problems
-from composer.behavior_checks.message_values import ValueChecker
-from composer.behavior_checks.missing_values import missing_values, unset_attributes
-from composer.behavior_checks.misspelled_attributes import misspelled_attributes
-from composer.behavior_checks.node_classes import missing_constructors, undeclared_parameters
-from composer.behavior_checks.operations import (
+from composer.behavior_checks.operations.formats import text_problems
+from composer.behavior_checks.operations.iteration import iteration_problems
+from composer.behavior_checks.operations.operations import (
     annotations_of,
     operation_problems,
     returned_exceptions,
 )
+from composer.behavior_checks.operations.returns import must_return, return_problems
 from composer.behavior_checks.parts import outside_functions, scalar_name
 from composer.behavior_checks.problems import CodeProblem, Kind, distinct
-from composer.behavior_checks.rclpy_calls import transition_problems
-from composer.behavior_checks.returns import must_return, return_problems
 from composer.behavior_source import BehaviorSource, Function
 from composer.behavior_source.flow import returned_values
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of
-from composer.behavior_types.annotations import annotated
-from composer.behavior_types.bindings import assigned_pairs, nodes_of
-from composer.behavior_types.expressions import FunctionTypes
-from composer.behavior_types.handlers import Handler
+from composer.behavior_types.expressions.annotations import annotated
+from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.hosted import HostedTypes
 from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.libraries.handlers import Handler
+from composer.behavior_types.syntax.bindings import assigned_pairs, nodes_of
 from composer.behavior_types.values import (
     Collection,
     OwnClass,
@@ -64,7 +64,7 @@ from composer.model import Node
 from composer.source import Span
 
 if TYPE_CHECKING:
-    from composer.behavior_checks.blame import Blame
+    from composer.behavior_checks.calls.blame import Blame
 
 #: Attributes of awaitables that code may use instead of awaiting them.
 _OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exception", "send"})
@@ -106,7 +106,7 @@ def behavior_problems(
 def _blame(types: BehaviorTypes) -> Blame | None:
     if not types.has_open_functions:
         return None
-    from composer.behavior_checks.blame import Blame  # noqa: PLC0415 (start-up time)
+    from composer.behavior_checks.calls.blame import Blame  # noqa: PLC0415 (start-up time)
 
     return Blame(types.call_sites)
 

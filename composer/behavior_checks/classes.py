@@ -10,7 +10,7 @@ from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.inference import BehaviorTypes
-from composer.behavior_types.own_classes import fields_of_class, is_dataclass
+from composer.behavior_types.syntax.own_classes import fields_of_class, is_dataclass
 from composer.behavior_types.values import Collection, OwnClass
 
 #: What a dataclass refuses as a default, because all of its objects would share it.

@@ -12,11 +12,11 @@ from composer.behavior_source import Function, Module, helper_named
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
-from composer.behavior_types.bindings import Binding, bindings_of, nodes_of
-from composer.behavior_types.expressions import FunctionTypes
-from composer.behavior_types.lineage import lineage
-from composer.behavior_types.names import constant_named
-from composer.behavior_types.own_classes import updated_targets
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.syntax.bindings import Binding, bindings_of, nodes_of
+from composer.behavior_types.syntax.lineage import lineage
+from composer.behavior_types.syntax.names import constant_named
+from composer.behavior_types.syntax.own_classes import updated_targets
 from composer.behavior_types.values import OwnModule, OwnObject, Self
 from composer.diagnostics import suggestion
 from composer.field_types import ANYTHING

@@ -6,11 +6,11 @@ import ast
 from collections.abc import Callable
 from inspect import isabstract
 
-from composer.behavior_types.lineage import is_derived
-from composer.behavior_types.numpy_types import ARRAY
-from composer.behavior_types.operators import is_byte, is_float, is_integer, is_number, is_text
-from composer.behavior_types.own_classes import is_enumeration, is_named_tuple, is_plain
-from composer.behavior_types.standard_types import NO_SEQUENCES
+from composer.behavior_types.libraries.numpy_types import ARRAY
+from composer.behavior_types.libraries.standard_types import NO_SEQUENCES
+from composer.behavior_types.scalars import is_byte, is_float, is_integer, is_number, is_text
+from composer.behavior_types.syntax.lineage import is_derived
+from composer.behavior_types.syntax.own_classes import is_enumeration, is_named_tuple, is_plain
 from composer.behavior_types.values import (
     NONE,
     ApiMethod,

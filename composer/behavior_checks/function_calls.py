@@ -5,29 +5,29 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 
-from composer.behavior_checks.arguments import (
+from composer.behavior_checks.calls.arguments import (
     api_signature,
     constructor,
     fields_signature,
     method_signature,
     signature_of,
 )
-from composer.behavior_checks.calls import call_problems
-from composer.behavior_checks.collection_calls import method_problems
-from composer.behavior_checks.message_values import ValueChecker
-from composer.behavior_checks.operations import annotations_by_name, uncallable
+from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.calls.collection_calls import method_problems
+from composer.behavior_checks.calls.rclpy_calls import rclpy_call
+from composer.behavior_checks.messages.message_values import ValueChecker
+from composer.behavior_checks.operations.operations import annotations_by_name, uncallable
 from composer.behavior_checks.problems import CodeProblem, Kind
-from composer.behavior_checks.rclpy_calls import rclpy_call
 from composer.behavior_source import Function, Module
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import span_of
-from composer.behavior_types.api_values import api_parameters
-from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.objects import fields_expected
+from composer.behavior_types.expressions.protocols import special_method
+from composer.behavior_types.expressions.results import changed_tuple
 from composer.behavior_types.hosted import rclpy_function
-from composer.behavior_types.objects import fields_expected
-from composer.behavior_types.own_classes import constructor_of
-from composer.behavior_types.protocols import special_method
-from composer.behavior_types.results import changed_tuple
+from composer.behavior_types.libraries.api_values import api_parameters
+from composer.behavior_types.syntax.own_classes import constructor_of
 from composer.behavior_types.values import (
     ApiMethod,
     ApiValue,

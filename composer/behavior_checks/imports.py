@@ -9,7 +9,7 @@ from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 
-from composer.behavior_checks.module_attributes import module_attributes
+from composer.behavior_checks.attributes.module_attributes import module_attributes
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
 from composer.behavior_source.library import is_standard, standard_names
@@ -23,7 +23,7 @@ from composer.behavior_source.modules import (
 from composer.behavior_source.spans import start_span
 from composer.behavior_source.syntax import read_module
 from composer.behavior_types.api import API_NAMES
-from composer.behavior_types.module_names import module_names
+from composer.behavior_types.syntax.module_names import module_names
 from composer.diagnostics import nearest, suggestion
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces

@@ -12,10 +12,10 @@ from composer.behavior_source.flow import always_executed, empty_returns, return
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
-from composer.behavior_types.bindings import How, bindings_of, nodes_of
-from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.inference import BehaviorTypes
-from composer.behavior_types.names import constant_named
+from composer.behavior_types.syntax.bindings import How, bindings_of, nodes_of
+from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.values import (
     BuiltinMethod,
     CollectionMethod,

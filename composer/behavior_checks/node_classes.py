@@ -12,8 +12,8 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_source.syntax import name_span
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.hosted import HostedTypes
-from composer.behavior_types.names import own_name
-from composer.behavior_types.rclpy_api import rclpy_class
+from composer.behavior_types.libraries.rclpy_api import rclpy_class
+from composer.behavior_types.syntax.names import own_name
 from composer.diagnostics import nearest
 
 _DECLARED = frozenset({"use_sim_time", "start_type_description_service"})

@@ -8,8 +8,8 @@ from functools import lru_cache
 from types import GeneratorType
 
 from composer.behavior_source import Module
-from composer.behavior_types.bindings import How
-from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.syntax.bindings import How
 from composer.behavior_types.values import Collection, Value
 from composer.interfaces import FieldType
 

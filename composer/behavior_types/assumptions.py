@@ -6,7 +6,7 @@ import ast
 from dataclasses import field
 
 from composer.behavior_source import Function
-from composer.behavior_types.own_classes import known_attributes
+from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import Collection, OwnObject, Value
 from composer.fast_dataclass import dataclass
 

@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING
 from composer.behavior_source import Function, Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.traversal import children
-from composer.behavior_types.bindings import CONTEXTS, bindings_of, is_class_method, is_static
-from composer.behavior_types.fillings import plain
-from composer.behavior_types.lineage import NAMED_TUPLE, PLAIN_BASES, lineage
-from composer.behavior_types.own_classes import constructor_of
+from composer.behavior_types.expressions.fillings import plain
+from composer.behavior_types.syntax.bindings import (
+    CONTEXTS,
+    bindings_of,
+    is_class_method,
+    is_static,
+)
+from composer.behavior_types.syntax.lineage import NAMED_TUPLE, PLAIN_BASES, lineage
+from composer.behavior_types.syntax.own_classes import constructor_of
 from composer.behavior_types.values import (
     NONE,
     ModuleFunction,
@@ -26,7 +31,7 @@ from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING
 
 if TYPE_CHECKING:
-    from composer.behavior_types.expressions import FunctionTypes
+    from composer.behavior_types.expressions.function_types import FunctionTypes
     from composer.behavior_types.inference import BehaviorTypes
 
 #: Decorators that leave the arguments of a function as they are.

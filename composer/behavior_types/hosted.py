@@ -10,17 +10,17 @@ from composer.behavior_source import BehaviorSource, Method, Module
 from composer.behavior_source.method_body import argument
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.assumptions import Assumed
-from composer.behavior_types.bindings import Bindings, nodes_of
-from composer.behavior_types.expressions import FunctionTypes
-from composer.behavior_types.handlers import Handler
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.members import attribute_of
+from composer.behavior_types.expressions.objects import annotation_in, given_class
 from composer.behavior_types.inference import BehaviorTypes
-from composer.behavior_types.literals import constant_type
-from composer.behavior_types.members import attribute_of
-from composer.behavior_types.names import own_name
-from composer.behavior_types.objects import annotation_in, given_class
-from composer.behavior_types.own_classes import known_attributes
-from composer.behavior_types.rclpy_api import is_rclpy, rclpy_class, rclpy_object
-from composer.behavior_types.self_attributes import (
+from composer.behavior_types.libraries.handlers import Handler
+from composer.behavior_types.libraries.rclpy_api import is_rclpy, rclpy_class, rclpy_object
+from composer.behavior_types.syntax.bindings import Bindings, nodes_of
+from composer.behavior_types.syntax.literals import constant_type
+from composer.behavior_types.syntax.names import own_name
+from composer.behavior_types.syntax.own_classes import known_attributes
+from composer.behavior_types.syntax.self_attributes import (
     ATTRIBUTES_OF_OBJECTS,
     class_attributes,
     escapes,

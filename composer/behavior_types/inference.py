@@ -12,28 +12,28 @@ from composer.behavior_source import BehaviorSource, Function, Method, Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.api import attribute_class
 from composer.behavior_types.assumptions import Assumed, is_open, lacks
-from composer.behavior_types.bindings import (
-    Binding,
-    Bindings,
-    How,
-    bindings_of,
-    is_class_method,
-)
-from composer.behavior_types.expressions import FunctionTypes
-from composer.behavior_types.fillings import (
+from composer.behavior_types.expressions.fillings import (
     Filling,
     filled,
     fillings_of,
     is_fresh,
     without_none,
 )
-from composer.behavior_types.handlers import Handler, handlers_of
-from composer.behavior_types.lineage import class_named
-from composer.behavior_types.objects import method_value
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.objects import method_value
+from composer.behavior_types.expressions.rebinding import joined, with_changes
+from composer.behavior_types.libraries.handlers import Handler, handlers_of
 from composer.behavior_types.outside_assignments import set_from_outside
-from composer.behavior_types.project_classes import ProjectClasses, takes_object
-from composer.behavior_types.rebinding import joined, with_changes
-from composer.behavior_types.self_attributes import escapes, self_attributes
+from composer.behavior_types.syntax.bindings import (
+    Binding,
+    Bindings,
+    How,
+    bindings_of,
+    is_class_method,
+)
+from composer.behavior_types.syntax.lineage import class_named
+from composer.behavior_types.syntax.project_classes import ProjectClasses, takes_object
+from composer.behavior_types.syntax.self_attributes import escapes, self_attributes
 from composer.behavior_types.values import (
     NONE,
     ApiValue,

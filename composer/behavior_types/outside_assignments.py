@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from composer.behavior_source import Function
 from composer.behavior_source.traversal import walk
-from composer.behavior_types.bindings import nodes_of
-from composer.behavior_types.expressions import FunctionTypes
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.values import OwnClass, Self
 from composer.interfaces import FieldType, Message
 

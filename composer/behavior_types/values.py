@@ -21,7 +21,8 @@ class NoneType:
 
 NONE = NoneType()
 
-_INTEGERS = frozenset(INTEGER_RANGES) - {"byte"}
+#: The types of message fields whose values are ints of Python: a byte is bytes of length 1.
+INTEGERS = frozenset(INTEGER_RANGES) - {"byte"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +203,7 @@ def _join_fields(first: FieldType, second: FieldType) -> Value:
     """Return the type of numbers or texts of different size, which are the same in Python."""
     if first.is_array or second.is_array:
         return ANYTHING
-    for names, general in ((FLOATS, NUMBER), (_INTEGERS, INTEGER), (TEXTS, STRING)):
+    for names, general in ((FLOATS, NUMBER), (INTEGERS, INTEGER), (TEXTS, STRING)):
         if first.name in names and second.name in names:
             return general
     return ANYTHING

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from composer.analysis.class_interfaces import CREATORS
-from composer.analysis.hosted_classes import is_rclpy_node
+from composer.analysis.python.class_interfaces import CREATORS
+from composer.analysis.python.hosted_classes import is_rclpy_node
 from composer.behavior_source import (
     BehaviorSource,
     Function,

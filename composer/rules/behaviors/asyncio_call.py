@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.context import Context
+from composer.analysis.python.behavior_code import diagnostics_of
 from composer.behavior_checks import Kind
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.references import class_name_hint
+from composer.analysis.endpoints.references import class_name_hint
+from composer.analysis.python.behaviors import behaviors
 from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import BehaviorReference

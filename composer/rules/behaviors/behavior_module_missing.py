@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context
+from composer.analysis.python.behaviors import behaviors
 from composer.analysis.spans import part_of
 from composer.behavior_source import nearby_modules
 from composer.diagnostics import Diagnostic, Rule, Severity, register

@@ -6,8 +6,8 @@ import re
 import sys
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import GENERAL_HANDLERS, behaviors, calls_of, handlers
 from composer.analysis.context import Context
+from composer.analysis.python.behaviors import GENERAL_HANDLERS, behaviors, calls_of, handlers
 from composer.behavior_source import BehaviorSource, Call
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.source import Span

@@ -5,13 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import (
+from composer.analysis.context import Context
+from composer.analysis.python.behaviors import (
     GENERAL_HANDLERS,
     distinct_behaviors,
     handlers,
     reached_methods,
 )
-from composer.analysis.context import Context
 from composer.behavior_source import Method
 from composer.behavior_source.flow import endless_loops
 from composer.behavior_source.spans import start_span

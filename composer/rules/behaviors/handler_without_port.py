@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import complete_behaviors, handlers, unbound_handlers
 from composer.analysis.context import Context
 from composer.analysis.formatting import a
+from composer.analysis.python.behaviors import complete_behaviors, handlers, unbound_handlers
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register, suggestion
 from composer.model import Node
 

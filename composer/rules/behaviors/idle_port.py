@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import handlers
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.python.behaviors import handlers
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import ImplementationKind, Node, PortKind
 

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import Handler, complete_behaviors, handlers, unbound_handlers
 from composer.analysis.context import Context
+from composer.analysis.python.behaviors import (
+    Handler,
+    complete_behaviors,
+    handlers,
+    unbound_handlers,
+)
 from composer.behavior_source import BehaviorSource, Method
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.hosted_classes import ClassOfNode, hosted_classes
+from composer.analysis.python.hosted_classes import ClassOfNode, hosted_classes
 from composer.behavior_source import Call
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import ExecutorKind, Node

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.hosted_classes import calls_in, hosted_classes
+from composer.analysis.python.hosted_classes import calls_in, hosted_classes
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.hosted_classes import ClassOfNode, hosted_classes
-from composer.analysis.references import class_name_hint
+from composer.analysis.endpoints.references import class_name_hint
+from composer.analysis.python.hosted_classes import ClassOfNode, hosted_classes
 from composer.behavior_source import NearbyModules
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import BehaviorReference

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.hosted_classes import hosted_classes
+from composer.analysis.python.hosted_classes import hosted_classes
 from composer.behavior_checks.node_classes import declared_names, is_declared
 from composer.behavior_types.hosted import passes_node_on
 from composer.diagnostics import Diagnostic, Rule, Severity, nearest, register

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.hosted_classes import hosted_classes
+from composer.analysis.python.hosted_classes import hosted_classes
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.endpoints.unconnected import COUNTERPARTS, nearest_channel, unconnected_ports
 from composer.analysis.formatting import port_name
-from composer.analysis.unconnected import COUNTERPARTS, nearest_channel, unconnected_ports
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
 

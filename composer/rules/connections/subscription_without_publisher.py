@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.formatting import port_name
-from composer.analysis.unconnected import (
+from composer.analysis.endpoints.unconnected import (
     external_hint,
     name_location,
     nearest_channel,
     unconnected_ports,
 )
+from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import PortKind
 

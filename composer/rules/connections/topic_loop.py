@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
+from composer.analysis.endpoints.unconnected import diagnostic_location
 from composer.analysis.formatting import port_name
-from composer.analysis.unconnected import diagnostic_location
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Event, Port, PortKind, PortOfNode
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.context import Context
-from composer.analysis.expressions import ExpressionSite, expression_sites
+from composer.analysis.messages.expressions import ExpressionSite, expression_sites
+from composer.analysis.python.behavior_code import diagnostics_of
 from composer.analysis.spans import part_of_path
-from composer.behavior_checks.elements import counted
+from composer.behavior_checks.messages.elements import counted
 from composer.behavior_checks.problems import Kind
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.expressions import FieldPath

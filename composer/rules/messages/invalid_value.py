@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.context import Context
-from composer.analysis.type_mismatches import certain_field_problems
+from composer.analysis.endpoints.type_mismatches import certain_field_problems
+from composer.analysis.python.behavior_code import diagnostics_of
 from composer.behavior_checks import Kind
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.endpoints.type_mismatches import (
+    TypeMismatch,
+    type_mismatches,
+    wrong_connection,
+)
 from composer.analysis.formatting import port_name
-from composer.analysis.type_mismatches import TypeMismatch, type_mismatches, wrong_connection
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortOfNode
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from composer.analysis.context import Context
-from composer.analysis.reactions import message_templates
+from composer.analysis.messages.reactions import message_templates
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.field_types import constant_problem
 from composer.interfaces import Interfaces, Message

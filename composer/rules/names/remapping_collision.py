@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.references import matched_ports, own_name
+from composer.analysis.endpoints.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node, Port, PortKind, Remapping
 

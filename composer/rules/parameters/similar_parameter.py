@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from difflib import SequenceMatcher
 from pathlib import PurePath
 
-from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context
-from composer.analysis.expressions import expression_sites
+from composer.analysis.messages.expressions import expression_sites
+from composer.analysis.python.behaviors import behaviors
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node, Parameter
 

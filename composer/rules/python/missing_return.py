@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behavior_code import diagnostics_of
-from composer.analysis.behaviors import Handler, distinct_behaviors, handlers
 from composer.analysis.context import Context
+from composer.analysis.python.behavior_code import diagnostics_of
+from composer.analysis.python.behaviors import Handler, distinct_behaviors, handlers
 from composer.behavior_checks import Kind
 from composer.behavior_source import Function, Method
 from composer.behavior_source.flow import empty_returns, reaches_end

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import GENERAL_HANDLERS, distinct_behaviors, handlers
 from composer.analysis.context import Context
+from composer.analysis.python.behaviors import GENERAL_HANDLERS, distinct_behaviors, handlers
 from composer.behavior_source import Function
 from composer.behavior_source.receivers import lacks_self
 from composer.diagnostics import Diagnostic, Rule, Severity, register

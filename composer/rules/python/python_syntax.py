@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behaviors import behaviors
 from composer.analysis.context import Context
-from composer.analysis.hosted_classes import hosted_classes
+from composer.analysis.python.behaviors import behaviors
+from composer.analysis.python.hosted_classes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.source import Span
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.analysis.rates import timed_publishers
+from composer.analysis.timing.rates import timed_publishers
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, location
+from composer.analysis.endpoints.qos_conflicts import QosConflict, qos_conflicts
 from composer.analysis.formatting import port_name
-from composer.analysis.qos_conflicts import QosConflict, qos_conflicts
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Channel
 

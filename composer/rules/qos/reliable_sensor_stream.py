@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number, port_name
-from composer.analysis.rates import rates
+from composer.analysis.timing.rates import rates
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import ChannelKind, Port, PortOfNode
 from composer.qos import Reliability

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.analysis.rates import rates
+from composer.analysis.timing.rates import rates
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import ChannelKind
 from composer.qos import Durability, History, QosProfile, Reliability

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.expressions import EVENT_NAMES, ExpressionSite, expression_sites
+from composer.analysis.messages.expressions import EVENT_NAMES, ExpressionSite, expression_sites
 from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 

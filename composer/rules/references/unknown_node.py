@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.references import endpoints
+from composer.analysis.endpoints.references import endpoints
 from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Endpoint, Node

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.expressions import expression_sites
+from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.source import Span

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
-from composer.analysis.reactions import sends
-from composer.analysis.references import endpoints
+from composer.analysis.endpoints.references import endpoints
+from composer.analysis.messages.reactions import sends
 from composer.analysis.spans import part_of
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Endpoint, Node, PortKind

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.references import known_profiles, unknown_profiles
+from composer.analysis.endpoints.references import known_profiles, unknown_profiles
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 
 RULE = register(

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.expressions import expression_sites
-from composer.analysis.reactions import reactions
+from composer.analysis.messages.expressions import expression_sites
+from composer.analysis.messages.reactions import reactions
 from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
 from composer.model import Node

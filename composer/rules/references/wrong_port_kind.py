@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import a, either
-from composer.analysis.reactions import sends
+from composer.analysis.messages.reactions import sends
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind

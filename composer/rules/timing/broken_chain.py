@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from composer.analysis.chains import input_ports
 from composer.analysis.context import Context
+from composer.analysis.timing.chains import input_ports
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import PortKind
 

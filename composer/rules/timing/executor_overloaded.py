@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.executor_load import executor_loads
+from composer.analysis.timing.executor_load import executor_loads
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

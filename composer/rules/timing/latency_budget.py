@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from composer.analysis.chains import ChainDelay, chain_delays
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
+from composer.analysis.timing.chains import ChainDelay, chain_delays
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 
 RULE = register(

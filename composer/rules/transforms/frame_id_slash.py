@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.behavior_code import diagnostics_of
 from composer.analysis.context import Context
 from composer.analysis.frames import uses_of_behaviors
-from composer.analysis.reactions import message_templates
+from composer.analysis.messages.reactions import message_templates
+from composer.analysis.python.behavior_code import diagnostics_of
 from composer.behavior_checks import Kind
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Transforms

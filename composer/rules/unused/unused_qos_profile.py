@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.references import unknown_profiles
+from composer.analysis.endpoints.references import unknown_profiles
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.analysis.references import matched_ports, own_name
+from composer.analysis.endpoints.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
 from composer.model import ImplementationKind, Node, Port, Remapping
 

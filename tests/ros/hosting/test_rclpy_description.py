@@ -21,8 +21,8 @@ import rclpy.qos
 import rclpy.task
 import rclpy.time
 
-from composer.behavior_types.own_classes import is_enumeration, known_attributes
-from composer.behavior_types.rclpy_api import rclpy_class, rclpy_module
+from composer.behavior_types.libraries.rclpy_api import rclpy_class, rclpy_module
+from composer.behavior_types.syntax.own_classes import is_enumeration, known_attributes
 
 pytestmark = pytest.mark.ros
 

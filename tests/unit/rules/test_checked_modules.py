@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from composer.analysis import behavior_code
+from composer.analysis.python import behavior_code
 from composer.behavior_checks import CodeProblem, behavior_problems
 from composer.model import Node
 from tests.unit.support.checking import diagnostics_in

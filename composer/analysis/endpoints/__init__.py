@@ -1,0 +1,1 @@
+"""Which ports belong together: by their names, types and QoS."""

@@ -1,0 +1,124 @@
+"""Topics, services and actions whose ports have different types."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from composer.analysis.context import Context
+from composer.analysis.messages.fields import field_problems
+from composer.fast_dataclass import dataclass
+from composer.field_types import Problem
+from composer.model import Channel, Connection, Endpoint, PortOfNode
+from composer.names import join
+
+
+@dataclass(frozen=True, slots=True)
+class TypeMismatch:
+    """A channel with several types: a port with the usual one, and all ports with others."""
+
+    channel: Channel
+    usual: PortOfNode
+    others: Mapping[str, list[PortOfNode]]
+
+
+def type_mismatches(context: Context) -> tuple[TypeMismatch, ...]:
+    """Return the channels with several types."""
+    return tuple(_mismatches(context))
+
+
+def certain_field_problems(context: Context) -> Iterator[Problem]:
+    """Yield the problems with fields, except of ports whose type is probably wrong."""
+    doubtful = {
+        _key(endpoint)
+        for mismatch in context.once(type_mismatches)
+        for endpoints in mismatch.others.values()
+        for endpoint in endpoints
+    }
+    for found in context.once(field_problems):
+        if found.port not in doubtful:
+            yield found.problem
+
+
+def wrong_connection(
+    context: Context, endpoint: PortOfNode, mismatch: TypeMismatch
+) -> Endpoint | None:
+    """Return where a port is connected, if the connection is probably wrong and not its type.
+
+    That is so if another connection of the port fits its type, or if what the node does with the
+    port fits its type and not that of the channel.
+    """
+    channel = mismatch.channel
+    here: list[Endpoint] = []
+    elsewhere: list[Connection] = []
+    for connection in context.system.connections:
+        ends = (*connection.sources, *connection.sinks)
+        own = [end for end in ends if (end.node, end.port) == _key(endpoint)]
+        if connection.kind is not channel.kind or not own:
+            continue
+        if join(context.system.namespace, connection.name.value) == channel.name:
+            here.extend(own)
+        else:
+            elsewhere.append(connection)
+    if here and (
+        any(_has_type(context, connection, endpoint) for connection in elsewhere)
+        or _fits_only_own(context, endpoint, mismatch.usual.port.interface.value)
+    ):
+        return here[0]
+    return None
+
+
+def _has_type(context: Context, connection: Connection, endpoint: PortOfNode) -> bool:
+    """Return whether another port of a connection has the type of a port."""
+    ports = (
+        context.system.port(end)
+        for end in (*connection.sources, *connection.sinks)
+        if (end.node, end.port) != _key(endpoint)
+    )
+    own = endpoint.port.interface.value
+    return any(port is not None and port.interface.value == own for port in ports)
+
+
+def _fits_only_own(context: Context, endpoint: PortOfNode, other: str) -> bool:
+    """Return whether what a node does with a port fits its type, and not another one."""
+    key, node, port = _key(endpoint), endpoint.node, endpoint.port
+    if any(found.port == key for found in context.once(field_problems)):
+        return False
+    changed = replace(port, interface=port.interface.map(lambda _: other))
+    ports = tuple(changed if item is port else item for item in node.ports)
+    system = replace(context.system, nodes=(replace(node, ports=ports),))
+    supposed = Context(system, context.interfaces, context.node_types)
+    return any(found.port == key for found in field_problems(supposed))
+
+
+def _mismatches(context: Context) -> Iterator[TypeMismatch]:
+    troubled = {found.port for found in context.once(field_problems)}
+    for channel in context.all_channels:
+        by_type: dict[str, list[PortOfNode]] = defaultdict(list)
+        for endpoint in channel.ends:
+            if context.interface(endpoint.port) is not None:
+                by_type[endpoint.port.interface.value].append(endpoint)
+        if len(by_type) > 1:
+            yield _mismatch(channel, by_type, troubled)
+
+
+def _mismatch(
+    channel: Channel,
+    by_type: dict[str, list[PortOfNode]],
+    troubled: set[tuple[str, str] | None],
+) -> TypeMismatch:
+    """Choose the usual type: one that fits what its nodes do, then the most common, the first."""
+
+    def weight(name: str) -> tuple[bool, int]:
+        endpoints = by_type[name]
+        fits = not any(_key(endpoint) in troubled for endpoint in endpoints)
+        return fits, len(endpoints)
+
+    common = max(by_type, key=weight)
+    others = {name: endpoints for name, endpoints in by_type.items() if name != common}
+    return TypeMismatch(channel, by_type[common][0], others)
+
+
+def _key(endpoint: PortOfNode) -> tuple[str, str]:
+    return endpoint.node.name.value, endpoint.port.name.value

@@ -1,0 +1,1 @@
+"""The messages that expressions read and reactions fill."""

@@ -1,0 +1,1 @@
+"""Attributes that do not exist, are misspelled, or change their type."""

@@ -1,0 +1,60 @@
+"""Checks the attributes of modules of the standard library, and of numpy."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Module
+from composer.behavior_source.library import is_standard, standard_names
+from composer.behavior_source.spans import attribute_span
+from composer.behavior_source.traversal import walk
+from composer.behavior_types.libraries.numpy_names import NUMPY_NAMES
+from composer.diagnostics import nearest, suggestion
+
+
+def module_attributes(module: Module) -> Iterator[CodeProblem]:
+    """Check the attributes of the modules of the standard library and of numpy in a file."""
+    aliases = {
+        bound: imported.module
+        for bound, imported in module.imports.items()
+        if not imported.name and "." not in bound and _is_known(imported.module)
+    }
+    if not aliases:
+        return
+    uses: list[tuple[str, ast.Attribute]] = []
+    parts: list[tuple[str, str, ast.Attribute]] = []
+    for node in walk(module.tree.body):
+        match node:
+            case ast.Attribute(value=ast.Name(id=name)) if name in aliases:
+                uses.append((name, node))
+            case ast.Attribute(value=ast.Attribute(value=ast.Name(id=name), attr=part)):
+                if name in aliases and f"{aliases[name]}.{part}" in NUMPY_NAMES:
+                    parts.append((name, f"{aliases[name]}.{part}", node))
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+                aliases.pop(name, None)  # means something else, at least somewhere
+    parts += [(name, aliases.get(name, ""), node) for name, node in uses]
+    for name, full, node in parts:
+        names = _known_names(full) if name in aliases else None
+        if names is None or node.attr in names or node.attr.startswith("__"):
+            continue
+        close = nearest(node.attr, names)
+        if close is None and full in NUMPY_NAMES:
+            continue  # it may be new
+        message = f"module '{full}' has no '{node.attr}'"
+        hint = suggestion(node.attr, names) if close else None
+        yield CodeProblem(Kind.IMPORT, message, attribute_span(node, module.source), hint)
+
+
+def _is_known(module: str) -> bool:
+    return is_standard(module) or module in NUMPY_NAMES
+
+
+def _known_names(module: str) -> frozenset[str] | None:
+    if module in NUMPY_NAMES:
+        return NUMPY_NAMES[module]
+    try:
+        return standard_names(module)
+    except LookupError:
+        return None

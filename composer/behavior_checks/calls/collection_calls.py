@@ -1,0 +1,102 @@
+"""Checks what is stored in lists, dicts and sets: by their methods, and by index."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.calls.arguments import method_signature
+from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.fitting import argument_problem, kind_of, shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.scalars import is_text
+from composer.behavior_types.values import Collection, Parameters, Ports, Value
+from composer.field_types import STRING
+from composer.interfaces import FieldType, Message
+
+#: The methods that store their last argument as an element.
+_ADDING = frozenset({"add", "append", "appendleft", "insert"})
+#: The methods of dicts and of sets that take a key first.
+_KEYED = frozenset({"get", "pop", "setdefault"})
+_HASHING = frozenset({"add", "discard", "remove"})
+
+
+def method_problems(
+    call: ast.Call, owner: Collection, name: str, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield why a call of a method of a collection or of a text fails."""
+    signature = method_signature(owner.python, name)
+    found = list(call_problems(call, signature, scope)) if signature is not None else []
+    yield from found
+    if found or not call.args:
+        return
+    if (name in _KEYED and owner.python is dict) or (
+        name in _HASHING and owner.python in (set, frozenset)
+    ):
+        yield from key_problems(call.args[0], owner, scope)
+    if name in _ADDING and owner.python is not dict:
+        yield from _stored(call.args[-1], owner.element, f"'{name}'", scope)
+    elif name == "join" and owner.python is str:
+        yield from _joined(call.args[0], scope)
+
+
+def key_problems(node: ast.expr, owner: Collection, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield why a value cannot be a key of a dict or an element of a set."""
+    found = scope.type_of(node)
+    wrong = None
+    if isinstance(found, Message):
+        wrong = f"{found.name} cannot be a key"
+    elif isinstance(found, Parameters | Ports):
+        wrong = "this cannot be a key: name one of its attributes"
+    elif isinstance(found, Collection) and found.python in (list, dict, set):
+        wrong = f"{shown(found)} cannot be a key"
+    elif owner.python is dict:
+        wrong = argument_problem(node, found, owner.key, scope.type_of)
+        wrong = f"this key: {wrong}" if wrong is not None else None
+    if wrong is not None:
+        yield CodeProblem(Kind.VALUE, wrong, span_of(node, scope.home.source))
+
+
+def stored_problems(
+    target: ast.Subscript, value: ast.expr, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield why a value does not belong into the list or dict that ``target`` is an item of."""
+    owner = scope.type_of(target.value)
+    if _is_record(target, scope):
+        return
+    if isinstance(owner, Collection) and not isinstance(target.slice, ast.Slice):
+        yield from _stored(value, owner.element, "this item", scope)
+
+
+def _is_record(target: ast.Subscript, scope: FunctionTypes) -> bool:
+    """Return whether a dict, written with its keys, gets a further item of its own type."""
+    if not isinstance(target.slice, ast.Constant) or not isinstance(target.value, ast.Name):
+        return False
+    bindings = scope.bindings.names.get(target.value.id, [])
+    return not bindings or any(isinstance(binding.expression, ast.Dict) for binding in bindings)
+
+
+def _stored(
+    node: ast.expr, expected: Value, what: str, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    wrong = argument_problem(node, scope.type_of(node), expected, scope.type_of)
+    if wrong is not None:
+        yield CodeProblem(Kind.VALUE, f"{what}: {wrong}", span_of(node, scope.home.source))
+
+
+def _joined(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    found = scope.type_of(node)
+    is_iterable = isinstance(found, Collection) or (
+        isinstance(found, FieldType) and (found.is_array or is_text(found))
+    )
+    if not is_iterable and kind_of(found) is not None:
+        problem = f"'join' takes strings, not {shown(found)}"
+        yield CodeProblem(Kind.VALUE, problem, span_of(node, scope.home.source))
+        return
+    items = scope.element(found) if is_iterable else found
+    wrong = argument_problem(None, items, STRING, scope.type_of)
+    if wrong is not None:
+        problem = f"'join' takes strings: {wrong}"
+        yield CodeProblem(Kind.VALUE, problem, span_of(node, scope.home.source))

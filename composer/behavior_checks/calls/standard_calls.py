@@ -1,0 +1,114 @@
+"""Checks calls of built-in functions and of the standard library."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from itertools import pairwise
+
+from composer.behavior_checks.calls.arguments import (
+    Signature,
+    constructor,
+    fields_signature,
+    library_signature,
+    signature_of,
+)
+from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.fitting import kind_of, shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.objects import fields_expected
+from composer.behavior_types.expressions.operators import operation_problem, order_problem
+from composer.behavior_types.scalars import is_float
+from composer.behavior_types.syntax.own_classes import is_dataclass
+from composer.behavior_types.values import ModuleFunction, OwnClass, OwnMethod, OwnObject, Value
+from composer.field_types import INTEGER
+
+#: Functions of math that do not take numbers only.
+_OF_ITERABLES = frozenset({"math.dist", "math.fsum", "math.prod", "math.sumprod"})
+
+
+def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check a call of the built-in or imported function with that full name."""
+    if name == "range":
+        yield from _range(call, scope)
+        return
+    if name in {"functools.partial", "functools.partialmethod"}:
+        yield from _partial(call, scope)
+        return
+    if name == "dataclasses.replace":
+        yield from _replaced(call, scope)
+        return
+    signature = library_signature(name)
+    if signature is not None:
+        yield from call_problems(call, signature, scope)
+    if name == "time.sleep" or name.startswith("math."):
+        takes_numbers = name not in _OF_ITERABLES
+        for argument in call.args:
+            found = scope.type_of(argument)
+            kind = kind_of(found)
+            if takes_numbers and kind not in (None, "number"):
+                message = f"{shown(found)} where a number is expected"
+                yield CodeProblem(Kind.VALUE, message, span_of(argument, scope.home.source))
+            elif name == "math.dist" and kind == "number":
+                message = f"{shown(found)} where the coordinates of a point are expected"
+                yield CodeProblem(Kind.VALUE, message, span_of(argument, scope.home.source))
+                return  # the other point has the same cause
+    if name == "sum" and len(call.args) == 1:
+        element = scope.element(scope.type_of(call.args[0]))
+        problem = operation_problem(INTEGER, ast.Add(), element)
+        if problem is not None:
+            yield CodeProblem(Kind.VALUE, problem, span_of(call.args[0], scope.home.source))
+    if name in {"max", "min"} and len(call.args) > 1 and not call.keywords:
+        for first, second in pairwise(map(scope.type_of, call.args)):
+            problem = order_problem(first, ast.Lt(), second)
+            if problem is not None:
+                span = span_of(call, scope.home.source)
+                yield CodeProblem(Kind.VALUE, problem, span)
+                return
+
+
+def _range(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    for argument in call.args:
+        found = scope.type_of(argument)
+        span = span_of(argument, scope.home.source)
+        if is_float(found):
+            problem = "'range' takes integers, not a float"
+            yield CodeProblem(Kind.VALUE, problem, span, "write int(...)")
+        elif kind_of(found) in ("collection", "dict", "text", "function"):
+            problem = f"'range' takes integers, not {shown(found)}"
+            hint = None if kind_of(found) == "function" else "write range(len(...))"
+            yield CodeProblem(Kind.VALUE, problem, span, hint)
+
+
+def _replaced(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check the fields that ``dataclasses.replace`` sets."""
+    found = scope.type_of(call.args[0]) if call.args else None
+    if not isinstance(found, OwnObject) or not is_dataclass(found.of):
+        return
+    signature = fields_signature(found.of, "replace", first=True)
+    if signature is not None:
+        yield from call_problems(call, signature, scope, fields_expected(scope, found.of))
+
+
+def _partial(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check what ``functools.partial`` sets against the function; it may leave out arguments."""
+    if not call.args or isinstance(call.args[0], ast.Starred):
+        return
+    signature = _signature(scope.type_of(call.args[0]))
+    if signature is not None:
+        given = ast.Call(func=call.func, args=call.args[1:], keywords=call.keywords)
+        yield from call_problems(given, signature.partial(), scope)
+
+
+def _signature(function: Value) -> Signature | None:
+    match function:
+        case OwnMethod(method=method) if method.node is not None and method.known:
+            return signature_of(method.node, is_bound=True)
+        case ModuleFunction(node=node, is_bound=is_bound):
+            return signature_of(node, is_bound=is_bound)
+        case OwnClass() as own:
+            return constructor(own)
+        case _:
+            return None

@@ -1,0 +1,1 @@
+"""Values that are stored in messages and sent."""

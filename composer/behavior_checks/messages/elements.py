@@ -1,0 +1,98 @@
+"""Checks how many elements arrays have: array parameters, and fields of a fixed size."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.syntax.bindings import nodes_of
+from composer.behavior_types.syntax.literals import integer_constant
+from composer.behavior_types.values import Parameters
+from composer.field_types import described
+from composer.interfaces import FieldType
+from composer.model import Parameter
+
+
+def element_problems(
+    node: ast.AST, function: Function, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield the elements that an expression or an assignment expects, but its parameter lacks."""
+    match node:
+        case ast.Subscript(value=owner, slice=index):
+            at = integer_constant(index)
+            array = scope.type_of(owner)
+            size = array.array_size if isinstance(array, FieldType) else None
+            if at is not None and size is not None and not -size <= at < size:
+                problem = f"{described(array)} has no element {at}"  # type: ignore[arg-type]
+                hint = f"indices count from 0, so the last one is {size - 1}"
+                yield CodeProblem(Kind.INDEX, problem, span_of(index, scope.home.source), hint)
+            parameter = parameter_read(owner, scope)
+            if at is None or parameter is None or _looks_first(function):
+                return
+            name, count = parameter.name.value, _count(parameter)
+            if count is not None and not -count <= at < count:
+                yield CodeProblem(
+                    Kind.INDEX,
+                    f"parameter '{name}' has no element {at}: it has {counted(count)}",
+                    span_of(index, scope.home.source),
+                    f"indices count from 0, so the last one is {count - 1}" if count else None,
+                )
+        case ast.Assign(targets=[ast.Tuple(elts=targets) | ast.List(elts=targets)], value=value):
+            parameter = parameter_read(value, scope)
+            if parameter is None or any(isinstance(item, ast.Starred) for item in targets):
+                return
+            name, count = parameter.name.value, _count(parameter)
+            if count not in (None, len(targets)) and not _looks_first(function):
+                message = f"parameter '{name}' has {counted(count or 0)}, not {len(targets)}"
+                span = span_of(value, scope.home.source)
+                lines = (function.lineno, function.end_lineno or function.lineno)
+                yield CodeProblem(Kind.INDEX, message, span, lines=lines)
+
+
+def size_problem(node: ast.expr, expected: FieldType) -> str | None:
+    """Return why a list of a known length does not fit a field, None if it may fit."""
+    size, bound = expected.array_size, expected.array_bound
+    length = _length(node) if size is not None or bound is not None else None
+    if length is None or length == size or (bound is not None and length <= bound):
+        return None
+    return f"{counted(length)} where {described(expected)} is expected"
+
+
+def counted(count: int) -> str:
+    """Return ``1 element`` or ``3 elements``."""
+    return f"{count} element" + ("" if count == 1 else "s")
+
+
+def parameter_read(node: ast.expr, scope: FunctionTypes) -> Parameter | None:
+    """Return the parameter that an expression such as ``self.parameters.goal`` reads."""
+    if isinstance(node, ast.Attribute) and isinstance(scope.type_of(node.value), Parameters):
+        return scope.owner.node.parameter(node.attr)
+    return None
+
+
+def _count(parameter: Parameter) -> int | None:
+    value = parameter.value.value if parameter.value is not None else None
+    return len(value) if isinstance(value, list) else None
+
+
+def _looks_first(function: Function) -> bool:
+    """Return whether a function asks for a length, or handles an element that is missing."""
+    return any(
+        isinstance(node, ast.Try) or (isinstance(node, ast.Name) and node.id == "len")
+        for node in nodes_of(function)
+    )
+
+
+def _length(node: ast.expr) -> int | None:
+    match node:
+        case ast.List(elts=items) | ast.Tuple(elts=items):
+            return None if any(isinstance(item, ast.Starred) for item in items) else len(items)
+        case ast.BinOp(left=ast.List() | ast.Tuple() as items, op=ast.Mult(), right=times):
+            length, count = _length(items), integer_constant(times)
+            return length * max(count, 0) if length is not None and count is not None else None
+        case _:
+            return None

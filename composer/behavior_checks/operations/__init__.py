@@ -1,0 +1,1 @@
+"""Operations and statements that fail or have no effect."""

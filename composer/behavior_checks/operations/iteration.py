@@ -1,0 +1,109 @@
+"""Checks what is iterated over and unpacked."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.fitting import shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.scalars import is_byte, is_number, is_text
+from composer.behavior_types.syntax.own_classes import known_attributes
+from composer.behavior_types.values import Collection, ModuleFunction, OwnMethod, OwnObject, Value
+from composer.field_types import BOOL
+from composer.interfaces import FieldType, Message
+
+#: Built-in functions whose first argument is iterated over.
+#: In how many lines after an assignment a name may be missing because of it.
+_REACH = 20
+_ITERATING = frozenset(
+    {"all", "any", "enumerate", "list", "reversed", "set", "sorted", "sum", "tuple"}
+)
+
+
+def iteration_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield why a loop, an assignment or a call cannot iterate over or unpack a value."""
+    match node:
+        case (
+            ast.For(target=target, iter=iterated) | ast.comprehension(target=target, iter=iterated)
+        ):
+            if getattr(node, "is_async", 0):
+                return
+            yield from _iterated(iterated, scope)
+            yield from _unpacked(target, scope.element(scope.type_of(iterated)), iterated, scope)
+        case ast.Assign(targets=[target], value=value):
+            found = scope.type_of(value)
+            yield from _unpacked(target, found, value, scope)
+        case ast.Call(func=function, args=arguments):
+            name = scope.called_name(function)
+            if name in _ITERATING and arguments:
+                yield from _iterated(arguments[0], scope)
+            elif name == "zip" or (name in {"min", "max"} and len(arguments) == 1):
+                for argument in arguments:
+                    yield from _iterated(argument, scope)
+        case ast.Starred(value=value):
+            yield from _iterated(value, scope)
+        case ast.AugAssign(target=ast.expr() as target, op=ast.Add(), value=value):
+            changed = scope.type_of(target)
+            is_list = isinstance(changed, Collection) and changed.python is list
+            # numpy adds a number to each element of an array
+            is_field = isinstance(changed, FieldType) and changed.is_array
+            if is_list or (is_field and isinstance(scope.type_of(value), Message)):
+                yield from _iterated(value, scope, "added to a list")
+
+
+def _iterated(
+    node: ast.expr, scope: FunctionTypes, what: str = "iterated over"
+) -> Iterator[CodeProblem]:
+    found = scope.type_of(node)
+    if is_scalar(found):
+        problem = f"{shown(found)} cannot be {what}"
+        yield CodeProblem(Kind.VALUE, problem, span_of(node, scope.home.source))
+
+
+def is_scalar(type_: Value) -> bool:
+    """Return whether a value has no elements: a number, a message, a function or a plain object."""
+    if isinstance(type_, OwnMethod):
+        return True
+    if isinstance(type_, ModuleFunction):  # a decorator may make anything of it
+        return not type_.node.decorator_list
+    if isinstance(type_, OwnObject):
+        known = known_attributes(type_.of)
+        return known is not None and not {"__iter__", "__getitem__"} & known
+    return is_number(type_) or type_ == BOOL or isinstance(type_, Message) or is_byte(type_)
+
+
+def _unpacked(
+    target: ast.expr, found: Value, origin: ast.expr, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Check a tuple of targets against the value that is unpacked into it."""
+    if not isinstance(target, ast.Tuple | ast.List):
+        return
+    if any(isinstance(item, ast.Starred) for item in target.elts):
+        return
+    is_own = isinstance(origin, ast.Tuple | ast.List) and not isinstance(target, ast.Starred)
+    wrong = _wrong_count(found, len(target.elts))
+    if wrong is not None and not (is_own and scope.type_of(origin) == found):
+        span = span_of(origin, scope.home.source)
+        lines = (span.line, span.line + _REACH)
+        yield CodeProblem(Kind.VALUE, wrong, span, _hint(origin, found, scope), lines=lines)
+        return
+    items = found.items if isinstance(found, Collection) else None
+    for item, type_ in zip(target.elts, items or (), strict=False):
+        yield from _unpacked(item, type_, origin, scope)
+
+
+def _wrong_count(found: Value, count: int) -> str | None:
+    if isinstance(found, Collection) and found.items is not None and len(found.items) != count:
+        return f"{len(found.items)} values are unpacked into {count} names"
+    if is_text(found) or is_scalar(found):
+        return f"{shown(found)} is unpacked into {count} names"
+    return None
+
+
+def _hint(origin: ast.expr, found: Value, scope: FunctionTypes) -> str | None:
+    whole = scope.type_of(origin)
+    is_dict = isinstance(whole, Collection) and whole.python is dict
+    return "write .items() to get keys and values" if is_dict and is_text(found) else None

@@ -1,0 +1,242 @@
+"""Checks operations, calls and statements that fail or have no effect."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from inspect import isabstract
+from itertools import pairwise
+
+from composer.behavior_checks.calls.standard_calls import library_call_problems
+from composer.behavior_checks.fitting import kind_of, shown
+from composer.behavior_checks.operations.caught import exception_class, unreachable_handlers
+from composer.behavior_checks.operations.formats import percent_problem
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function, Module
+from composer.behavior_source.flow import returned_values
+from composer.behavior_source.method_body import dotted
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.annotations import annotated
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.operators import (
+    equality_problem,
+    operation_problem,
+    order_problem,
+)
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.libraries.standard_types import ITERATORS
+from composer.behavior_types.scalars import is_float, is_scalar
+from composer.behavior_types.syntax.literals import integer_constant
+from composer.behavior_types.syntax.own_classes import known_attributes
+from composer.behavior_types.values import (
+    ApiMethod,
+    ApiValue,
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Parameters,
+    Ports,
+    Self,
+    Value,
+)
+from composer.field_types import ANYTHING, Word, described
+from composer.interfaces import FieldType, Message
+
+
+def annotations_by_name(
+    function: Function, home: Module, types: BehaviorTypes
+) -> Mapping[str, Value]:
+    """Return the types that the annotations of the parameters of a function name."""
+    arguments = function.args
+    return {
+        argument.arg: annotated(argument.annotation, home, types.node, types.interfaces)
+        for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
+        if argument.annotation is not None
+    }
+
+
+def annotations_of(function: Function) -> Iterator[ast.expr]:
+    """Yield the annotations of the parameters and of the result of a function."""
+    arguments = function.args
+    for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
+        if argument.annotation is not None:
+            yield argument.annotation
+    if function.returns is not None:
+        yield function.returns
+
+
+def uncallable(value: Value) -> tuple[str, str | None] | None:
+    """Return why a value cannot be called, and a hint; None if it may be."""
+    match value:
+        case ApiValue(class_name="Publisher"):
+            return "a Publisher is not a function", "call its method 'publish'"
+        case ApiValue(class_name=name):
+            return f"a {name} is not a function", None
+        case Ports() | Parameters():
+            return "this is not a function", None
+        case Message(name=name):
+            return f"{name} is not a function", None
+        case OwnObject(of=of):
+            known = known_attributes(of)
+            is_callable = known is None or "__call__" in known
+            return None if is_callable else (f"a {of.definition.name} is not a function", None)
+        case Collection(python=python) if not isabstract(python):
+            return f"a {python.__name__} is not a function", None
+        case FieldType() if is_scalar(value) or value.is_array:
+            return f"{described(value)} is not a function", None
+        case _:
+            return None
+
+
+def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the problems of an operation or a statement."""
+    source = scope.home.source
+    match node:
+        case ast.BinOp(left=left, op=operator, right=right):
+            problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
+            problem = problem or percent_problem(left, operator, right, scope)
+            if problem is not None:
+                about = blamed_name((left, right), scope)
+                yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)
+        case ast.AugAssign(target=target, op=operator, value=value):
+            changed = scope.type_of(target)
+            if changed is ANYTHING:
+                before = _before_changes(target, scope)
+                changed = before if is_scalar(before) else ANYTHING
+            problem = operation_problem(changed, operator, scope.type_of(value))
+            is_array = isinstance(changed, FieldType) and changed.is_array
+            if problem is not None and not is_array and not isinstance(changed, Collection):
+                yield CodeProblem(Kind.VALUE, problem, span_of(value, source))
+        case ast.Subscript(value=owner, slice=index):
+            problem = _index_problem(scope.type_of(owner), scope.type_of(index))
+            problem = problem or _position_problem(scope.type_of(owner), index)
+            if problem is not None:
+                yield CodeProblem(Kind.VALUE, problem, span_of(index, source))
+        case ast.Call(func=ast.Name(id="len"), args=[argument]):
+            found = scope.type_of(argument)
+            if _has_no_length(found):
+                message = f"{shown(found)} has no length"
+                yield CodeProblem(Kind.VALUE, message, span_of(argument, source))
+        case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
+            yield from _equality(left, right, node, scope)
+        case ast.Compare(left=left, ops=operators, comparators=others):
+            values = [scope.type_of(item) for item in (left, *others)]
+            for (first, second), sign in zip(pairwise(values), operators, strict=True):
+                problem = order_problem(first, sign, second)
+                if problem is not None:
+                    yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
+        case ast.Call(func=function) if called := scope.called_name(function):
+            yield from library_call_problems(node, called, scope)
+        case ast.Try():
+            yield from unreachable_handlers(node, scope)
+        case ast.Expr(value=value):
+            yield from _unused(value, scope)
+        case ast.Await(value=ast.Call(func=function)):
+            name = scope.global_name(dotted(function))
+            if name.startswith("asyncio.") and not _runs_asyncio(scope.home):
+                message = f"'{name}' needs the event loop of asyncio, which does not run here"
+                hint = "use self.clock.sleep" if name == "asyncio.sleep" else None
+                yield CodeProblem(Kind.ASYNCIO, message, span_of(function, source), hint)
+
+
+def _before_changes(target: ast.expr, scope: FunctionTypes) -> Value:
+    """Return the type of a name or an attribute without what '+=' and the like do to it."""
+    if isinstance(target, ast.Name):
+        return scope.before_changes(target.id)
+    if isinstance(target, ast.Attribute) and isinstance(scope.type_of(target.value), Self):
+        return scope.owner.before_changes(target.attr)
+    return ANYTHING
+
+
+def _equality(
+    left: ast.expr, right: ast.expr, node: ast.expr, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield why a value is never equal to the other one."""
+    source = scope.home.source
+    for word, other in ((scope.type_of(left), right), (scope.type_of(right), left)):
+        constant = other.value if isinstance(other, ast.Constant) else None
+        never = word.problem(constant) if isinstance(word, Word) else None
+        if never is not None:
+            yield CodeProblem(Kind.VALUE, never[0], span_of(other, source), never[1])
+    problem = equality_problem(scope.type_of(left), scope.type_of(right))
+    if problem is not None:
+        yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
+
+
+def blamed_name(operands: Sequence[ast.expr], scope: FunctionTypes) -> str:
+    """Return the name of the operand that is not a number, "" if it has none."""
+    for operand in operands:
+        if isinstance(operand, ast.Name) and kind_of(scope.type_of(operand)) not in (
+            None,
+            "number",
+        ):
+            return operand.id
+    return ""
+
+
+def returned_exceptions(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the exceptions that a function returns although its result is not used."""
+    returns = function.returns
+    if returns is None and not function.name.startswith("on_"):
+        return
+    if returns is not None and not (isinstance(returns, ast.Constant) and returns.value is None):
+        return
+    for value in returned_values(function):
+        if isinstance(value, ast.Call) and _is_exception(scope.called_name(value.func)):
+            message = "an exception is returned, not raised"
+            span = span_of(value, scope.home.source)
+            yield CodeProblem(Kind.UNUSED, message, span, "write 'raise' instead of 'return'")
+
+
+def _is_exception(name: str) -> bool:
+    found = exception_class(name)
+    return found is not None and issubclass(found, Exception)
+
+
+def _runs_asyncio(home: Module) -> bool:
+    """Return whether a file may run an event loop of asyncio, such as in a thread."""
+    starts = ("asyncio.run(", "run_until_complete", "run_forever", "asyncio.Runner")
+    return any(start in home.source.text for start in starts)
+
+
+_TEXT = FieldType("string")
+
+
+def _index_problem(owner: Value, index: Value) -> str | None:
+    is_list = isinstance(owner, FieldType) and owner.is_array
+    is_sequence = isinstance(owner, Collection) and owner.python in (list, tuple, bytes)
+    if (is_list or is_sequence) and is_float(index):
+        return "an index must be an integer, not a float"
+    if isinstance(owner, Message) or (is_scalar(owner) and owner != _TEXT):
+        return f"{described(owner)} is not a list"  # type: ignore[arg-type]
+    return None
+
+
+def _position_problem(owner: Value, index: ast.expr) -> str | None:
+    """Return why a tuple of a known length has no item at a position."""
+    items = owner.items if isinstance(owner, Collection) and owner.python is tuple else None
+    position = integer_constant(index)
+    if items is None or position is None or -len(items) <= position < len(items):
+        return None
+    return f"{shown(owner)} has no item {position}"
+
+
+def _has_no_length(type_: Value) -> bool:
+    if isinstance(type_, Collection):
+        return type_.python in ITERATORS or type_.python is Iterator
+    is_function = isinstance(type_, OwnMethod | ModuleFunction)
+    return is_function or isinstance(type_, Message) or (is_scalar(type_) and type_ != _TEXT)
+
+
+def _unused(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    source = scope.home.source
+    match value:
+        case ast.Compare(ops=[ast.Eq(), *_]):
+            message = "the result of this comparison is not used"
+            yield CodeProblem(Kind.UNUSED, message, span_of(value, source), "assign with '='")
+        case ast.Attribute(attr=name) | ast.Name(id=name):
+            found = scope.type_of(value)
+            if isinstance(found, OwnMethod | ModuleFunction | ApiMethod):
+                message = f"'{name}' is not called"
+                yield CodeProblem(Kind.UNUSED, message, span_of(value, source), "add '()'")

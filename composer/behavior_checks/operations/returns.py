@@ -1,0 +1,115 @@
+"""Checks what a function returns against its annotation, and against what the composer expects."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.fitting import argument_problem, shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function
+from composer.behavior_source.flow import (
+    empty_returns,
+    is_stub,
+    may_raise_at_end,
+    reaches_end,
+    returned_values,
+)
+from composer.behavior_source.spans import span_of
+from composer.behavior_source.syntax import name_span
+from composer.behavior_types.expressions.annotations import allows_none, annotated
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.libraries.handlers import Handler
+from composer.behavior_types.scalars import is_float, is_integer
+from composer.behavior_types.values import NONE, Collection, OwnObject, Pending, Value
+from composer.field_types import ANYTHING, BOOL
+from composer.interfaces import FieldType, Message
+
+
+def return_problems(
+    function: Function, scope: FunctionTypes, handler: Handler | None
+) -> Iterator[CodeProblem]:
+    """Yield what is wrong with the values that a function returns, or does not return.
+
+    What a handler of a service or an action returns is checked as a message, by the caller.
+    """
+    if handler is not None and handler.returns is NONE:
+        yield from _unused(function, scope)
+        return
+    annotation = function.returns
+    if annotation is None or is_stub(function):
+        return
+    expected = annotated(annotation, scope.home, scope.owner.node, scope.owner.interfaces)
+    is_message = handler is not None and isinstance(handler.returns, Message)
+    if not is_message and expected is not NONE:
+        yield from _wrong(function, scope, expected)
+    if allows_none(annotation) or function.name.startswith("accept_"):
+        return
+    if isinstance(expected, Message | FieldType | OwnObject | Collection):
+        yield from _missing(function, scope, expected)
+
+
+def must_return(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
+    """Yield what is wrong with what a function returns to rclpy, which expects that type."""
+    if expected is NONE or expected is ANYTHING:
+        yield from return_problems(function, scope, None)
+        return
+    if is_stub(function) or _yields(function):
+        return
+    if not isinstance(expected, Message):  # its fields are checked by the caller
+        yield from _wrong(function, scope, expected)
+    yield from _empty(function, scope, expected)
+    if reaches_end(function):
+        yield _without_end(function, scope, expected)
+
+
+def _missing(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
+    if isinstance(expected, Collection) and _yields(function):
+        return
+    yield from _empty(function, scope, expected)
+    if reaches_end(function) and not may_raise_at_end(function):
+        yield _without_end(function, scope, expected)
+
+
+def _empty(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
+    for statement in empty_returns(function):
+        span = span_of(statement, scope.home.source)
+        message = f"'{function.name}' returns {shown(expected)}, not None"
+        yield CodeProblem(Kind.RETURN, message, span, "return a value")
+
+
+def _without_end(function: Function, scope: FunctionTypes, expected: Value) -> CodeProblem:
+    problem = f"'{function.name}' returns {shown(expected)}, but may end without a 'return'"
+    span = name_span(function, "def", scope.home.source)
+    return CodeProblem(Kind.RETURN, problem, span, "return a value at its end")
+
+
+def _wrong(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
+    """Yield the returned values that contradict the annotation."""
+    if _yields(function):
+        return
+    for value in returned_values(function):
+        found = scope.type_of(value)
+        if isinstance(found, Pending):
+            continue
+        problem = argument_problem(value, found, expected, scope.type_of)
+        if problem is None and is_float(found) and (is_integer(expected) or expected == BOOL):
+            problem = f"{shown(found)} where {shown(expected)} is expected"
+        if problem is not None:
+            message = f"the result of '{function.name}': {problem}"
+            yield CodeProblem(Kind.RETURN, message, span_of(value, scope.home.source))
+
+
+def _unused(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the messages that a handler returns, although nothing uses them."""
+    for value in returned_values(function):
+        if isinstance(scope.type_of(value), Message):
+            span = span_of(value, scope.home.source)
+            message = f"what '{function.name}' returns is not used"
+            yield CodeProblem(
+                Kind.UNUSED, message, span, "publish it: self.publishers.NAME.publish"
+            )
+
+
+def _yields(function: Function) -> bool:
+    return any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(function))

@@ -1,0 +1,243 @@
+"""The types of operators and built-in functions, and operators that fail."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from typing import TypeGuard
+
+from composer.behavior_types.libraries.numpy_types import ARRAY, array_operation
+from composer.behavior_types.libraries.rclpy_api import is_time, order_of_rclpy, time_arithmetic
+from composer.behavior_types.scalars import is_float, is_integer, is_number, is_scalar, is_text
+from composer.behavior_types.syntax.lineage import NAMED_TUPLE, lineage
+from composer.behavior_types.syntax.own_classes import is_plain, known_attributes
+from composer.behavior_types.values import (
+    NONE,
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Value,
+    join_all,
+)
+from composer.field_types import ANYTHING, BOOL, INTEGER, NUMBER, STRING
+from composer.interfaces import TEXTS, FieldType, Message
+
+
+def binary(left: Value, operator: ast.operator, right: Value) -> Value:
+    """Return the type of an arithmetic operation."""
+    if is_number(left) and is_number(right):
+        return _arithmetic(left, operator, right)
+    of_array = array_operation(left, operator, right)
+    if of_array is not None:
+        return of_array
+    if isinstance(operator, ast.Add | ast.Sub) and (is_time(left) or is_time(right)):
+        return time_arithmetic(left, _SIGNS[type(operator)], right)
+    if is_text(left) and (
+        (isinstance(operator, ast.Add) and is_text(right))
+        or (isinstance(operator, ast.Mult) and is_number(right))
+        or isinstance(operator, ast.Mod)
+    ):
+        return STRING
+    if isinstance(left, Collection) and left.python is not dict:
+        if isinstance(operator, ast.Add) and isinstance(right, Collection):
+            joined = join_all((left, right))
+            if isinstance(joined, Collection) and joined.items is not None:
+                return Collection(tuple, joined.element)
+            return joined
+        if isinstance(operator, ast.Mult) and is_integer(right):
+            return left
+    return ANYTHING
+
+
+def _arithmetic(left: Value, operator: ast.operator, right: Value) -> Value:
+    if isinstance(operator, ast.Div) or is_float(left) or is_float(right):
+        return NUMBER
+    if isinstance(operator, ast.BitAnd | ast.BitOr | ast.BitXor) and BOOL in (left, right):
+        return ANYTHING
+    return ANYTHING if isinstance(operator, ast.Pow | ast.MatMult) else INTEGER
+
+
+def unary(operator: ast.unaryop, operand: Value) -> Value:
+    """Return the type of ``-x``, ``not x`` and the like."""
+    if isinstance(operator, ast.Not):
+        return BOOL
+    if isinstance(operator, ast.USub | ast.UAdd) and is_number(operand):
+        return INTEGER if operand == BOOL else operand
+    return ARRAY if operand == ARRAY else ANYTHING
+
+
+def both(operator: ast.boolop, operands: Sequence[Value]) -> Value:
+    """Return the type of ``a and b`` or ``a or b``."""
+    if isinstance(operator, ast.Or):
+        return join_all(operands)
+    *first, last = operands
+    # a message is never false
+    possible = [*(item for item in first if not isinstance(item, Message)), last]
+    return ANYTHING if NONE in possible else join_all(possible)
+
+
+def comparison(operators: Sequence[ast.cmpop], operands: Sequence[Value]) -> Value:
+    """Return the type of a comparison: a bool, unless an operand is of an unknown type."""
+    if all(isinstance(item, ast.In | ast.NotIn | ast.Is | ast.IsNot) for item in operators):
+        return BOOL
+    known = (is_scalar(operand) or operand is NONE for operand in operands)
+    return BOOL if all(known) else ANYTHING
+
+
+def operation_problem(left: Value, operator: ast.operator, right: Value) -> str | None:
+    """Return why an operation on two values fails, or None if it may be right."""
+    sign = _SIGNS.get(type(operator))
+    if sign is None:
+        return None
+    if isinstance(operator, ast.Mod) and left is ANYTHING:
+        return None
+    for value in (left, right):
+        if isinstance(value, Message) and ANYTHING in (left, right):
+            return f"{value.name} has no operator '{sign}'"
+    if ANYTHING in (left, right):
+        return None
+    if isinstance(operator, ast.Mod) and is_text(left):
+        return None  # it formats any value
+    for value in (left, right):
+        if isinstance(value, Message):
+            return f"{value.name} has no operator '{sign}'"
+        if isinstance(value, OwnMethod | ModuleFunction):
+            return f"a function has no operator '{sign}'"
+    if is_time(left) or is_time(right):
+        return _problem_of_times(left, sign, right)
+    name = _NAMES[type(operator)]
+    is_defined = _defines(left, f"__{name}__") or _defines(right, f"__r{name}__")
+    for value in (left, right):
+        if isinstance(value, OwnObject) and not is_defined and is_plain(value.of):
+            return f"a {value.of.definition.name} has no operator '{sign}'"
+        if _is_tuple(value) and sign not in _OF_TUPLES and not _has_own(left, right, name):
+            return f"a {value.of.definition.name} has no operator '{sign}'"
+    is_repeated = isinstance(operator, ast.Mult) and (is_integer(left) or is_integer(right))
+    for first, second in ((left, right), (right, left)):
+        is_sequence = _is_list(second) and second.python in (list, tuple)
+        if is_number(first) and _is_list(second) and not (is_repeated and is_sequence):
+            return f"operator '{sign}' on a {second.python.__name__} and a number"
+    is_mixed = (is_text(left) and is_number(right)) or (is_number(left) and is_text(right))
+    if is_mixed and not is_repeated:
+        return f"operator '{sign}' on a string and a number"
+    return None
+
+
+def _problem_of_times(left: Value, sign: str, right: Value) -> str | None:
+    """Return why rclpy cannot calculate with two values, one of which is a Time or a Duration."""
+    names = [order_of_rclpy(item) or _order(item) for item in (left, right)]
+    if "" in names or time_arithmetic(left, sign, right) is not ANYTHING:
+        return None
+    return f"operator '{sign}' on {names[0]} and {names[1]}"
+
+
+def _is_tuple(value: Value) -> TypeGuard[OwnObject]:
+    """Return whether a value is a named tuple, or of a class that is derived from one."""
+    return isinstance(value, OwnObject) and lineage(value.of).others == {NAMED_TUPLE}
+
+
+def _has_own(left: Value, right: Value, name: str) -> bool:
+    """Return whether a class may define an operator for two values."""
+    for value, method in ((left, f"__{name}__"), (right, f"__r{name}__")):
+        known = known_attributes(value.of) if isinstance(value, OwnObject) else frozenset()
+        if known is None or method in known:
+            return True
+    return not all(
+        is_number(value) or is_text(value) or _is_tuple(value) for value in (left, right)
+    )
+
+
+def _defines(value: Value, method: str) -> bool:
+    """Return whether an object may define an operator."""
+    if not isinstance(value, OwnObject):
+        return False
+    known = known_attributes(value.of) if is_plain(value.of) else None
+    return known is None or method in known
+
+
+def _is_list(type_: Value) -> TypeGuard[Collection]:
+    return isinstance(type_, Collection) and type_.python in (list, tuple, dict, set)
+
+
+def order_problem(left: Value, operator: ast.cmpop, right: Value) -> str | None:
+    """Return why Python cannot order two values, or None if it may."""
+    if not isinstance(operator, ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+        return None
+    kinds = {order_of_rclpy(left) or _order(left), order_of_rclpy(right) or _order(right)}
+    if len(kinds) > 1 and "" not in kinds:
+        return "a comparison of " + " and ".join(sorted(kinds))
+    return None
+
+
+def equality_problem(left: Value, right: Value) -> str | None:
+    """Return why two values are never equal, None if they may be."""
+    for first, second in ((left, right), (right, left)):
+        if isinstance(first, Message) and (is_number(second) or is_text(second)):
+            return f"{first.name} is never equal to {_order(second)}"
+        if isinstance(first, OwnMethod | ModuleFunction) and _order(second) not in (
+            "",
+            "a function",
+        ):
+            return f"a function is never equal to {_order(second)}"
+    return None
+
+
+def _order(type_: Value) -> str:
+    if is_number(type_):
+        return "a number"
+    if is_text(type_):
+        return "a string"
+    if isinstance(type_, Message):
+        return type_.name
+    if isinstance(type_, OwnMethod | ModuleFunction):
+        return "a function"
+    is_array = isinstance(type_, FieldType) and type_.is_array
+    # numpy arrays, which messages may hold, can be compared with numbers
+    is_list = is_array and isinstance(type_, FieldType) and type_.name in TEXTS
+    if is_list:
+        return "a list"
+    if isinstance(type_, Collection) and type_.python in (list, tuple, dict):
+        return f"a {type_.python.__name__}"
+    if isinstance(type_, OwnObject) and is_plain(type_.of):
+        return "" if _may_order(type_) else f"a {type_.of.definition.name}"
+    return ""
+
+
+def _may_order(type_: OwnObject) -> bool:
+    """Return whether objects of a class may be compared with other values."""
+    own = {method.name for method in type_.of.definition.methods}
+    options = any(isinstance(item, ast.Call) for item in type_.of.definition.node.decorator_list)
+    return options or bool(own & {"__lt__", "__le__", "__gt__", "__ge__"})
+
+
+#: What tuples and numbers have in common; numpy takes tuples for arrays.
+_OF_TUPLES = frozenset({"+", "*", "%"})
+_NAMES: dict[type[ast.operator], str] = {
+    ast.Add: "add",
+    ast.Sub: "sub",
+    ast.Mult: "mul",
+    ast.Div: "truediv",
+    ast.FloorDiv: "floordiv",
+    ast.Mod: "mod",
+    ast.Pow: "pow",
+    ast.BitAnd: "and",
+    ast.BitOr: "or",
+    ast.BitXor: "xor",
+    ast.LShift: "lshift",
+    ast.RShift: "rshift",
+}
+_SIGNS: dict[type[ast.operator], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.FloorDiv: "//",
+    ast.Mod: "%",
+    ast.Pow: "**",
+    ast.BitAnd: "&",
+    ast.BitOr: "|",
+    ast.BitXor: "^",
+    ast.LShift: "<<",
+    ast.RShift: ">>",
+}

@@ -1,0 +1,1 @@
+"""The types of what others define: the API for behaviors, rclpy, numpy, the standard library."""

@@ -1,0 +1,324 @@
+"""The types of what built-in functions, the standard library and methods of Python return."""
+
+from __future__ import annotations
+
+import builtins
+import importlib
+import itertools
+import re
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from types import GeneratorType
+
+from composer import behavior
+from composer.behavior_types.libraries.numpy_types import ARRAY, numpy_method_result, numpy_result
+from composer.behavior_types.scalars import is_float, is_integer, is_number, is_text
+from composer.behavior_types.values import (
+    NONE,
+    BuiltinObject,
+    Collection,
+    Value,
+    join,
+    join_all,
+    pair,
+)
+from composer.field_types import ANYTHING, BOOL, INTEGER, NUMBER, STRING
+from composer.interfaces import FieldType
+
+_NO_ITEMS: dict[str, str] = {}
+_VALUES, _KEYS, _ITEMS = (
+    type(_NO_ITEMS.values()),
+    type(_NO_ITEMS.keys()),
+    type(_NO_ITEMS.items()),
+)
+#: What can be iterated over once only, and has no length.
+ITERATORS = frozenset({GeneratorType, enumerate, filter, map, reversed, zip, itertools.cycle})
+#: What messages do not accept as an array.
+NO_SEQUENCES = ITERATORS | {dict, _VALUES, _ITEMS}
+
+_MATH_TO_INTEGER = frozenset({"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "trunc"})
+_MATH_TO_BOOL = frozenset({"isclose", "isfinite", "isinf", "isnan"})
+_MATH_TO_OTHER = frozenset({"frexp", "modf", "perm", "prod", "sumprod"})
+_CALLS: Mapping[str, Value] = {
+    "str": STRING,
+    "repr": STRING,
+    "int": INTEGER,
+    "len": INTEGER,
+    "ord": INTEGER,
+    "chr": STRING,
+    "float": NUMBER,
+    "bool": BOOL,
+    "isinstance": BOOL,
+    "hasattr": BOOL,
+    "callable": BOOL,
+    "any": BOOL,
+    "all": BOOL,
+    "random.gauss": NUMBER,
+    "random.randint": INTEGER,
+    "random.random": NUMBER,
+    "random.uniform": NUMBER,
+    "statistics.fmean": NUMBER,
+    "time.monotonic": NUMBER,
+    "time.perf_counter": NUMBER,
+    "time.time": NUMBER,
+    "time.time_ns": INTEGER,
+    "re.compile": BuiltinObject(re.Pattern),
+    "re.fullmatch": BuiltinObject(re.Match),
+    "re.match": BuiltinObject(re.Match),
+    "re.search": BuiltinObject(re.Match),
+    "re.sub": STRING,
+}
+_COLLECTIONS: Mapping[str, type] = {
+    "list": list,
+    "sorted": list,
+    "tuple": tuple,
+    "set": set,
+    "frozenset": frozenset,
+    "bytes": bytes,
+    "bytearray": bytearray,
+    "iter": GeneratorType,
+    "reversed": reversed,
+    "collections.deque": deque,
+    "itertools.cycle": itertools.cycle,
+}
+_COPYING = frozenset({"copy.copy", "copy.deepcopy", "dataclasses.replace"})
+_TEXTS = Collection(list, STRING)
+_OF_TEXT: Mapping[str, Value] = {
+    **dict.fromkeys(
+        ("capitalize", "format", "join", "ljust", "lower", "lstrip", "removeprefix"), STRING
+    ),
+    **dict.fromkeys(
+        ("removesuffix", "replace", "rjust", "rstrip", "strip", "title", "upper", "zfill"), STRING
+    ),
+    **dict.fromkeys(("endswith", "isalpha", "isdigit", "isidentifier", "startswith"), BOOL),
+    **dict.fromkeys(("count", "find", "index", "rfind"), INTEGER),
+    **dict.fromkeys(("rsplit", "split", "splitlines"), _TEXTS),
+    "encode": Collection(bytes, INTEGER),
+    "partition": pair(STRING, STRING, STRING),
+    "rpartition": pair(STRING, STRING, STRING),
+}
+#: Exceptions from which libraries derive exceptions with more attributes.
+_DERIVED_FROM = frozenset({BaseException, Exception})
+
+
+def element_of(type_: Value) -> Value:
+    """Return the type of what iterating over a value gives, as it is written in its type."""
+    if isinstance(type_, Collection):
+        return type_.key if type_.python is dict else type_.element
+    if isinstance(type_, FieldType) and type_.is_array:
+        return type_.element
+    return STRING if is_text(type_) else ANYTHING
+
+
+def sliced(owner: Value) -> Value:
+    """Return the type of a slice of a value."""
+    match owner:
+        case Collection(python=python, element=element):
+            return Collection(python, element)
+        case FieldType(name=name) if owner.is_array:
+            return FieldType(name, is_array=True)
+        case BuiltinObject() if owner == ARRAY:
+            return ARRAY
+        case _:
+            return STRING if is_text(owner) else ANYTHING
+
+
+def called(name: str, arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    """Return the type of a call of a built-in function or of one in the standard library."""
+    module, _, function = name.rpartition(".")
+    if module == "math":
+        return _math(function)
+    if name.startswith("numpy."):
+        return numpy_result(name.removeprefix("numpy."), arguments, keywords)
+    if name in _CALLS:
+        return _CALLS[name]
+    if name in _COPYING and len(arguments) == 1:
+        return arguments[0]
+    if name == "range":
+        return Collection(range, INTEGER)
+    if name in _COLLECTIONS:
+        return _collection(_COLLECTIONS[name], arguments)
+    special = _SPECIAL.get(name)
+    return special(arguments, keywords) if special is not None else ANYTHING
+
+
+def _collection(python: type, arguments: Sequence[Value]) -> Value:
+    source = arguments[0] if len(arguments) == 1 else ANYTHING
+    items = source.items if isinstance(source, Collection) and python is tuple else None
+    is_empty = not arguments and python is not tuple
+    return Collection(python, element_of(source), items=items, is_empty=is_empty)
+
+
+def _math(function: str) -> Value:
+    if function in _MATH_TO_OTHER:
+        return ANYTHING
+    if function in _MATH_TO_INTEGER:
+        return INTEGER
+    return BOOL if function in _MATH_TO_BOOL else NUMBER
+
+
+def _dict(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    source = arguments[0] if len(arguments) == 1 and not keywords else ANYTHING
+    if isinstance(source, Collection) and source.python is dict:
+        return source
+    item = element_of(source)
+    if isinstance(item, Collection) and item.items is not None and len(item.items) == _PAIR:
+        key, value = item.items
+        return Collection(dict, value, key)
+    return Collection(dict)
+
+
+def _default_dict(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    """Return the type of a call of ``defaultdict``, whose values are of the class it is given."""
+    return Collection(dict, is_empty=len(arguments) <= 1)
+
+
+def _least(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    """Return the type of a call of ``min`` or ``max``."""
+    if len(arguments) > 1:
+        is_mixed = all(map(is_number, arguments)) and any(map(is_float, arguments))
+        return NUMBER if is_mixed else join_all(arguments)
+    found = element_of(arguments[0]) if arguments else ANYTHING
+    return join(found, keywords["default"]) if "default" in keywords else found
+
+
+def _sum(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    element = element_of(arguments[0]) if len(arguments) == 1 and not keywords else ANYTHING
+    if element == BOOL or is_integer(element):
+        return INTEGER
+    return NUMBER if is_float(element) else ANYTHING
+
+
+def _enumerate(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return Collection(enumerate, pair(INTEGER, element_of(arguments[0]))) if arguments else ANYTHING
+
+
+def _zip(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return Collection(zip, pair(*map(element_of, arguments))) if arguments else ANYTHING
+
+
+def _next(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    found = element_of(arguments[0]) if arguments else ANYTHING
+    return join(found, arguments[1]) if len(arguments) > 1 else found
+
+
+def _divmod(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    if len(arguments) != _PAIR or not all(map(is_number, arguments)):
+        return ANYTHING
+    found = NUMBER if any(map(is_float, arguments)) else INTEGER
+    return pair(found, found)
+
+
+def _number(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    """Return the type of a call of ``abs``."""
+    only = arguments[0] if len(arguments) == 1 and not keywords else ANYTHING
+    return only if is_number(only) else ANYTHING
+
+
+def _round(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    only = arguments[0] if len(arguments) == 1 and not keywords else ANYTHING
+    return INTEGER if is_number(only) else ANYTHING
+
+
+def _filter(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return Collection(filter, element_of(arguments[1])) if len(arguments) == _PAIR else ANYTHING
+
+
+def _map(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return Collection(map) if arguments else ANYTHING
+
+
+_PATTERN = BuiltinObject(re.Pattern)
+_MATCH = BuiltinObject(re.Match)
+#: The results of methods of objects of the standard library.
+_METHODS: Mapping[tuple[type, str], Value] = {
+    **{(re.Pattern, name): _MATCH for name in ("fullmatch", "match", "search")},
+    (re.Pattern, "finditer"): Collection(GeneratorType, _MATCH),
+    (re.Pattern, "split"): Collection(list, STRING),
+    (re.Pattern, "sub"): STRING,
+    (re.Match, "end"): INTEGER,
+    (re.Match, "groups"): Collection(tuple, STRING),
+    (re.Match, "start"): INTEGER,
+}
+
+
+def builtin_result(
+    python: type, name: str, arguments: Sequence[Value], keywords: Mapping[str, Value]
+) -> Value:
+    """Return the type of what a method of an object of the standard library or numpy returns."""
+    of_numpy = numpy_method_result(python, name, keywords)
+    if of_numpy is not None:
+        return of_numpy
+    if (python, name) == (re.Match, "group"):
+        return STRING if len(arguments) <= 1 else Collection(tuple, STRING)
+    if python.__module__ == "random":
+        return _CALLS.get(f"random.{name}", ANYTHING)
+    return _METHODS.get((python, name), ANYTHING)
+
+
+def _random(_: Sequence[Value], __: Mapping[str, Value]) -> Value:
+    return BuiltinObject(importlib.import_module("random").Random)  # it takes time to import
+
+
+_SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] = {
+    "abs": _number,
+    "collections.OrderedDict": _dict,
+    "collections.defaultdict": _default_dict,
+    "dict": _dict,
+    "divmod": _divmod,
+    "enumerate": _enumerate,
+    "filter": _filter,
+    "map": _map,
+    "max": _least,
+    "min": _least,
+    "next": _next,
+    "random.Random": _random,
+    "round": _round,
+    "sum": _sum,
+    "zip": _zip,
+}
+_PAIR = 2
+
+
+def method_result(owner: Collection, name: str, arguments: Sequence[Value]) -> Value:
+    """Return the type of what a method of a collection or of a text returns."""
+    if owner.python is str:
+        return _OF_TEXT.get(name, ANYTHING)
+    if owner.python is dict:
+        return _of_dict(owner, name, arguments)
+    if name in {"copy", "difference", "intersection"}:
+        return owner
+    if name in {"count", "index"}:
+        return INTEGER
+    if name == "decode" and owner.python in (bytes, bytearray):
+        return STRING
+    if name in {"pop", "popleft"} and len(arguments) <= 1:
+        return owner.element
+    in_place = {"append", "appendleft", "clear", "extend", "insert", "remove", "reverse", "sort"}
+    return NONE if name in in_place | {"add", "discard", "update"} else ANYTHING
+
+
+def _of_dict(owner: Collection, name: str, arguments: Sequence[Value]) -> Value:
+    match name:
+        case "values":
+            return Collection(_VALUES, owner.element)
+        case "keys":
+            return Collection(_KEYS, owner.key)
+        case "items":
+            return Collection(_ITEMS, pair(owner.key, owner.element))
+        case "get" | "pop" | "setdefault":
+            return join_all((owner.element, *arguments[1:]))
+        case "copy":
+            return owner
+        case _:
+            return ANYTHING
+
+
+def exception_type(name: str) -> Value:
+    """Return the type of a caught exception, ANYTHING if it may have further attributes."""
+    module, _, last = name.rpartition(".")
+    home = {"": builtins, "composer.behavior": behavior}.get(module)
+    found = getattr(home, last, None)
+    if not isinstance(found, type) or not issubclass(found, BaseException):
+        return ANYTHING
+    return ANYTHING if found in _DERIVED_FROM else BuiltinObject(found)
