@@ -14,6 +14,8 @@ from composer.runtime.ros.qos_profiles import discovered_profile
 
 #: rmw's node name of an endpoint whose participant has not reported its nodes yet.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: The length of the participant's prefix in the id of an endpoint (DDSI-RTPS, 9.3.1).
+PARTICIPANT_BYTES = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,11 @@ class EndpointInfo:
     def is_nameless(self) -> bool:
         """Whether the endpoint is discovered but its node is not."""
         return UNKNOWN_NODE in self.node
+
+    @property
+    def participant(self) -> bytes:
+        """The prefix of the participant with the endpoint."""
+        return bytes.fromhex(self.gid.replace(".", ""))[:PARTICIPANT_BYTES]
 
     @property
     def name(self) -> str:

@@ -24,6 +24,7 @@ def endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]]
 
 def _endpoints_by_node(graph: RosGraph) -> _Ends:
     ends: _Ends = {name: [] for name in node_names(graph)}
+    replaced = graph.replaced()
     for topic, types in visible_topics(graph).items():
         info = graph.topic(topic, types)
         for kind, found in (
@@ -31,7 +32,7 @@ def _endpoints_by_node(graph: RosGraph) -> _Ends:
             (PortKind.SUBSCRIPTION, info.subscriptions),
         ):
             for end in found:
-                if end.node in ends:
+                if end.node in ends and end.participant not in replaced:
                     ends[end.node].append(ObservedEndpoint(kind, topic, end.type, end.qos))
     for name, of_node in ends.items():
         of_node.extend(_services_and_actions(graph, name))

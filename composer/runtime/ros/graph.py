@@ -7,7 +7,8 @@ queries, and a single participant would keep every command from working.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
@@ -23,7 +24,8 @@ from rclpy.validate_node_name import validate_node_name
 
 from composer.names import join_node_name
 from composer.runtime.process.query_socket import NameAndTypes
-from composer.runtime.ros.endpoints import UNKNOWN_NODE, TopicInfo, topic_info
+from composer.runtime.ros.ended_participants import ended_participants
+from composer.runtime.ros.endpoints import PARTICIPANT_BYTES, UNKNOWN_NODE, TopicInfo, topic_info
 
 #: The name and the namespace of a node.
 NodeName: TypeAlias = tuple[str, str]
@@ -35,8 +37,6 @@ COMMAND_PREFIX = "_compose_"
 SETTLE_S = 0.15
 #: The topic with which each ROS 2 participant announces its nodes, by its DDS name.
 _PARTICIPANTS_TOPIC = "ros_discovery_info"
-#: The length of the participant's prefix in the id of an endpoint (DDSI-RTPS, 9.3.1).
-_PARTICIPANT_BYTES = 12
 _KNOWN_NAMES = 50_000  # of the largest systems, several times
 _MAX_LISTED = 3
 _MAX_SKIPPED = 1000
@@ -119,7 +119,28 @@ class RosGraph:
         return len(named) == len(publishers) and announced.issuperset(map(participant, known))
 
     def nodes(self) -> list[NodeName]:
-        """Return all nodes; a name that two nodes share is listed twice."""
+        """Return all nodes; a name that two nodes share is listed twice.
+
+        A killed process counts until DDS notices its end, unless its nodes run again.
+        """
+        found = self._all_nodes()
+        replaced = self._replaced(found)
+        if not replaced:
+            return found
+        ends = {(end.node_name, end.node_namespace, participant(end)) for end in self._all_ends()}
+        gone = Counter((name, namespace) for name, namespace, prefix in ends if prefix in replaced)
+        return list((Counter(found) - gone).elements())
+
+    def replaced(self) -> frozenset[bytes]:
+        """Return the participants that have ended, if nodes with the names of theirs run again."""
+        return self._replaced(self._all_nodes())
+
+    def _replaced(self, found: list[NodeName]) -> frozenset[bytes]:
+        if len(found) == len(set(found)):
+            return frozenset()
+        return ended_participants(self.participants(), self._node.context.get_domain_id())
+
+    def _all_nodes(self) -> list[NodeName]:
         try:
             found = self._node.get_node_names_and_namespaces()
         except rclpy_implementation.RCLError:  # a node without a name, so rcl returns none at all
@@ -204,21 +225,19 @@ class RosGraph:
 
     def _nodes_with_endpoints(self) -> list[NodeName]:
         """Return the nodes with a publisher or a subscription, as nearly all nodes have."""
-        infos = (info for name, _ in self.topics() for info in self._endpoints(name))
         return sorted(
             {
                 (info.node_name, info.node_namespace)
-                for info in infos
+                for info in self._all_ends()
                 if UNKNOWN_NODE not in (info.node_name, info.node_namespace)
             }
         )
 
-    def _endpoints(self, topic: str) -> list[TopicEndpointInfo]:
-        node = self._node
-        return [
-            *node.get_publishers_info_by_topic(topic),
-            *node.get_subscriptions_info_by_topic(topic),
-        ]
+    def _all_ends(self) -> Iterator[TopicEndpointInfo]:
+        """Yield the publishers and subscriptions of all nodes."""
+        for topic, _ in self.topics():
+            yield from self._node.get_publishers_info_by_topic(topic)
+            yield from self._node.get_subscriptions_info_by_topic(topic)
 
 
 # A service is a pair of DDS topics: its server reads requests, its clients write them.
@@ -236,7 +255,7 @@ def clients_of(node: Node, service: str) -> list[TopicEndpointInfo]:
 
 def participant(endpoint: TopicEndpointInfo) -> bytes:
     """Return the prefix of the participant with an endpoint."""
-    return bytes(endpoint.endpoint_gid[:_PARTICIPANT_BYTES])
+    return bytes(endpoint.endpoint_gid[:PARTICIPANT_BYTES])
 
 
 @lru_cache(_KNOWN_NAMES)

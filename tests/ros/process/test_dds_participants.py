@@ -12,6 +12,8 @@ import pytest
 from std_msgs.msg import Empty
 
 from composer.runtime.process.dds_participants import count_participants
+from composer.runtime.ros.ended_participants import ended_participants
+from composer.runtime.ros.graph import RosGraph
 from tests.ros.support.commands import PYTHON
 from tests.ros.support.in_process import Peer, wait_until
 
@@ -93,6 +95,30 @@ def test_each_participant_on_this_host_is_counted(peer: Peer) -> None:
     finally:
         another.close()
     wait_until(lambda: count_participants(domain_id) == before, "its end")
+
+
+def test_participants_of_ended_processes_are_recognized(peer: Peer) -> None:
+    domain_id = int(os.environ["ROS_DOMAIN_ID"])
+    graph = RosGraph(peer.node)
+    wait_until(lambda: len(graph.participants()) == count_participants(domain_id))
+    known = graph.participants()
+    assert ended_participants(known, domain_id) == frozenset()
+    (own,) = (prefix for prefix in known if prefix[4:6] == number(os.getpid()))
+    with subprocess.Popen(["true"]) as process:
+        process.wait()
+    ended = own[:4] + number(process.pid) + own[6:]
+    elsewhere = own[:2] + bytes(255 - byte for byte in own[2:4]) + ended[4:]
+    assert ended_participants(known | {ended, elsewhere}, domain_id) == {ended}
+    # It may run in a container, if another participant holds a port.
+    another = Peer()
+    try:
+        assert ended_participants(known | {ended}, domain_id) == frozenset()
+    finally:
+        another.close()
+
+
+def number(process: int) -> bytes:
+    return (process & 0xFFFF).to_bytes(2, "little")
 
 
 def test_a_command_discovers_others_on_this_host_without_shared_memory(

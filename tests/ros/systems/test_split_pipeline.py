@@ -22,8 +22,10 @@ from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.qos import QoSPresetProfiles
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from composer.drift import ObservedEndpoint
 from composer.remote.systems.local_queries import local_report
 from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.ros.endpoints_by_node import endpoints, node_names
 from composer.runtime.ros.graph import RosGraph, participant
 from tests.ros.support.commands import (
     COMPOSE,
@@ -321,12 +323,25 @@ def states_of_all() -> set[str]:
     return {node.state for node in report.nodes} if report else set()
 
 
-def test_killed_processes_are_replaced(split: RunningSystem, path: Path) -> None:
+def test_killed_processes_are_replaced(
+    split: RunningSystem, path: Path, one_process: Graph, external: ExternalNode
+) -> None:
+    external.spin_until(lambda: graph_of(external.node) == one_process)
+    before = endpoints_of_nodes(external)
     for process in ("sensing", "planning"):
         killed = int(local_systems()[f"/pipeline/{process}"])
         os.kill(killed, signal.SIGKILL)
         wait_until(lambda pid=killed: pid not in processes_of(path), "the end")
         wait_until(lambda: is_up(path), "all nodes")
+    graph = RosGraph(external.node)
+    external.spin_until(lambda: [node_names(graph).count(name) for name in NODES] == [1, 1, 1])
+    external.spin_until(lambda: endpoints_of_nodes(external) == before)
+    # DDS lists the killed processes for 20 s.
+    assert len(names_of(external)) > len(set(names_of(external)))
+
+
+def endpoints_of_nodes(external: ExternalNode) -> dict[str, tuple[ObservedEndpoint, ...]]:
+    return {name: ends for name, ends in endpoints(RosGraph(external.node)) if name in NODES}
 
 
 @pytest.mark.soak
