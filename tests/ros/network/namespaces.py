@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -114,6 +115,21 @@ class Quality:
 PERFECT = Quality()
 
 
+def _netem(device: str, quality: Quality) -> tuple[str, ...]:
+    """Return the command that lets the kernel delay and lose what a device sends."""
+    delay, loss = f"{quality.delay_ms:g}ms", f"{quality.loss_percent:g}%"
+    return ("tc", "qdisc", "add", "dev", device, "root", "netem", "delay", delay, "loss", loss)
+
+
+@cache
+def has_netem() -> bool:
+    """Return whether the kernel can delay and lose packets, as those of many computers cannot."""
+    if shutil.which("tc") is None:
+        return False
+    command = ("unshare", "--net", *_netem("lo", Quality(1.0, 1.0)))
+    return subprocess.run(command, check=False, capture_output=True).returncode == 0
+
+
 class Computer(Namespaces):
     """A computer with a host name and an address."""
 
@@ -123,9 +139,12 @@ class Computer(Namespaces):
         self._port = f"port{number}"
         self._bridge = bridge
         self._wire: subprocess.Popen[str] | None = None
-        if quality == PERFECT:
+        if quality == PERFECT or has_netem():
             ends = ("type", "veth", "peer", "name", "eth0", "netns", str(self.pid))
             bridge.set_up("ip", "link", "add", self._port, *ends)
+            if quality != PERFECT:
+                bridge.set_up(*_netem(self._port, quality))
+                self.set_up(*_netem("eth0", quality))
         else:
             self._wire = self._lay_wire(quality)
         bridge.set_up("ip", "link", "set", self._port, "master", "bridge", "up")
@@ -134,7 +153,7 @@ class Computer(Namespaces):
         self.set_up("ip", "route", "add", "224.0.0.0/4", "dev", "eth0")
 
     def _lay_wire(self, quality: Quality) -> subprocess.Popen[str]:
-        """Start a wire in place of a pair of devices."""
+        """Start a wire in place of a pair of devices and netem."""
         ends = (str(self._bridge.pid), self._port, str(self.pid), "eth0")
         numbers = (str(quality.delay_ms), str(quality.loss_percent))
         program = Path(__file__).with_name("wire.py")
