@@ -21,6 +21,17 @@ class Introspection:
     lifecycle_services: bool = True
 
     @property
+    def endpoints(self) -> int:
+        """The number of publishers, and of both ends of services."""
+        numbers = (
+            13 * self.parameters,
+            self.rosout,
+            2 * self.type_description,
+            10 * self.lifecycle_services,
+        )
+        return 1 + sum(numbers)  # transition_event is always there
+
+    @property
     def left_to_manager(self) -> tuple[str, ...]:
         """The services that the manager node provides for the node: "lifecycle", "parameters"."""
         lifecycle = () if self.lifecycle_services else ("lifecycle",)
