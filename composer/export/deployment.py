@@ -24,10 +24,14 @@ from composer.names import join
 STOP_WITHIN_S = 15
 #: ROS reads these; the others of a sourced workspace follow from its setup file.
 VARIABLES = (
+    "FASTDDS_BUILTIN_TRANSPORTS",
     "RMW_IMPLEMENTATION",
     "ROS_AUTOMATIC_DISCOVERY_RANGE",
     "ROS_DISCOVERY_SERVER",
     "ROS_DOMAIN_ID",
+    "ROS_SECURITY_ENABLE",
+    "ROS_SECURITY_ENCLAVE_OVERRIDE",
+    "ROS_SECURITY_STRATEGY",
     "ROS_STATIC_PEERS",
     "ROS_SUPER_CLIENT",
 )

@@ -21,6 +21,12 @@ _HEAD = """\
 #
 #   docker compose up --build       docker compose ps       docker compose logs -f
 """
+_END = """\
+#
+# 'on_failure: shutdown' of the system: let all processes end with the first one that ends.
+#
+#   docker compose up --abort-on-container-exit
+"""
 _HOST = (
     "ROS nodes of one computer exchange messages by shared memory. Containers do as well if they\n"
     "share network and IPC with the computer, and run as the same user as its other nodes."
@@ -37,13 +43,13 @@ def compose_file(
     """Return the compose file of a system.
 
     ``build`` has the keys ``context`` and ``dockerfile``; if it is empty, the image is only used.
+    Docker builds in parallel, and fails if two services build the same image: the first service of
+    each computer does, for all.
     Of ``environment``, the variables that ROS reads become part of the file.
     """
     listed = services(system)
     variables = ros_variables(environment)
     common = {
-        "image": image,
-        **({"build": dict(build)} if build else {}),
         "init": True,
         "#1": _HOST,
         "network_mode": "host",
@@ -55,10 +61,15 @@ def compose_file(
         "stop_grace_period": f"{STOP_WITHIN_S}s",
     }
     found: dict[str, Any] = {}
+    hosts: set[str | None] = set()
     for number, service in enumerate(listed):
         if len(listed) > 1:
             found[f"#{number}"] = service.origin
+        builds = build and service.host not in hosts
+        hosts.add(service.host)
         found[service.label] = {
+            "image": image,
+            **({"build": dict(build)} if builds else {}),
             **common,
             "command": ["compose", *service.command(str(contents.file))],
             **_conditional(system, service, listed),
@@ -69,11 +80,13 @@ def compose_file(
         if not found[service.label]["environment"]:
             del found[service.label]["environment"]
     document = {"name": listed[0].label, "services": found}
-    return _HEAD.format(system=system.name) + yaml_text(_escaped(document))
+    end = _END if len(listed) > 1 and not is_restarted(system) else ""
+    return _HEAD.format(system=system.name) + end + yaml_text(_escaped(document))
 
 
 def _conditional(system: System, service: Service, listed: tuple[Service, ...]) -> dict[str, Any]:
-    others = [item for item in listed if item.host == service.host and item is not service]
+    here = [item for item in listed if item.host == service.host]
+    others = [item for item in here if item is not service]
     found: dict[str, Any] = {}
     servers = {item.label: {"condition": "service_healthy"} for item in others if item.is_server}
     members: list[str] = []
@@ -86,7 +99,8 @@ def _conditional(system: System, service: Service, listed: tuple[Service, ...]) 
     elif members:
         found["depends_on"] = members
     if service.host is not None:
-        found["#3"] = f"On {service.host}: docker compose up {service.label}"
+        labels = " ".join(item.label for item in here)
+        found["#3"] = f"On {service.host}: docker compose up --build {labels}"
         found["profiles"] = [service.host]
     if is_restarted(system) or service.is_server:
         found["restart"] = "unless-stopped"

@@ -59,7 +59,7 @@ def manifests(
             }
             for service in here
         }
-        pod = _pod(containers, is_open=is_open)
+        pod = _pod(containers, ends=not is_restarted(system), is_open=is_open)
         found.append(yaml_text(_workload(system, here[0], pod)))
     return _HEAD.format(system=system.name, image=image) + "---\n".join(found)
 
@@ -99,14 +99,22 @@ def _label_value(name: str) -> str:
     return name[:63].strip("_.-")
 
 
-def _pod(containers: Mapping[Service, dict[str, Any]], *, is_open: bool) -> dict[str, Any]:
-    """Return a pod; ``is_open`` is whether it takes part in the graph of its computer."""
-    servers = [container for service, container in containers.items() if service.is_server]
-    others = [container for service, container in containers.items() if not service.is_server]
-    host = next(iter(containers)).host
+def _pod(
+    containers: Mapping[Service, dict[str, Any]], *, ends: bool, is_open: bool
+) -> dict[str, Any]:
+    """Return a pod; ``is_open`` is whether it takes part in the graph of its computer.
+
+    If the system ``ends``, the pod does so with the coordinating process.
+    """
+    first = next(iter(containers))
+    main = [item for item in containers if not item.is_server]
+    if ends and first.is_coordinator:
+        main = [first]
+    sidecars = [item for item in containers if item not in main] if main else []
+    sidecars.sort(key=lambda item: not item.is_server)
     pod: dict[str, Any] = {}
-    if host is not None:
-        pod["nodeSelector"] = {"kubernetes.io/hostname": host}
+    if first.host is not None:
+        pod["nodeSelector"] = {"kubernetes.io/hostname": first.host}
     if is_open:
         pod |= {
             "#1": _OUTSIDE,
@@ -125,8 +133,12 @@ def _pod(containers: Mapping[Service, dict[str, Any]], *, is_open: bool) -> dict
             "fsGroup": USER_ID,
             "seccompProfile": {"type": "RuntimeDefault"},
         },
-        **({"initContainers": list(map(_as_sidecar, servers))} if servers and others else {}),
-        "containers": others or servers,
+        **(
+            {"initContainers": [_as_sidecar(containers[item]) for item in sidecars]}
+            if sidecars
+            else {}
+        ),
+        "containers": [containers[item] for item in main or containers],
         "volumes": list(_volumes(shares_memory=not is_open)),
     }
     return pod
@@ -135,7 +147,7 @@ def _pod(containers: Mapping[Service, dict[str, Any]], *, is_open: bool) -> dict
 def _as_sidecar(container: dict[str, Any]) -> dict[str, Any]:
     """Return a container that has started before the others start, and runs as long as they do."""
     name = container["name"]
-    comment = "It runs as long as the pod (Kubernetes 1.29), and the others start after it."
+    comment = "It runs as long as others do (Kubernetes 1.29), which start after it."
     return {"name": name, "#0": comment, **container, "restartPolicy": "Always"}
 
 

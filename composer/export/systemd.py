@@ -17,6 +17,14 @@ from composer.model import Host, OnFailure, RestartBudget, System
 
 #: The folders of a sourced workspace.
 _FOLDERS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "ROS_DISTRO")
+#: ROS reads these as well: files of this computer, and what is in one of them.
+_FILES = (
+    "CYCLONEDDS_URI",
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "RMW_FASTRTPS_USE_QOS_FROM_XML",
+    "ROS_SECURITY_KEYSTORE",
+)
 #: The wheels of ROS from PyPI set it when Python starts, and mark that.
 _LIBRARIES, _OF_WHEELS = "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 #: Much longer than the second after which a process reports again that it is alive.
@@ -27,9 +35,7 @@ _SERVICE = """\
 # Written by 'compose export systemd' for the system {system}.
 {origin}[Unit]
 Description={description}
-{order}Wants=network-online.target
-After=network-online.target
-{limit}
+{order}{network}{limit}
 [Service]
 {start}ExecStart={command}
 {place}{environment}{resources}# {compose} ends everything in order.
@@ -40,6 +46,9 @@ TimeoutStopSec={stop_s}
 [Install]
 WantedBy={target}
 """
+
+#: The service manager of a user does not know it.
+_NETWORK = "Wants=network-online.target\nAfter=network-online.target\n"
 
 _START_SYSTEM = f"""\
 # READY=1 follows the bring-up, whose transitions have limits of their own.
@@ -59,9 +68,16 @@ _TARGET = """\
 [Unit]
 Description={description}
 Wants={wants}
-
+{end}
 [Install]
 WantedBy={target}
+"""
+
+
+_END_OF_TARGET = """\
+# 'on_failure: shutdown' of the system: all processes end with the one that coordinates them.
+BindsTo={first}
+After={first}
 """
 
 
@@ -71,12 +87,14 @@ class Installation:
 
     ``python`` is the command that starts compose here. Of ``environment``, the variables that ROS
     reads become part of the units. ``remote`` returns the command that runs a service on
-    another computer, in its workspace: the name of a shell and its arguments.
+    another computer, in its workspace: the name of a shell and its arguments. ``user`` is who runs
+    services here, None for the user of the service manager.
     """
 
     python: Sequence[str]
     environment: Mapping[str, str]
     remote: Callable[[Host, Service], Sequence[str]]
+    user: str | None = None
 
 
 def units(
@@ -101,6 +119,7 @@ def units(
             system=name,
             description=_description(system),
             wants=" ".join(_unit(service) for service in here),
+            end="" if is_restarted(system) else _END_OF_TARGET.format(first=_unit(here[0])),
             target=boot,
         )
     for service in listed:
@@ -116,6 +135,7 @@ def units(
             origin="" if len(listed) == 1 else f"# {service.origin}\n",
             description=_description(system, service),
             order=order,
+            network="" if user else _NETWORK,
             limit="" if service.is_server else _start_limit(system),
             command=" ".join(_quoted(word.replace("$", "$$")) for word in command),
             start=_START_SERVER if service.is_server else _START_SYSTEM,
@@ -131,12 +151,13 @@ def units(
 
 
 def _here(service: Service, path: Path, installation: Installation) -> tuple[Sequence[str], str]:
-    """Return the command of a service, and the lines about its folder and environment."""
+    """Return the command of a service, and the lines about its user, folder and environment."""
     environment = installation.environment
-    variables = {**_workspace(environment), **ros_variables(environment)}
+    variables = {**_set(environment), **ros_variables(environment)}
     folder = f"WorkingDirectory={_escaped(str(path.parent))}\n"
     command = [*installation.python, *service.command(str(path))]
-    return command, folder + _environment(dict(sorted(variables.items())))
+    place = _login(installation.user) + folder
+    return command, place + _environment(dict(sorted(variables.items())))
 
 
 def _there(
@@ -144,8 +165,12 @@ def _there(
 ) -> tuple[Sequence[str], str]:
     """Return the same for another computer, whose shell finds the workspace and Python."""
     shell, *words = installation.remote(host, service)
-    login = "" if user or host.user is None else f"User={_escaped(host.user.value)}\n"
-    return [f"/bin/{shell}", *words], login
+    login = None if user or host.user is None else host.user.value
+    return [f"/bin/{shell}", *words], _login(login)
+
+
+def _login(name: str | None) -> str:
+    return "" if name is None else f"User={_escaped(name)}\n"
 
 
 def _unit(service: Service) -> str:
@@ -182,9 +207,10 @@ def _description(system: System, service: Service | None = None) -> str:
     return _escaped(line.rstrip("\\ "))  # one at the end would continue the line
 
 
-def _workspace(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the folders of the workspace that is sourced now."""
-    found = {name: environment[name] for name in _FOLDERS if environment.get(name)}
+def _set(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the folders of the workspace that is sourced now, and the files that are set."""
+    names = (*_FOLDERS, *_FILES)
+    found = {name: environment[name] for name in names if environment.get(name)}
     if _OF_WHEELS in environment:
         found.pop(_LIBRARIES, None)
     return found

@@ -91,6 +91,8 @@ def test_docker_compose_reads_what_the_system_declares(project: Path) -> None:
     assert robot["command"] == ["compose", "run", "systems/robot.yaml", "--await-processes"]
     assert robot["restart"] == "unless-stopped"
     assert robot["build"] == {"context": "..", "dockerfile": "deploy/Containerfile"}
+    assert [service["image"] for service in services.values()] == ["my-robot:latest"] * 3
+    assert [name for name in services if "build" in services[name]] == ["my-robot"]
     assert robot["environment"] == {"ROS_DOMAIN_ID": "7"}
     assert camera["command"][2:] == ["systems/robot.yaml", "--process", "front_camera"]
     assert camera["cpuset"] == "0,1"
@@ -149,8 +151,13 @@ def test_each_computer_has_a_pod_in_the_network_of_its_computer(project: Path) -
     assert [pod["hostNetwork"] and pod["hostIPC"] for pod in pods] == [True, True]
     assert "nodeSelector" not in pods[0]
     assert pods[1]["nodeSelector"] == {"kubernetes.io/hostname": "jetson"}
-    service = yaml.safe_load(export("docker-compose"))["services"]["my-robot-arm"]
-    assert service["profiles"] == ["jetson"]
+    export("docker-compose", "-o", "deploy")
+    text = (project / "deploy" / "compose.yaml").read_text()
+    services = yaml.safe_load(text)["services"]
+    assert services["my-robot-arm"]["profiles"] == ["jetson"]
+    assert "# On jetson: docker compose up --build my-robot-arm\n" in text
+    # One for each computer, which builds the image there.
+    assert [name for name in services if "build" in services[name]] == ["my-robot", "my-robot-arm"]
 
 
 def test_a_discovery_server_is_ready_before_the_processes_start(project: Path) -> None:
@@ -182,7 +189,14 @@ def test_a_failure_ends_a_system_that_shuts_down_on_failure(project: Path) -> No
     add(project, SHUTDOWN)
     (job,) = kubernetes()
     assert (job["kind"], job["spec"]["backoffLimit"]) == ("Job", 0)
-    services = yaml.safe_load(export("docker-compose"))["services"]
+    pod = job["spec"]["template"]["spec"]
+    # Kubernetes ends the others when this one has ended, and so the job.
+    assert [container["name"] for container in pod["containers"]] == ["my-robot"]
+    others = {item["name"]: item["restartPolicy"] for item in pod["initContainers"]}
+    assert others == {"my-robot-front-camera": "Always", "my-robot-arm": "Always"}
+    text = export("docker-compose")
+    assert "docker compose up --abort-on-container-exit\n" in text
+    services = yaml.safe_load(text)["services"]
     assert {service["restart"] for service in services.values()} == {"no"}
 
 

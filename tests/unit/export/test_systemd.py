@@ -65,6 +65,22 @@ def test_a_unit_has_the_command_and_the_variables_of_ros(tmp_path: Path) -> None
     assert "RestartPreventExitStatus=2 78\n" in text
     assert "WantedBy=multi-user.target" in text
     assert "WantedBy=default.target" in unit(system, {}, user=True)
+    assert "network-online.target" not in unit(system, {}, user=True)
+
+
+def test_a_unit_runs_as_who_exports_it_with_the_files_that_are_set(tmp_path: Path) -> None:
+    environment = {
+        "FASTRTPS_DEFAULT_PROFILES_FILE": "/home/ada/profiles.xml",
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_KEYSTORE": "/home/ada/keystore",
+    }
+    system = system_of(tmp_path)
+    found = units(*system, Installation(PYTHON, environment, remote, "ada"), user=False)
+    (text,) = found.values()
+    assert "\nUser=ada\nWorkingDirectory=" in text
+    assert [line for line in text.splitlines() if line.startswith("Environment=")] == [
+        f"Environment={name}={value}" for name, value in environment.items()
+    ]
 
 
 def test_each_process_has_a_unit_with_its_limits(tmp_path: Path) -> None:
@@ -128,6 +144,12 @@ def test_restarts_follow_the_policy_of_the_system(tmp_path: Path) -> None:
     assert "Restart=no\n" in text
 
 
+def test_a_failure_ends_all_processes_of_a_system_that_shuts_down(tmp_path: Path) -> None:
+    found = _units(tmp_path, f"{PROCESSES}lifecycle: {{on_failure: shutdown}}\n")
+    assert "BindsTo=robot.service\nAfter=robot.service\n" in found[PurePosixPath("robot.target")]
+    assert "BindsTo" not in _units(tmp_path, PROCESSES)[PurePosixPath("robot.target")]
+
+
 def _units(folder: Path, text: str) -> dict[PurePosixPath, str]:
     return units(*system_of(folder, text), Installation(PYTHON, {}, remote), user=False)
 
@@ -144,12 +166,13 @@ def test_several_units_need_a_folder(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
 @pytest.mark.parametrize("user", [False, True])
-def test_systemd_accepts_the_units(user: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("policy", ["restart, restart: {backoff_ms: 250}", "shutdown"])
+def test_systemd_accepts_the_units(policy: str, user: bool, tmp_path: Path) -> None:
     environment = {"ROS_DOMAIN_ID": "7", "PYTHONPATH": "/a b:/c%d"}
     python = (sys.executable, "-P", "-m", "composer")
-    installation = Installation(python, environment, remote)
+    installation = Installation(python, environment, remote, None if user else "daemon")
     text = PROCESSES.replace("jetson: {}", "jetson: {address: 10.0.0.5, workspace: ~/robot}")
-    text += "lifecycle: {on_failure: restart, restart: {backoff_ms: 250}}\n"
+    text += f"lifecycle: {{on_failure: {policy}}}\n"
     text += "discovery: {kind: server, address: [10.0.0.1, 10.0.0.5], start: true}\n"
     system = system_of(tmp_path, text)
     files = []

@@ -124,8 +124,8 @@ def export_systemd(
     """Write the systemd units that run a system.
 
     There is a service for each of its processes, in this Python environment, with the variables of
-    ROS that are set now. A process that fails is started again as the system declares it. The
-    services of several processes belong to a target.
+    ROS that are set now. It runs as you. A process that fails is started again as the system
+    declares it. The services of several processes belong to a target.
     """
     import os
     import sys
@@ -140,7 +140,7 @@ def export_systemd(
     def remote(host: Host, service: Service) -> list[str]:
         return python_words(host, ("-m", "composer", *service.command(file)), os.environ)
 
-    installation = Installation(python, os.environ, remote)
+    installation = Installation(python, os.environ, remote, None if user else _user())
     found = units(declared, path, installation, user=user)
     if len(found) == 1:
         _write(next(iter(found.values())), output, replace=force)
@@ -258,6 +258,18 @@ def export_sros2(
     else:
         files = {f"{path.strip('/')}/permissions.xml": text for path, text in texts.items()}
         _write_all(output, files, replace=force)
+
+
+def _user() -> str | None:
+    """Return the name of this user, or the number if there is no name; None for root."""
+    import os
+    import pwd
+
+    number = os.geteuid()
+    try:
+        return pwd.getpwuid(number).pw_name if number else None
+    except KeyError:
+        return str(number)
 
 
 def _domain_id() -> int:
