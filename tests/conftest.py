@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import pytest
 
@@ -53,11 +53,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.stash[STDERR] = os.dup(2)  # pytest captures it later
     config.add_cleanup(lambda: os.close(config.stash[STDERR]))
-    # Without bytecode files, hundreds of commands would each compile the composer.
-    if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
-        folder = tempfile.TemporaryDirectory(prefix="bytecode-")
-        config.add_cleanup(folder.cleanup)
-        os.environ["PYTHONPYCACHEPREFIX"] = folder.name
+    # Without bytecode files, each worker would compile all tests, and each command the composer.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
+    _begin_elsewhere(config)
     # The logs of runs do not belong into the home folder of who runs the tests.
     logs = tempfile.TemporaryDirectory(prefix="ros-log-", ignore_cleanup_errors=True)
     config.add_cleanup(logs.cleanup)
@@ -68,6 +67,24 @@ def pytest_configure(config: pytest.Config) -> None:
     # check whether programs stop at Ctrl-C.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _begin_elsewhere(config: pytest.Config) -> None:
+    """Let each worker of xdist begin with other tests than the others when it collects all.
+
+    So it finds the bytecode files that they have written, instead of compiling the same tests as
+    they at the same time. ``_mix`` gives the tests the same order in all workers.
+    """
+    worker: dict[str, Any] | None = getattr(config, "workerinput", None)
+    if worker is not None and config.args == config.getini("testpaths"):
+        folders = sorted(
+            str(path)
+            for kind in ("ros", "unit")
+            for path in (TESTS / kind).iterdir()
+            if path.is_dir()
+        )
+        number = int(worker["workerid"].removeprefix("gw"))
+        config.args[:0] = folders[number :: worker["workercount"]]
 
 
 def _may_skip() -> bool:
@@ -101,8 +118,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if not config.getoption("--soak"):
         _deselect(config, items, "soak")
     may_skip = _may_skip()
+    with_ros = {
+        path for path in {item.path for item in items} if path.is_relative_to(TESTS_WITH_ROS)
+    }
     for item in items:
-        if item.path.is_relative_to(TESTS_WITH_ROS):
+        if item.path in with_ros:
             item.add_marker(pytest.mark.ros)
         if may_skip and item.get_closest_marker("ros"):
             item.add_marker(pytest.mark.skip(reason=NO_ROS))
@@ -113,7 +133,7 @@ def _mix(items: list[pytest.Item]) -> None:
 
     With xdist's --no-loadscope-reorder, the workers run both kinds at all times.
     """
-    files = dict.fromkeys(item.path for item in items)
+    files = sorted({item.path for item in items})
     waiting = [path for path in files if any(map(path.is_relative_to, WAITING_FILES))]
     computing = [path for path in files if path not in waiting]
     place = {

@@ -18,7 +18,7 @@ PIP = ("-m", "pip", "--disable-pip-version-check")
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if item.path.is_relative_to(HERE):
+        if item.path.parent == HERE:
             item.add_marker(pytest.mark.slow)
             item.add_marker(pytest.mark.timeout(300))
 
