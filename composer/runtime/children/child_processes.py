@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import selectors
+import signal
 import socket
 import subprocess
 import sys
@@ -30,6 +31,14 @@ _POLL_S = 0.005
 
 class StartFailed(Exception):
     """A program cannot be started; the text is the reason."""
+
+
+def signal_name(number: int) -> str:
+    """Return the name of the signal that ended a process, such as SIGKILL."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 @dataclass(frozen=True, slots=True)

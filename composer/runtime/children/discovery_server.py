@@ -21,7 +21,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from composer.model import Discovery, LogLevel
-from composer.runtime.children.child_processes import Child, ChildProcesses, Command
+from composer.runtime.children.child_processes import (
+    Child,
+    ChildProcesses,
+    Command,
+    signal_name,
+)
 from composer.runtime.children.server_record import ServerRecord
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import PortState, is_own_address, port_state, resolve
@@ -265,7 +270,7 @@ def _how(child: Child) -> str:
     if child.ended.cancelled():
         return ""
     status = child.ended.result()
-    return f" with status {status}" if status >= 0 else f" by signal {-status}"
+    return f" with status {status}" if status >= 0 else f" by {signal_name(-status)}"
 
 
 def _program() -> str:

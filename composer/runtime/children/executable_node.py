@@ -9,7 +9,6 @@ the rest.
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ from typing import Any
 
 from composer.model import Executable, ExecutableKind, LifecycleKind, Node
 from composer.runtime.callbacks.log import severity
-from composer.runtime.children.child_processes import Child, Command, StartFailed
+from composer.runtime.children.child_processes import Child, Command, StartFailed, signal_name
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
 from composer.runtime.children.output import parse_line
 from composer.runtime.children.outside_node import (
@@ -270,11 +269,7 @@ def _ended(child: Child) -> str:
         return "its process has not started"
     if status >= 0:
         return f"its process exited with status {status}"
-    try:
-        name = signal.Signals(-status).name
-    except ValueError:
-        name = f"signal {-status}"
-    return f"its process was ended by {name}"
+    return f"its process was ended by {signal_name(-status)}"
 
 
 def _seconds(executable: Executable) -> str:

@@ -23,7 +23,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import LogLevel, Process
-from composer.runtime.children.child_processes import Child, Command, StartFailed
+from composer.runtime.children.child_processes import Child, Command, StartFailed, signal_name
 from composer.runtime.children.member_context import Member, MemberContext, ProcessUnavailable
 from composer.runtime.children.member_report import (
     MemberReport,
@@ -396,4 +396,4 @@ def _how(child: Child) -> str:
     if not child.ended.done() or child.ended.cancelled():
         return ""
     status = child.ended.result()
-    return f"exited with status {status}" if status >= 0 else f"was ended by signal {-status}"
+    return f"exited with status {status}" if status >= 0 else f"was ended by {signal_name(-status)}"

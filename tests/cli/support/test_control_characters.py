@@ -104,7 +104,9 @@ def test_a_hostile_topic_has_the_usual_lines() -> None:
 
 
 def test_a_hostile_system_has_one_title() -> None:
-    report: Any = SimpleNamespace(activity="up", message=HOSTILE, host=HOSTILE, pid="1", nodes=())
+    report: Any = SimpleNamespace(
+        activity="up", message=HOSTILE, host=HOSTILE, pid="1", nodes=(), processes={}
+    )
     for text in (ps._system(HOSTILE, None), ps._system("/robot", report).partition("\nnode ")[0]):
         assert is_safe(text)
         assert "\n" not in text

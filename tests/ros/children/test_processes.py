@@ -108,7 +108,7 @@ def test_a_killed_process_is_a_failure_of_its_nodes(tmp_path: Path) -> None:
         os.kill(killed, signal.SIGKILL)
         failed = wait_for_restart(system, "/lab/camera")
         # Noticed by the end of the process, not by missing reports.
-        assert failed.reason == "process 'sensing' was ended by signal 9"
+        assert failed.reason == "process 'sensing' was ended by SIGKILL"
         for name in ("/lab/detector", "/lab/arm"):  # paused, and in this order active again
             assert system.states(name)[-2:] == [f"{name} inactive", f"{name} active"]
         assert pid_of(system, "detector") == other

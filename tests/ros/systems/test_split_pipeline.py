@@ -271,6 +271,7 @@ def test_commands_for_the_system_include_all_processes(split: RunningSystem, pat
     assert shows_all_callbacks(repeated_until(shows_all_callbacks, *top))
     for words in (("ps", "--json"), ("ps", "pipeline", "--json")):
         assert lists_all_callbacks(repeated_until(lists_all_callbacks, *words))
+    repeated_until(lambda text: [text.count(f"{name} ") for name in NODES] == [1, 1, 1], "ps")
     check_the_drawn_processes()
     check_the_measured_processes(path)
     as_declared = "pipeline: runs as declared\n"

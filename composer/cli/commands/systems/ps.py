@@ -35,6 +35,7 @@ _Systems: TypeAlias = "Mapping[str, SystemReport | PartialReport | None]"
 _Listed: TypeAlias = "tuple[_Systems, Mapping[str, str | None]]"
 
 _HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "last error")
+_PROCESS = "process"
 
 
 def ps(
@@ -51,8 +52,9 @@ def ps(
     """List running systems and their nodes.
 
     For each node, the list has the state and its duration, the number of restarts and errors, the
-    message rates over the last second, and the last error. Lifecycle nodes that do not belong to a
-    system are listed with their states. If a system is of another version of ros2-composer, only
+    message rates over the last second, and the last error. Nodes of other processes of a system are
+    listed there, with the process. Lifecycle nodes that do not belong to a system are listed with
+    their states. If a system is of another version of ros2-composer, only
     the states of its nodes are listed. With --json, the output includes callback timings, which
     'compose top' shows as a table.
 
@@ -124,7 +126,11 @@ def _report(report: SystemReport | PartialReport) -> dict[str, Any]:
 
 
 def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
-    parts = [_system(name, report) for name, report in systems.items()]
+    from composer.remote.systems.system_reports import SystemReport
+
+    known = [report for report in systems.values() if isinstance(report, SystemReport)]
+    processes = {name for report in known for name in report.processes.values()}
+    parts = [_system(name, report, is_listed=name in processes) for name, report in systems.items()]
     if others:
         rows = [(node, state or "(no response)") for node, state in others.items()]
         title = "other lifecycle nodes" if parts else "lifecycle nodes"
@@ -132,7 +138,10 @@ def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
     return "\n\n".join(parts) or "no system is running"
 
 
-def _system(name: str, report: SystemReport | PartialReport | None) -> str:
+def _system(
+    name: str, report: SystemReport | PartialReport | None, *, is_listed: bool = False
+) -> str:
+    """Return the part of a system; ``is_listed`` is whether another one has its nodes."""
     from composer.remote.systems.system_reports import PartialReport
 
     if report is None:
@@ -141,8 +150,13 @@ def _system(name: str, report: SystemReport | PartialReport | None) -> str:
     if isinstance(report, PartialReport):
         title = lines([f"{name}: of another version of ros2-composer, only states known ({where})"])
         return f"{title}\n{columns([_HEAD[:2], *report.states.items()])}"
-    rows = [_HEAD, *(_row(node) for node in report.nodes)]
     title = lines([f"{name}: {report.activity}, {report.message} ({where})"])
+    if is_listed:
+        return title
+    rows = [_HEAD, *(_row(node) for node in report.nodes)]
+    if report.processes:
+        names = (_PROCESS, *(node.process for node in report.nodes))
+        rows = [(row[0], name, *row[1:]) for row, name in zip(rows, names, strict=True)]
     return f"{title}\n{columns(rows)}"
 
 
