@@ -8,7 +8,7 @@ queries, and a single participant would keep every command from working.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Set
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
@@ -106,17 +106,19 @@ class RosGraph:
         return frozenset(map(participant, publishers)) & frozenset(map(participant, subscriptions))
 
     def are_nodes_known(self) -> bool:
-        """Say whether each participant has announced its nodes, which it does last."""
+        """Say whether each participant has announced its nodes, which it does last.
+
+        One that was killed before never does.
+        """
         node = self._node
         known = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
-        publishers = [
-            endpoint
-            for topic, _ in self.topics()
-            for endpoint in node.get_publishers_info_by_topic(topic)
-        ]
-        named = [endpoint for endpoint in publishers if endpoint.node_name != UNKNOWN_NODE]
-        announced = {participant(endpoint) for endpoint in named}
-        return len(named) == len(publishers) and announced.issuperset(map(participant, known))
+        named, nameless = set[bytes](), set[bytes]()
+        for topic, _ in self.topics():
+            for endpoint in node.get_publishers_info_by_topic(topic):
+                found = nameless if endpoint.node_name == UNKNOWN_NODE else named
+                found.add(participant(endpoint))
+        nameless |= set(map(participant, known)) - named
+        return not nameless or nameless <= self._ended(nameless)
 
     def nodes(self) -> list[NodeName]:
         """Return all nodes; a name that two nodes share is listed twice.
@@ -138,7 +140,12 @@ class RosGraph:
     def _replaced(self, found: list[NodeName]) -> frozenset[bytes]:
         if len(found) == len(set(found)):
             return frozenset()
-        return ended_participants(self.participants(), self._node.context.get_domain_id())
+        return self._ended()
+
+    def _ended(self, others: Set[bytes] = frozenset()) -> frozenset[bytes]:
+        """Return which participants have ended; ``others`` have announced only a part."""
+        known = self.participants() | others
+        return ended_participants(known, self._node.context.get_domain_id())
 
     def _all_nodes(self) -> list[NodeName]:
         try:

@@ -9,12 +9,16 @@ import time
 from pathlib import Path
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Empty
 
 from composer.runtime.process.dds_participants import count_participants
 from composer.runtime.ros.ended_participants import ended_participants
-from composer.runtime.ros.graph import RosGraph
-from tests.ros.support.commands import PYTHON
+from composer.runtime.ros.endpoints import UNKNOWN_NODE
+from composer.runtime.ros.graph import RosGraph, participant
+from tests.ros.support.commands import PYTHON, hand_written
 from tests.ros.support.in_process import Peer, wait_until
 
 #: A participant that is not discovered at once is discovered 1 to 3 s later; without the profile,
@@ -115,6 +119,36 @@ def test_participants_of_ended_processes_are_recognized(peer: Peer) -> None:
         assert ended_participants(known | {ended}, domain_id) == frozenset()
     finally:
         another.close()
+
+
+class Observer(Node):
+    """Has not received the names of the nodes of one process."""
+
+    missed = -1
+
+    def get_publishers_info_by_topic(
+        self, topic_name: str, no_mangle: bool = False
+    ) -> list[TopicEndpointInfo]:
+        found = super().get_publishers_info_by_topic(topic_name, no_mangle)
+        for endpoint in found:
+            if participant(endpoint)[4:6] == number(self.missed):
+                endpoint.node_name = UNKNOWN_NODE
+        return found
+
+
+def test_the_nodes_of_a_killed_process_are_not_waited_for(ros_domain_id: int) -> None:
+    """It will never announce their names."""
+    with Context() as context, hand_written("hand_written_talker.py") as talker:
+        observer = Observer("observer", context=context)
+        graph = RosGraph(observer)
+        wait_until(lambda: ("talker", "/lab") in graph.nodes() and graph.are_nodes_known())
+        observer.missed = talker.pid
+        assert not graph.are_nodes_known()
+        talker.kill()
+        talker.wait()
+        wait_until(graph.are_nodes_known)
+        assert ("talker", "/lab") in graph.nodes()
+        observer.destroy_node()
 
 
 def number(process: int) -> bytes:
