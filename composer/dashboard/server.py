@@ -11,12 +11,14 @@ import errno
 import signal
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import InvalidState
 
 from composer.dashboard.access import Refusal
 from composer.dashboard.app import AccessCheck, refusal_page, security_headers
@@ -124,6 +126,11 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.close_timeout = _CLOSED_WITHIN_S
+
+    def shutdown(self) -> None:
+        """End the connection; one that the other side has just ended takes no message any more."""
+        with suppress(InvalidState):
+            super().shutdown()
 
 
 class _GuardedProtocol(H11Protocol):

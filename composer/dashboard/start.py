@@ -21,7 +21,8 @@ from composer.project import Project
 from composer.report.tool import tool_version
 
 PROTOCOL_VERSION = 1
-_LEAVES_WITHIN_S = 1.0
+#: On a busy computer. A participant that does not leave stays in the graph of others for 20 s.
+_LEAVES_WITHIN_S = 5.0
 
 
 class NotPrivateError(Exception):

@@ -70,6 +70,8 @@ def dashboard(*arguments: str, cwd: Path | None = None) -> Iterator[Dashboard]:
         yield running
         assert running.process.poll() is None, "the dashboard has ended by itself"
         assert "Traceback" not in running.errors(), running.errors()
+        running.process.terminate()
+        assert running.process.wait(timeout=PATIENCE_S) == 0, running.errors()
     except BaseException as error:
         error.add_note(f"the dashboard printed:\n{running.errors()}")
         raise
