@@ -58,9 +58,11 @@ class Obstacles:
         return all(self._passes(begin, end, station.rank) for station in stations[first + 1 : last])
 
     def _passes(self, begin: Station, end: Station, rank: int) -> bool:
+        solid = self._solid[rank]
+        if not solid:
+            return True
         extent = self._ranks[rank]
         at = sorted(_across(begin, end, along) for along in (extent.begin, extent.end))
-        solid = self._solid[rank]
         # The solid parts of a rank hardly overlap: checking the neighbors is enough.
         place = bisect_left(solid, (at[1], at[1]))
         return all(high <= at[0] or low >= at[1] for low, high in solid[max(place - 2, 0) : place])
@@ -72,7 +74,7 @@ def _across(begin: Station, end: Station, along: float) -> float:
     The curve is the cubic of ``routing``, with control points halfway along.
     """
     span = end.begin - begin.end
-    if span <= 0.0:
+    if span <= 0.0 or begin.across == end.across:
         return end.across
     target = min(max((along - begin.end) / span, 0.0), 1.0)
     low, high = 0.0, 1.0

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import field
 from itertools import groupby
+from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
 from composer.graph.layout.boxes import Box, Group, Item, space_between
@@ -22,24 +23,19 @@ _STILL = 0.5
 _BEND_WEIGHT = 4.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Pull:
-    """A box of an item, and the neighbor to align it with."""
-
-    box: Box
-    other: Box
-    offset: float  # of the box from the neighbor for a straight edge
-    weight: float
+#: A box of an item, the neighbor to align it with, the offset of the box from the neighbor for a
+#: straight edge, and the weight.
+_Pull: TypeAlias = tuple[Box, Box, float, float]
 
 
 @dataclass(slots=True)
 class _Room:
-    """A child of a group, and the limits of its movement."""
+    """A child of a group, and the limits of its movement: its neighbors, with the space between."""
 
     item: Item
     group: Group
-    above: list[Item]
-    below: list[Item]
+    above: list[tuple[Item, float]]
+    below: list[tuple[Item, float]]
     before: list[_Pull]
     after: list[_Pull]
     both: list[_Pull] = field(default_factory=list)
@@ -56,9 +52,10 @@ def assign_coordinates(root: Group) -> None:
             _sweep(by_rank, root, lambda room: room.before)
     for room in rooms:
         room.both = room.before + room.after
+    pulled = [room for room in rooms if room.both]
     for number in range(_ROUNDS):
-        in_turn = rooms if number % 2 else rooms[::-1]
-        if max(_move(room, root, room.both) for room in in_turn) < _STILL:
+        in_turn = pulled if number % 2 else pulled[::-1]
+        if max((_move(room, root, room.both) for room in in_turn), default=0.0) < _STILL:
             break
     root.fit()
 
@@ -74,12 +71,15 @@ def _sweep(rooms: list[_Room], root: Group, pulls: Callable[[_Room], list[_Pull]
 def _rooms(group: Group, root: Group) -> list[_Room]:
     found = {id(child): _Room(child, group, [], [], *_pulls(child)) for child in group.children}
     last: dict[int, Item] = {}
+    neighbors: set[tuple[int, int]] = set()
     for child in group.children:
         for rank in range(child.first_rank, child.last_rank + 1):
             above = last.get(rank)
-            if above is not None and above not in found[id(child)].above:
-                found[id(child)].above.append(above)
-                found[id(above)].below.append(child)
+            if above is not None and (id(above), id(child)) not in neighbors:
+                neighbors.add((id(above), id(child)))
+                space = space_between(above, child)
+                found[id(child)].above.append((above, space))
+                found[id(above)].below.append((child, space))
             last[rank] = child
     rooms = []
     for room in found.values():
@@ -90,16 +90,17 @@ def _rooms(group: Group, root: Group) -> list[_Room]:
 
 
 def _pulls(item: Item) -> tuple[list[_Pull], list[_Pull]]:
-    own = set(map(id, item.boxes()))
+    boxes = list(item.boxes())
+    own = set(map(id, boxes))
     before = [
-        _Pull(box, piece.low, piece.low_offset - piece.high_offset, _weight(box, piece.low))
-        for box in item.boxes()
+        (box, piece.low, piece.low_offset - piece.high_offset, _weight(box, piece.low))
+        for box in boxes
         for piece in box.before
         if id(piece.low) not in own
     ]
     after = [
-        _Pull(box, piece.high, piece.high_offset - piece.low_offset, _weight(box, piece.high))
-        for box in item.boxes()
+        (box, piece.high, piece.high_offset - piece.low_offset, _weight(box, piece.high))
+        for box in boxes
         for piece in box.after
         if id(piece.high) not in own
     ]
@@ -113,14 +114,14 @@ def _weight(box: Box, other: Box) -> float:
 
 def _move(room: _Room, root: Group, pulls: list[_Pull]) -> float:
     """Move an item towards its pull within its limits; return the distance."""
-    weight = target = 0.0
-    for pull in pulls:
-        weight += pull.weight
-        target += (pull.other.position + pull.offset - pull.box.position) * pull.weight
-    if weight == 0.0:
+    if not pulls:
         return 0.0
+    sum_of_weights = target = 0.0
+    for box, other, offset, weight in pulls:
+        sum_of_weights += weight
+        target += (other.position + offset - box.position) * weight
     item = room.item
-    distance = target / weight
+    distance = target / sum_of_weights
     if distance < 0.0:
         distance = -min(-distance, max(_room_above(room, root), 0.0))
     else:
@@ -132,20 +133,20 @@ def _move(room: _Room, root: Group, pulls: list[_Pull]) -> float:
 def _room_above(room: _Room, root: Group) -> float:
     item, group = room.item, room.group
     found = math.inf
-    if group is not root:
-        found = item.low - group.low - group.padding - group.label
     low = item.low
-    for other in room.above:
-        found = min(found, low - other.high - space_between(item, other))
+    if group is not root:
+        found = low - group.low - group.padding - group.label
+    for other, space in room.above:
+        found = min(found, low - other.high - space)
     return found
 
 
 def _room_below(room: _Room, root: Group) -> float:
     item, group = room.item, room.group
     found = math.inf
-    if group is not root:
-        found = group.high - group.padding - item.high
     high = item.high
-    for other in room.below:
-        found = min(found, other.low - high - space_between(item, other))
+    if group is not root:
+        found = group.high - group.padding - high
+    for other, space in room.below:
+        found = min(found, other.low - high - space)
     return found

@@ -129,13 +129,15 @@ def _behind(pieces: list[Link]) -> list[float]:
 
 def _push_apart(rank: list[Box]) -> None:
     """Remove overlaps on a rank, keeping its order and its middle."""
-    middle = sum(box.position for box in rank) / len(rank) if rank else 0.0
+    if len(rank) < 2:
+        return
+    middle = sum(box.position for box in rank) / len(rank)
     end = None
     for box in rank:
         least = box.position if end is None else end + box.gap + box.across / 2
         box.position = max(box.position, least)
         end = box.high
-    drift = sum(box.position for box in rank) / len(rank) - middle if rank else 0.0
+    drift = sum(box.position for box in rank) / len(rank) - middle
     for box in rank:
         box.position -= drift
 

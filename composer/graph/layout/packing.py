@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_right, insort
-from collections.abc import Iterable
+from collections.abc import Sequence
 
-from composer.graph.layout.boxes import Group, Item, space_between
+from composer.graph.layout.boxes import Box, Group, Item, space_between
 
 #: The cost of an order: crossings, then the total length of edges across in pixels.
 Cost = tuple[int, float]
@@ -17,13 +17,16 @@ def pack(group: Group, start: float = 0.0) -> None:
     inside = start + group.padding + group.label
     last: dict[int, Item] = {}
     for child in group.children:
+        if isinstance(child, Box):  # as below, for the most frequent case
+            nearest = last.get(child.rank)
+            low = inside if nearest is None else nearest.high + space_between(nearest, child)
+            child.position = low + child.across / 2
+            last[child.rank] = child
+            continue
         covered = range(child.first_rank, child.last_rank + 1)
         above = [last[rank] for rank in covered if rank in last]
         low = max((item.high + space_between(item, child) for item in above), default=inside)
-        if isinstance(child, Group):
-            pack(child, low)
-        else:
-            child.position = low + child.across / 2
+        pack(child, low)
         last.update(dict.fromkeys(covered, child))
     high = max(child.high for child in group.children) + group.padding
     group.high = max(high, group.low + group.least)
@@ -40,7 +43,9 @@ def cost(root: Group) -> Cost:
     return sum(map(_inversions, by_rank.values())), round(length, 3)
 
 
-def _inversions(lines: Iterable[tuple[float, float]]) -> int:
+def _inversions(lines: Sequence[tuple[float, float]]) -> int:
+    if len(lines) == 1:
+        return 0
     count = 0
     seen: list[float] = []
     for _, end in sorted(lines):
