@@ -22,7 +22,7 @@ from composer.dashboard.connection import Connection
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
-from composer.dashboard.page_modules import file_of_page, index_of
+from composer.dashboard.page_modules import file_of_page, index_of, style_sheet
 
 Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -88,7 +88,7 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
         *(Route(f"/{view}", index) for view in _VIEWS),
         *(Route(f"/{view}/{{rest:path}}", index) for view in _VIEWS),
         Route("/page/{path:path}", _file),
-        Route("/theme.css", _theme),
+        Route("/style.css", _style),
         WebSocketRoute("/ws", page),
         WebSocketRoute("/foxglove", foxglove),
     ]
@@ -158,10 +158,8 @@ async def _file(request: HttpRequest) -> Response:
     return _content(request.path_params["path"])
 
 
-async def _theme(_: HttpRequest) -> Response:
-    from composer.graph.formats.theme import page_style
-
-    return _of_page(page_style().encode(), "text/css")
+async def _style(_: HttpRequest) -> Response:
+    return _of_page(style_sheet(), "text/css")
 
 
 def _content(path: str) -> Response:

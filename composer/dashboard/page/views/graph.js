@@ -100,13 +100,17 @@ export function createView(app) {
       return;
     }
     const world = s("g", { class: "world" });
-    world.append(...[...parsed.documentElement.childNodes].map((node) => document.importNode(node, true)));
-    const svg = s("svg", { class: "picture", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
+    world.append(...parsed.documentElement.childNodes);
+    // Far until it is known: what is left out then takes no time.
+    const svg = s("svg", { class: "picture far", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
     canvas.replaceChildren(svg);
     picture = readPicture(canvas);
-    overlay = createOverlay(picture, things, data.executors);
-    viewport = createViewport(picture, createZoomLevels(picture));
-    viewport.fit();
+    // Measured before anything changes: each change makes the next measurement take a layout.
+    const boxes = boxesOf(picture);
+    viewport = createViewport(picture, createZoomLevels(picture, boxes));
+    const pixels = viewport.pixelsPerUnit();
+    overlay = createOverlay(picture, things, data.executors, boxes);
+    viewport.fit(pixels);
     listenToItems(picture, selection, viewport);
     overlay.show(live);
     filter.update(picture);
@@ -225,4 +229,10 @@ export function createView(app) {
   }
 
   return { element, show, hide };
+}
+
+/** Return the boxes of items and frames in SVG units, by their elements. */
+function boxesOf({ items, frames }) {
+  const measured = [...[...items.values()].map(({ element }) => [element, ".shape"]), ...frames.map(({ element }) => [element, ".frame"])];
+  return new Map(measured.map(([element, shape]) => [element, element.querySelector(shape).getBBox()]));
 }

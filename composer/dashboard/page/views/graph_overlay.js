@@ -5,7 +5,6 @@
  */
 import { s, setText } from "../dom.js";
 import { hertz } from "../format.js";
-import { boxOf } from "../graph/picture.js";
 import { kindOfState, labelOfState, stateShape } from "../icons.js";
 
 /** Stand where a state and a rate are to be written: see pictures.py. */
@@ -15,8 +14,11 @@ const PROCESS_PLACEHOLDER = / · pid 4194304 .*$/;
 const SHAPE_SIZE = 12;
 const INSET = 5;
 
-/** `executors` are the full names of the nodes in each frame of the deployment, by its key. */
-export function createOverlay(picture, things, executors) {
+/**
+ * `executors` are the full names of the nodes in each frame of the deployment, by its key; `boxes` those
+ * of all items, by their elements.
+ */
+export function createOverlay(picture, things, executors, boxes) {
   const nodes = new Map();
   const rates = new Map();
   const drops = new Map();
@@ -47,7 +49,7 @@ export function createOverlay(picture, things, executors) {
   }
 
   function nodeOf(item, texts) {
-    const box = boxOf(item);
+    const box = boxes.get(item.element);
     const at = `translate(${box.x + INSET} ${box.y + INSET}) scale(.75)`;
     const mark = s("g", { class: "mark", transform: at });
     item.element.append(mark);

@@ -31,12 +31,16 @@ const DRAWN_HEAD = 8;
 
 const measuring = document.createElement("canvas").getContext("2d");
 
-/** Return a function that shows the picture for a number of pixels per unit. */
-export function createZoomLevels(picture) {
+/**
+ * Return a function that shows the picture for a number of pixels per unit.
+ *
+ * `boxes` are those of items and frames in SVG units, by their elements.
+ */
+export function createZoomLevels(picture, boxes) {
   const { svg, world } = picture;
   const font = getComputedStyle(svg.querySelector("text") ?? svg).fontFamily;
-  const frames = framesOf(picture);
-  const items = [...picture.items.values()].filter((item) => item.kind !== "port").map(itemOf);
+  const frames = framesOf(picture, boxes);
+  const items = [...picture.items.values()].filter((item) => item.kind !== "port").map((item) => itemOf(item, boxes.get(item.element)));
   const named = [
     ...frames.filter((frame) => frame.isOuter),
     ...items.filter(({ item }) => isNode(item)),
@@ -46,7 +50,7 @@ export function createZoomLevels(picture) {
   const heads = [...svg.querySelectorAll("marker")];
   for (const entry of named) {
     measuring.font = `${entry.style.font}px ${font}`;
-    entry.width = measuring.measureText(entry.text.textContent).width + 2 * entry.style.padding + (entry.mark ? MARK + 2 : 0);
+    entry.width = measuring.measureText(entry.text.textContent).width + 2 * entry.style.padding + (entry.hasMark ? MARK + 2 : 0);
   }
   let shown = null;
 
@@ -70,20 +74,24 @@ export function createZoomLevels(picture) {
   };
 }
 
-function itemOf(item) {
+function itemOf(item, box) {
   const shapes = [...item.element.querySelectorAll(".shape")];
   const [text, state] = item.element.querySelectorAll("text");
-  const box = shapes[0].getBBox();
   const center = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
-  const mark = state ? item.element.querySelector(".mark") : null;
-  return { item, shapes, text, box, center, style: isNode(item) ? NODE : CHANNEL, mark };
+  const hasMark = item.kind === "node" && Boolean(state);
+  return { item, shapes, text, box, center, style: isNode(item) ? NODE : CHANNEL, hasMark };
 }
 
-function framesOf(picture) {
+/** Return the mark of a state, which graph_overlay.js draws. */
+function markOf({ item, hasMark }) {
+  return hasMark ? item.element.querySelector(".mark") : null;
+}
+
+function framesOf(picture, boxes) {
   const found = picture.frames.map(({ element }) => ({
     text: element.querySelector("text"),
     element,
-    box: element.querySelector("rect").getBBox(),
+    box: boxes.get(element),
   }));
   for (const frame of found) {
     frame.isOuter = !found.some((other) => other !== frame && contains(other.box, frame.box));
@@ -122,13 +130,15 @@ function placeOf({ item, box, center, style, width, isOuter }, unit, right) {
   return { x: box.x + (isOuter ? 0 : 3 * unit), y: isOuter ? box.y - size.height : box.y + unit, ...size };
 }
 
-function drawItem({ item, shapes, text, box, center, style, mark }, place, unit) {
+function drawItem(entry, place, unit) {
+  const { item, shapes, text, box, center, style } = entry;
   item.element.classList.toggle("nameless", !place);
   const width = place ? Math.max(place.width / box.width, 1) : 1;
   const height = place ? Math.max(place.height / box.height, 1) : 1;
   const shift = place ? place.x + place.width / 2 - center.x : 0;
   for (const shape of shapes) shape.style.transform = `translate(${shift}px) scale(${width}, ${height})`;
   if (!place) return;
+  const mark = markOf(entry);
   const left = mark ? (MARK + 2) * unit : 0;
   text.style.fontSize = `${style.font * unit}px`;
   text.style.transform = `translate(${shift + left / 2}px, ${center.y - Number(text.getAttribute("y"))}px)`;
@@ -145,9 +155,10 @@ function drawTitle({ element, text, style }, place, unit) {
 }
 
 function showNear(named) {
-  for (const { item, element, shapes = [], text, mark } of named) {
+  for (const entry of named) {
+    const { item, element, shapes = [], text } = entry;
     (element ?? item.element).classList.remove("nameless", "covered");
-    for (const part of [...shapes, text, mark]) {
+    for (const part of [...shapes, text, markOf(entry)]) {
       part?.style.removeProperty("transform");
       part?.style.removeProperty("font-size");
     }

@@ -81,6 +81,7 @@ export function dropNote() {
     element: note,
     show(dropped, why = "this page or the network was too slow") {
       note.hidden = !dropped;
+      if (!dropped) return;
       note.textContent = `${dropped.toLocaleString("en-US")} not shown`;
       note.title = `${dropped} messages were not sent: ${why}`;
     },

@@ -27,22 +27,23 @@ export function createViewport(picture, onscale = () => {}) {
     return Math.min(width / size.width, height / size.height) || 1;
   }
 
-  function show() {
+  /** `pixels` are those per unit, which take time to measure after a change. */
+  function show(pixels) {
     world.style.transform = `translate(${shift.x}px, ${shift.y}px) scale(${scale})`;
     svg.dataset.scale = scale.toFixed(3);
-    if (scale !== shownScale) rescale();
+    if (scale !== shownScale) rescale(pixels);
   }
 
-  function rescale() {
+  function rescale(pixels = pixelsPerUnit()) {
     shownScale = scale;
-    onscale(pixelsPerUnit() * scale);
+    onscale(pixels * scale);
   }
 
   /** Show the whole picture. */
-  function fit() {
-    scale = Math.min(1, MAX_FIT_PIXELS_PER_UNIT / pixelsPerUnit());
+  function fit(pixels = pixelsPerUnit()) {
+    scale = Math.min(1, MAX_FIT_PIXELS_PER_UNIT / pixels);
     shift = { x: (size.width * (1 - scale)) / 2, y: (size.height * (1 - scale)) / 2 };
-    show();
+    show(pixels);
   }
 
   /** Return a point of the screen in SVG units. */
@@ -113,7 +114,7 @@ export function createViewport(picture, onscale = () => {}) {
 
   listenToWheel(svg, zoomAt, pointAt);
   listenToPointers(svg, { zoomAt, drag, drop, pointAt });
-  return { fit, zoom, center, reveal, uncover, rescale };
+  return { fit, zoom, center, reveal, uncover, rescale, pixelsPerUnit };
 }
 
 function listenToWheel(svg, zoomAt, pointAt) {
