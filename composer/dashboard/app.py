@@ -23,6 +23,7 @@ from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
 from composer.dashboard.page_modules import file_of_page, index_of, style_sheet
+from composer.dashboard.preparation import prepare
 
 Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -49,11 +50,9 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
     foxglove_server = FoxgloveServer.of(dashboard)
 
     async def index(request: HttpRequest) -> Response:
-        # A connection follows: join the ROS graph while the page is being loaded.
-        dashboard.ros.enter()
-        dashboard.ros.leave()
-        view = request.url.path.split("/")[1]
-        return _of_page(index_of(view), "text/html")
+        path = request.url.path
+        prepare(dashboard, path, request.query_params.get("view", "nodes"))
+        return _of_page(index_of(path.split("/")[1]), "text/html")
 
     async def page(socket: WebSocket) -> None:
         await socket.accept()

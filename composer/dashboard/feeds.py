@@ -8,6 +8,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.dashboard.errors import RequestError, from_ros
@@ -44,6 +45,8 @@ class Feed(ABC):
     period_s = 1.0
     #: Whether to poll whenever a system has reported, instead of after each period.
     follows_reports = False
+    #: Polls this feed at once, on any thread; set before :meth:`start`.
+    poll_soon: Callable[[], None]
 
     def start(self, ros: RosGraphSide) -> None:  # noqa: B027 - optional
         """Begin to observe; called once before the first poll. Raises RequestError."""
@@ -97,6 +100,7 @@ class Feeds:
             running = self._running.get(key)
             if running is None:
                 running = self._running[key] = RunningFeed(feed, key)
+                feed.poll_soon = partial(self.poll_soon, key)
             running.receivers[receiver] = None
             last = running.last
             if last is not None:

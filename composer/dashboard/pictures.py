@@ -13,7 +13,7 @@ from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
 from composer.graph.formats.svg import contents
 from composer.graph.formats.svg_elements import markers
-from composer.graph.layout import Size, fit
+from composer.graph.layout import Size, arrange_for_pages
 from composer.graph.measure import sizes
 from composer.graph.scenes.scene import Scene
 from composer.model import PortKind
@@ -53,27 +53,34 @@ def declared_scene(declared: Declared) -> Scene:
     return scene_of([declared.system], declared.diagnostics)
 
 
-def picture(scene: Scene, view: View, page: Size) -> dict[str, Any]:
-    """Return a diagram as an SVG fragment, and what is known about everything in it, by key.
+class Diagram:
+    """A diagram that is laid out, and what is known about everything in it, by key."""
 
-    ``page`` is the size of its place in pixels. All texts in the fragment are escaped.
-    """
-    graph = build_graph(_without_qos(scene) if view is View.NODES else scene, view)
-    if view is View.DEPLOYMENT:
-        graph = replace(graph, clusters=tuple(map(_with_place_for_process, graph.clusters)))
-    directions = [graph.direction]
-    if view in _TURNED:
-        directions = [Direction.RIGHT, Direction.DOWN][:: 1 if page.width >= page.height else -1]
-    layout = fit(graph, sizes(graph), page, directions)
-    return {
-        "title": graph.title,
-        "view": graph.view,
-        "width": layout.size.width,
-        "height": layout.size.height,
-        "svg": "\n".join((markers(), *contents(graph, layout))),
-        "things": {thing.key: _facts(thing) for thing in _things(graph)},
-        "executors": _nodes_by_executor(graph) if view is View.DEPLOYMENT else {},
-    }
+    def __init__(self, scene: Scene, view: View) -> None:
+        graph = build_graph(_without_qos(scene) if view is View.NODES else scene, view)
+        if view is View.DEPLOYMENT:
+            graph = replace(graph, clusters=tuple(map(_with_place_for_process, graph.clusters)))
+        directions = tuple(Direction) if view in _TURNED else (graph.direction,)
+        self._graph = graph
+        self._arrangement = arrange_for_pages(graph, sizes(graph), directions)
+        self._facts = {thing.key: _facts(thing) for thing in _things(graph)}
+        self._executors = _nodes_by_executor(graph) if view is View.DEPLOYMENT else {}
+
+    def on(self, page: Size) -> dict[str, Any]:
+        """Return an SVG fragment and the facts; ``page`` is the size of its place in pixels.
+
+        All texts in the fragment are escaped.
+        """
+        graph, layout = self._graph, self._arrangement.on(page)
+        return {
+            "title": graph.title,
+            "view": graph.view,
+            "width": layout.size.width,
+            "height": layout.size.height,
+            "svg": "\n".join((markers(), *contents(graph, layout))),
+            "things": self._facts,
+            "executors": self._executors,
+        }
 
 
 def _without_qos(scene: Scene) -> Scene:

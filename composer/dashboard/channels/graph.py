@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared, required
@@ -13,6 +13,7 @@ from composer.dashboard.outbox import Update
 
 if TYPE_CHECKING:
     from composer.dashboard.observing.topology import Topology
+    from composer.dashboard.pictures import Diagram
     from composer.dashboard.ros_side import RosGraphSide
     from composer.drift import ObservedEndpoint
     from composer.remote.systems.system_reports import NodeReport
@@ -25,13 +26,15 @@ _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
 _MANAGER = "manager"
-#: While the graph changes, and until a picture is ready.
+#: While the graph changes.
 _SOON_S = 0.1
-_MAX_PICTURES = 4
 
 
-class PictureFeed(Feed):
-    """The diagram, again whenever the graph has changed. The layout runs on a worker thread."""
+class DiagramFeed(Feed):
+    """Lays out the diagram whenever the graph has changed, on a worker thread.
+
+    By itself it sends nothing: it prepares the diagram for a page that is being loaded.
+    """
 
     follows_reports = True  # to wake up together with the other feeds
 
@@ -41,10 +44,6 @@ class PictureFeed(Feed):
         source = "declared" if self._view in _DECLARED_ONLY else "live"
         self._is_live = values.choice("source", ("live", "declared"), source) == "live"
         self._is_live = self._is_live and self._view not in _DECLARED_ONLY
-        width = values.number("width", _WIDTH, _MIN_SIDE, _MAX_SIDE)
-        height = values.number("height", _HEIGHT, _MIN_SIDE, _MAX_SIDE)
-        self._page = (width, height)
-        values.end()
         self._declared = None if self._is_live else required(declared, f"the view {self._view}")
         self._ros: RosGraphSide
         self._drawn: tuple[int, frozenset[str]] | None = None
@@ -62,14 +61,14 @@ class PictureFeed(Feed):
         self._ros.observed.reports.release()
 
     def poll(self) -> Iterator[Update]:
-        """Yield the diagram if it is new."""
+        """Yield what is drawn."""
         finished, self._finished = self._finished, []
         for item in finished:
             if isinstance(item, Exception):
                 raise item
             yield item
         observed = self._ros.observed
-        self.period_s = _SOON_S if self._is_drawing or observed.is_new else 1.0
+        self.period_s = _SOON_S if observed.is_new else 1.0
         if self._is_drawing or (self._is_live and observed.waits_for_reports):
             return
         topology = observed.topology()
@@ -79,39 +78,49 @@ class PictureFeed(Feed):
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        known = observed.pictures.get((wanted, self._view, self._page, self._is_live))
-        if known is not None:
-            yield Update(known)
-            return
         self._is_drawing = True
-        self.period_s = _SOON_S
         self._ros.work(lambda: self._draw(topology, states))
 
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
-        from composer.dashboard.pictures import declared_scene, live_scene, picture
-        from composer.graph import View
-        from composer.graph.layout import Size
-
+        key = (self._drawn, self._view, self._is_live)
         try:
-            if self._declared is not None:
-                scene = declared_scene(self._declared)
-            else:
-                scene = live_scene(topology.snapshot(states))
-            data = picture(scene, View(self._view), Size(*self._page))
-            text = to_json({"revision": topology.revision, **data})
-            self._keep((self._drawn, self._view, self._page, self._is_live), text)
-            self._finished.append(Update(text))
+            diagram = self._ros.observed.diagrams.of(key, lambda: self._laid_out(topology, states))
+            self._finished += self._updates(diagram, topology.revision)
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
         finally:
             self._is_drawing = False
+            self.poll_soon()
 
-    def _keep(self, key: object, text: str) -> None:
-        """Keep a diagram for the next page that shows it."""
-        pictures = self._ros.observed.pictures
-        pictures[key] = text
-        while len(pictures) > _MAX_PICTURES:
-            pictures.pop(next(iter(pictures)), None)
+    def _laid_out(self, topology: Topology, states: Mapping[str, str | None]) -> Diagram:
+        from composer.dashboard.pictures import Diagram, declared_scene, live_scene
+        from composer.graph import View
+
+        if self._declared is not None:
+            return Diagram(declared_scene(self._declared), View(self._view))
+        return Diagram(live_scene(topology.snapshot(states)), View(self._view))
+
+    def _updates(self, diagram: Diagram, revision: int) -> Iterable[Update]:
+        """Return what to send of a diagram."""
+        del diagram, revision
+        return ()
+
+
+class PictureFeed(DiagramFeed):
+    """The diagram on a page, again whenever the graph has changed."""
+
+    def __init__(self, values: Values, declared: Declared | None) -> None:
+        """Read the parameters of the channel. Raises BadRequestError, RequestError."""
+        width = values.number("width", _WIDTH, _MIN_SIDE, _MAX_SIDE)
+        height = values.number("height", _HEIGHT, _MIN_SIDE, _MAX_SIDE)
+        self._page = (width, height)
+        super().__init__(values, declared)
+        values.end()
+
+    def _updates(self, diagram: Diagram, revision: int) -> Iterable[Update]:
+        from composer.graph.layout import Size
+
+        yield Update(to_json({"revision": revision, **diagram.on(Size(*self._page))}))
 
 
 class LiveFeed(Feed):

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Self
 
+from composer.dashboard.observing.diagrams import Diagrams
 from composer.dashboard.observing.log_lines import LogLines
 from composer.dashboard.observing.meters import TopicMeters
 from composer.dashboard.observing.topology import Topology
@@ -70,8 +71,7 @@ class Observed:
         self._states = _States(session, work)
         self._discovery = _Discovery(session)
         self._topology = first or Topology(0, {}, {})
-        #: The last diagrams, by what they depend on.
-        self.pictures: dict[object, str] = {}
+        self.diagrams = Diagrams()
         self._names: object = None
         self._names_due_s = 0.0
         self._endpoints_due_s = 0.0

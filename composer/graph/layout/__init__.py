@@ -10,11 +10,12 @@ box (``units``).
 from __future__ import annotations
 
 from composer.graph.layout.arrange import LayOut, arrange
-from composer.graph.layout.fitting import fit
+from composer.graph.layout.fitting import Arrangement, arrange_for_pages
 from composer.graph.layout.result import Frame, Layout, Path, Point, Rectangle, Size
 from composer.graph.layout.units import Sizes
 
 __all__ = [
+    "Arrangement",
     "Frame",
     "LayOut",
     "Layout",
@@ -24,5 +25,5 @@ __all__ = [
     "Size",
     "Sizes",
     "arrange",
-    "fit",
+    "arrange_for_pages",
 ]

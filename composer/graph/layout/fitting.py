@@ -1,4 +1,4 @@
-"""Lay out a graph for a page of a given size, so that it is shown as large as possible.
+"""Lay out a graph for pages, so that each shows it as large as possible.
 
 A large graph is laid out in parts, one for each outermost frame, in rows. Lines between two parts
 are straight and have no label.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, combinations
 
@@ -27,17 +28,69 @@ _LEFT_AND_RIGHT = 24.0
 _ABOVE = 20.0
 
 
-def fit(graph: Graph, sizes: Sizes, page: Size, directions: Sequence[Direction]) -> Layout:
-    """Return the layout that is largest on a page of this size in pixels.
+class Arrangement(ABC):
+    """A graph that is laid out. What a page makes of it takes little time."""
 
-    The first direction is the usual one: another one must be clearly larger.
-    """
+    @abstractmethod
+    def on(self, page: Size) -> Layout:
+        """Return the layout that is largest on a page of this size in pixels."""
+
+
+def arrange_for_pages(graph: Graph, sizes: Sizes, directions: Collection[Direction]) -> Arrangement:
+    """Lay out a graph for pages of any size, in one of the directions."""
     if _has_parts(graph):
-        return _in_parts(graph, sizes, page)
-    layouts = [arrange(replace(graph, direction=item), sizes) for item in directions]
-    best = max(layouts, key=lambda layout: _scale(layout.size, page))
-    gain = _scale(best.size, page) / _scale(layouts[0].size, page)
-    return best if gain > _CLEARLY else layouts[0]
+        # From top to bottom, names that are enlarged have room: they are wider than high.
+        inside, between = _parts(replace(graph, direction=Direction.DOWN))
+        return _InParts([arrange(part, sizes) for part in inside], between)
+    return _Whole({item: arrange(replace(graph, direction=item), sizes) for item in directions})
+
+
+class _Whole(Arrangement):
+    """The layout in each direction."""
+
+    def __init__(self, layouts: Mapping[Direction, Layout]) -> None:
+        self._layouts = layouts
+
+    def on(self, page: Size) -> Layout:
+        """Return one along the longer side of the page, unless another is clearly larger."""
+        longer = Direction.RIGHT if page.width >= page.height else Direction.DOWN
+        usual = self._layouts.get(longer) or next(iter(self._layouts.values()))
+        best = max(self._layouts.values(), key=lambda layout: _scale(layout.size, page))
+        return best if _scale(best.size, page) > _CLEARLY * _scale(usual.size, page) else usual
+
+
+class _InParts(Arrangement):
+    """The layouts of the parts, and the edges between them."""
+
+    def __init__(self, parts: Sequence[Layout], between: Sequence[Edge]) -> None:
+        self._parts = parts
+        self._between = between
+
+    def on(self, page: Size) -> Layout:
+        """Return the parts in rows."""
+        parts = self._parts
+        rows = _rows([part.size for part in parts], page)
+        scale = _scale(
+            _size([[part.size for part in parts[row.start : row.stop]] for row in rows]), page
+        )
+        room = Size(_LEFT_AND_RIGHT / scale, _ABOVE / scale)
+        moved = []
+        bottom = 0.0
+        for row in rows:
+            left, top = room.width, bottom + room.height
+            for part in parts[row.start : row.stop]:
+                moved.append(part.moved(Point(left, top)))
+                left += part.size.width
+            bottom = max(part.size.height for part in moved[row.start :])
+        layout = Layout(
+            size=Size(
+                max(part.size.width for part in moved) + room.width, bottom + room.height / 2
+            ),
+            vertices={key: place for part in moved for key, place in part.vertices.items()},
+            frames=tuple(frame for part in moved for frame in part.frames),
+            paths=tuple(path for part in moved for path in part.paths),
+        )
+        return replace(layout, paths=(*layout.paths, *_lines(self._between, layout)))
 
 
 def _scale(size: Size, page: Size) -> float:
@@ -47,32 +100,6 @@ def _scale(size: Size, page: Size) -> float:
 def _has_parts(graph: Graph) -> bool:
     frames = [item for item in graph.clusters if not (item.parent or item.block)]
     return len(graph.vertices) > _MANY_VERTICES and len(frames) >= _SEVERAL_FRAMES
-
-
-def _in_parts(graph: Graph, sizes: Sizes, page: Size) -> Layout:
-    # From top to bottom, names that are enlarged have room: they are wider than high.
-    inside, between = _parts(replace(graph, direction=Direction.DOWN))
-    parts = [arrange(part, sizes) for part in inside]
-    rows = _rows([part.size for part in parts], page)
-    scale = _scale(
-        _size([[part.size for part in parts[row.start : row.stop]] for row in rows]), page
-    )
-    room = Size(_LEFT_AND_RIGHT / scale, _ABOVE / scale)
-    moved = []
-    bottom = 0.0
-    for row in rows:
-        left, top = room.width, bottom + room.height
-        for part in parts[row.start : row.stop]:
-            moved.append(part.moved(Point(left, top)))
-            left += part.size.width
-        bottom = max(part.size.height for part in moved[row.start :])
-    layout = Layout(
-        size=Size(max(part.size.width for part in moved) + room.width, bottom + room.height / 2),
-        vertices={key: place for part in moved for key, place in part.vertices.items()},
-        frames=tuple(frame for part in moved for frame in part.frames),
-        paths=tuple(path for part in moved for path in part.paths),
-    )
-    return replace(layout, paths=(*layout.paths, *_lines(between, layout)))
 
 
 def _rows(sizes: Sequence[Size], page: Size) -> list[range]:
