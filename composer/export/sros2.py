@@ -96,7 +96,9 @@ def enclaves(system: System) -> tuple[Enclave, ...]:
     found = [Enclave(namespace, (manager, *_profiles(own)))]
     for part in parts:
         path = join(part.namespace, part.name.value)
-        found.append(Enclave(path, (_manager(path, part), *_profiles(part.nodes))))
+        own_manager = _manager(path, part)
+        own_manager.allow(PortKind.SERVICE, "change_states")
+        found.append(Enclave(path, (own_manager, *_profiles(part.nodes))))
     return tuple(found)
 
 
@@ -133,7 +135,9 @@ def _manager(namespace: str, system: System) -> Profile:
     profile.allow(PortKind.PUBLISHER, "/parameter_events", "/rosout", SELF_TEST_TOPICS)
     profile.allow(PortKind.SUBSCRIPTION, "/clock", SELF_TEST_TOPICS)
     profile.allow(PortKind.SERVICE, *_COMMANDS, *_PARAMETER_SERVICES, "get_type_description")
-    profile.allow(PortKind.SERVICE, "change_state", "change_states", "_instance_*")
+    profile.allow(PortKind.SERVICE, "_instance_*")
+    if any(node.introspection.left_to_manager for node in system.nodes):
+        profile.allow(PortKind.SERVICE, "change_state")
     profile.allow(PortKind.CLIENT, "_instance_*")
     for node in system.nodes:
         for port in node.transforms.ports if node.transforms is not None else ():

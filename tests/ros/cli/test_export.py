@@ -40,8 +40,6 @@ UNUSED = [
     SELF_TEST_TOPICS,
     "/clock",
     "/pipeline/manager/_instance_*",
-    "/pipeline/manager/change_state",
-    "/pipeline/manager/change_states",
 ]
 
 

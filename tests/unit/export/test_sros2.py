@@ -68,6 +68,9 @@ def test_a_node_may_do_what_it_declares_and_nothing_else(tmp_path: Path) -> None
     driver = profiles["/fleet/driver"]
     assert driver[PortKind.SUBSCRIPTION] == {"/parameter_events", "/clock"}
     manager = profiles["/fleet/robot/manager"]
+    # For nodes that leave it to the manager. Other processes of the system have the other one.
+    assert "/fleet/robot/manager/change_state" in manager[PortKind.SERVICE]
+    assert "/fleet/robot/manager/change_states" not in manager[PortKind.SERVICE]
     assert manager[PortKind.CLIENT] == {
         "/fleet/robot/manager/_instance_*",
         "/fleet/driver/change_state",
@@ -83,6 +86,9 @@ def test_each_process_has_an_enclave(tmp_path: Path) -> None:
         "/fleet/robot/hearing/manager",
         "/fleet/ear",
     ]
+    assert (
+        "/fleet/robot/hearing/manager/change_states" in second.profiles[0].names[PortKind.SERVICE]
+    )
     manager = first.profiles[0]
     assert "/fleet/robot/hearing/manager/change_states" in manager.names[PortKind.CLIENT]
     assert "/fleet/robot/hearing/manager/state" in manager.names[PortKind.SUBSCRIPTION]
