@@ -23,6 +23,7 @@ from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.syntax.self_attributes import (
     ATTRIBUTES_OF_OBJECTS,
     class_attributes,
+    created_by,
     escapes,
 )
 from composer.behavior_types.values import (
@@ -116,7 +117,7 @@ class HostedTypes(BehaviorTypes):
         of_node = {*_PRIVATE} if self.bases else set()
         for own in self.bases:
             of_node |= known_attributes(own) or set()
-        assigned = set(self.assigned)
+        assigned = created_by(self.source)
         return frozenset(ATTRIBUTES_OF_OBJECTS | of_node) | class_attributes(self.source, assigned)
 
     @cached_property

@@ -33,7 +33,7 @@ from composer.behavior_types.syntax.bindings import (
 )
 from composer.behavior_types.syntax.lineage import class_named
 from composer.behavior_types.syntax.project_classes import ProjectClasses, takes_object
-from composer.behavior_types.syntax.self_attributes import escapes, self_attributes
+from composer.behavior_types.syntax.self_attributes import created_by, escapes, self_attributes
 from composer.behavior_types.values import (
     NONE,
     ApiValue,
@@ -160,10 +160,12 @@ class BehaviorTypes:
             for statement in known.node.body
             if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)
         }
+        created = created_by(self.source)
         assigned = {
             name
             for name, bindings in self.assigned.items()
-            if name not in declared or any(binding.creates for _, binding in bindings)
+            if (name not in declared or any(binding.creates for _, binding in bindings))
+            and name in created
         }
         return self_attributes(self.source, assigned)
 

@@ -69,6 +69,9 @@ class Signature:
             if keyword.arg is not None and keyword.arg not in names and not self.takes_keywords:
                 message = f"'{self.name}' has no argument '{keyword.arg}'"
                 return message, keyword, suggestion(keyword.arg, names)
+        twice = self._twice(call) if not unpacks else None
+        if twice is not None:
+            return f"'{self.name}' gets the argument '{twice.arg}' twice", twice, None
         given = {name for name, _ in self.bound(call)}
         missing = [name for name in (*self.positional, *self.keywords) if name in self.required]
         missing = [name for name in missing if name not in given]
@@ -77,6 +80,11 @@ class Signature:
             plural = "s" if len(missing) > 1 else ""
             return f"'{self.name}' needs the argument{plural} {listed}", call.func, None
         return None
+
+    def _twice(self, call: ast.Call) -> ast.keyword | None:
+        """Return the keyword of a parameter that an argument before it sets as well."""
+        by_position = self.positional[self.positional_only : len(call.args)]
+        return next((item for item in call.keywords if item.arg in by_position), None)
 
     def _too_many(self, call: ast.Call) -> tuple[str, ast.expr, str | None]:
         most = len(self.positional)

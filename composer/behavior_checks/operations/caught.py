@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ast
 import builtins
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from composer import behavior
+from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.values import Collection, OwnObject, Value
 
 
 def exception_class(name: str) -> type[BaseException] | None:
@@ -27,6 +29,7 @@ def unreachable_handlers(node: ast.AST, scope: FunctionTypes) -> Iterator[CodePr
     earlier: list[type[BaseException]] = []
     for handler in node.handlers:
         caught = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+        yield from _not_exceptions([item for item in caught if item is not None], scope)
         found = [(item, exception_class(scope.called_name(item))) for item in caught if item]
         for item, known in found:
             general = next((other for other in earlier if known and issubclass(known, other)), None)
@@ -35,3 +38,29 @@ def unreachable_handlers(node: ast.AST, scope: FunctionTypes) -> Iterator[CodePr
                 hint = f"move 'except {known.__name__}' before 'except {general.__name__}'"
                 yield CodeProblem(Kind.UNUSED, message, span_of(item, scope.home.source), hint)
         earlier.extend(known for _, known in found if known is not None)
+
+
+def _not_exceptions(caught: Sequence[ast.expr], scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield what ``except`` names that is not a class of exceptions."""
+    for item in caught:
+        found = scope.type_of(item)
+        if isinstance(item, ast.List | ast.Set | ast.Dict):
+            problem, hint = f"'except' needs a tuple, not a {_NAMES[type(item)]}", "write (...)"
+        elif isinstance(item, ast.Call) and exception_class(scope.called_name(item.func)):
+            problem, hint = "'except' needs a class, not an exception", "remove '()'"
+        elif isinstance(found, OwnObject) and isinstance(item, ast.Call):
+            problem, hint = f"'except' needs a class, not {shown(found)}", "remove '()'"
+        elif _is_value(found):
+            problem, hint = f"'except' needs a class, not {shown(found)}", None
+        else:
+            continue
+        yield CodeProblem(Kind.VALUE, problem, span_of(item, scope.home.source), hint)
+
+
+def _is_value(found: Value) -> bool:
+    """Return whether a value is neither a class nor a tuple, which may be of classes."""
+    is_tuple = isinstance(found, Collection) and found.python is tuple
+    return not is_tuple and kind_of(found) in {"collection", "dict", "number", "text"}
+
+
+_NAMES: dict[type[ast.expr], str] = {ast.Dict: "dict", ast.List: "list", ast.Set: "set"}

@@ -11,7 +11,14 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.scalars import is_byte, is_number, is_text
 from composer.behavior_types.syntax.own_classes import known_attributes
-from composer.behavior_types.values import Collection, ModuleFunction, OwnMethod, OwnObject, Value
+from composer.behavior_types.values import (
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Value,
+    pair,
+)
 from composer.field_types import BOOL
 from composer.interfaces import FieldType, Message
 
@@ -83,9 +90,10 @@ def _unpacked(
         return
     if any(isinstance(item, ast.Starred) for item in target.elts):
         return
-    is_own = isinstance(origin, ast.Tuple | ast.List) and not isinstance(target, ast.Starred)
     wrong = _wrong_count(found, len(target.elts))
-    if wrong is not None and not (is_own and scope.type_of(origin) == found):
+    if isinstance(origin, ast.List) and scope.type_of(origin) is found and not _stars(origin):
+        wrong = _wrong_count(pair(*map(scope.type_of, origin.elts)), len(target.elts))
+    if wrong is not None:
         span = span_of(origin, scope.home.source)
         lines = (span.line, span.line + _REACH)
         yield CodeProblem(Kind.VALUE, wrong, span, _hint(origin, found, scope), lines=lines)
@@ -93,6 +101,10 @@ def _unpacked(
     items = found.items if isinstance(found, Collection) else None
     for item, type_ in zip(target.elts, items or (), strict=False):
         yield from _unpacked(item, type_, origin, scope)
+
+
+def _stars(node: ast.List) -> bool:
+    return any(isinstance(item, ast.Starred) for item in node.elts)
 
 
 def _wrong_count(found: Value, count: int) -> str | None:

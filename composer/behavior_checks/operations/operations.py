@@ -22,6 +22,7 @@ from composer.behavior_types.expressions.operators import (
     equality_problem,
     operation_problem,
     order_problem,
+    unary_problem,
 )
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.standard_types import ITERATORS
@@ -99,15 +100,12 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             if problem is not None:
                 about = blamed_name((left, right), scope)
                 yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)
-        case ast.AugAssign(target=target, op=operator, value=value):
-            changed = scope.type_of(target)
-            if changed is ANYTHING:
-                before = _before_changes(target, scope)
-                changed = before if is_scalar(before) else ANYTHING
-            problem = operation_problem(changed, operator, scope.type_of(value))
-            is_array = isinstance(changed, FieldType) and changed.is_array
-            if problem is not None and not is_array and not isinstance(changed, Collection):
-                yield CodeProblem(Kind.VALUE, problem, span_of(value, source))
+        case ast.UnaryOp(op=operator, operand=operand):
+            problem = unary_problem(operator, scope.type_of(operand))
+            if problem is not None:
+                yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
+        case ast.AugAssign():
+            yield from _changed(node, scope)
         case ast.Subscript(value=owner, slice=index):
             problem = _index_problem(scope.type_of(owner), scope.type_of(index))
             problem = problem or _position_problem(scope.type_of(owner), index)
@@ -138,6 +136,18 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 message = f"'{name}' needs the event loop of asyncio, which does not run here"
                 hint = "use self.clock.sleep" if name == "asyncio.sleep" else None
                 yield CodeProblem(Kind.ASYNCIO, message, span_of(function, source), hint)
+
+
+def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield why '+=' and the like fail."""
+    changed = scope.type_of(node.target)
+    if changed is ANYTHING:
+        before = _before_changes(node.target, scope)
+        changed = before if is_scalar(before) or isinstance(before, Message) else ANYTHING
+    problem = operation_problem(changed, node.op, scope.type_of(node.value))
+    is_array = isinstance(changed, FieldType) and changed.is_array
+    if problem is not None and not is_array and not isinstance(changed, Collection):
+        yield CodeProblem(Kind.VALUE, problem, span_of(node.value, scope.home.source))
 
 
 def _before_changes(target: ast.expr, scope: FunctionTypes) -> Value:

@@ -18,7 +18,7 @@ from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.expressions.results import awaited, result_of
 from composer.behavior_types.libraries.rclpy_api import rclpy_value
 from composer.behavior_types.libraries.standard_types import exception_type, sliced
-from composer.behavior_types.syntax.bindings import Binding, Bindings, How
+from composer.behavior_types.syntax.bindings import Binding, Bindings, How, reads_attribute
 from composer.behavior_types.syntax.lineage import class_named
 from composer.behavior_types.syntax.literals import constant_type, integer_constant
 from composer.behavior_types.syntax.names import (
@@ -103,13 +103,7 @@ class FunctionTypes:
 
     def reads_attribute(self, node: ast.expr | None, name: str) -> bool:
         """Return whether an expression reads ``self.<name>``."""
-        return node is not None and any(
-            isinstance(item, ast.Attribute)
-            and item.attr == name
-            and isinstance(item.value, ast.Name)
-            and item.value.id == self.bindings.receiver
-            for item in ast.walk(node)
-        )
+        return reads_attribute(node, self.bindings.receiver, name)
 
     def global_name(self, name: str) -> str:
         """Return the full name of a dotted name that starts with an imported one, or ""."""

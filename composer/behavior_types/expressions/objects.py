@@ -12,7 +12,14 @@ from composer.behavior_source.method_body import argument, dotted
 from composer.behavior_types.expressions.inferred import inferred_result
 from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.libraries.rclpy_api import CLASSES, generic, is_rclpy
-from composer.behavior_types.syntax.bindings import CONTEXTS, Binding, How, bindings_of, nodes_of
+from composer.behavior_types.syntax.bindings import (
+    CONTEXTS,
+    Binding,
+    How,
+    bindings_of,
+    nodes_of,
+    reads_attribute,
+)
 from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.literals import constant_type
 from composer.behavior_types.syntax.own_classes import (
@@ -108,7 +115,7 @@ def _assigned_to(scope: FunctionTypes, own: OwnClass, name: str) -> Value:
             bindings = bindings_of(method.node)
             inside = owner.function(method.node, known.home, known)
             for binding in bindings.attributes.get(name, ()):
-                if _reads(binding.expression, bindings.receiver, name):
+                if reads_attribute(binding.expression, bindings.receiver, name):
                     computed.append((inside, binding))
                 else:
                     plain.append((_stored(inside, binding), binding.how))
@@ -145,17 +152,6 @@ def _is_not_implemented(function: Function) -> bool:
             return "NotImplementedError" in ast.unparse(raised)
         case _:
             return False
-
-
-def _reads(node: ast.expr | None, receiver: str | None, name: str) -> bool:
-    """Return whether an expression reads an attribute of the object that a method belongs to."""
-    return node is not None and any(
-        isinstance(item, ast.Attribute)
-        and item.attr == name
-        and isinstance(item.value, ast.Name)
-        and item.value.id == receiver
-        for item in ast.walk(node)
-    )
 
 
 def method_value(

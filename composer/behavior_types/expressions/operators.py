@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
-from typing import TypeGuard
+import operator as calculation
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any, TypeGuard
 
 from composer.behavior_types.libraries.numpy_types import ARRAY, array_operation
 from composer.behavior_types.libraries.rclpy_api import is_time, order_of_rclpy, time_arithmetic
@@ -113,15 +115,60 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
             return f"a {value.of.definition.name} has no operator '{sign}'"
         if _is_tuple(value) and sign not in _OF_TUPLES and not _has_own(left, right, name):
             return f"a {value.of.definition.name} has no operator '{sign}'"
-    is_repeated = isinstance(operator, ast.Mult) and (is_integer(left) or is_integer(right))
-    for first, second in ((left, right), (right, left)):
-        is_sequence = _is_list(second) and second.python in (list, tuple)
-        if is_number(first) and _is_list(second) and not (is_repeated and is_sequence):
-            return f"operator '{sign}' on a {second.python.__name__} and a number"
-    is_mixed = (is_text(left) and is_number(right)) or (is_number(left) and is_text(right))
-    if is_mixed and not is_repeated:
-        return f"operator '{sign}' on a string and a number"
-    return None
+    return _problem_of_samples(left, operator, right)
+
+
+def _problem_of_samples(left: Value, operator: ast.operator, right: Value) -> str | None:
+    """Return why Python itself has no such operator for values of two of its types."""
+    samples = _sample(left), _sample(right)
+    if samples[0] is None or samples[1] is None:
+        return None
+    try:
+        _FUNCTIONS[type(operator)](*samples)
+    except TypeError:
+        pass
+    except (ArithmeticError, ValueError):
+        return None
+    else:
+        return None
+    sign = _SIGNS[type(operator)]
+    first, second = (_sampled(item) for item in samples)
+    if first == second == "a number":
+        return f"operator '{sign}' on a float"
+    if first == second:
+        return f"operator '{sign}' on two {second.removeprefix('a ')}s"
+    if first == "a number":
+        first, second = second, first
+    return f"operator '{sign}' on {first} and {second}"
+
+
+def _sample(value: Value) -> object:
+    """Return a value of a type of Python, None for other types; numpy has operators for most."""
+    if value == BOOL:
+        return True
+    if is_number(value):
+        return 1 if is_integer(value) else 1.0
+    if is_text(value):
+        return "a"
+    return _OF_COLLECTIONS.get(value.python) if isinstance(value, Collection) else None
+
+
+def _sampled(sample: object) -> str:
+    if isinstance(sample, int | float):
+        return "a number"
+    return "a string" if isinstance(sample, str) else f"a {type(sample).__name__}"
+
+
+def unary_problem(operator: ast.unaryop, operand: Value) -> str | None:
+    """Return why ``-x`` and the like fail, or None if they may be right."""
+    sign = _UNARY.get(type(operator))
+    if sign is None:
+        return None
+    sample = _sample(operand)
+    is_wrong = sample is not None and not isinstance(sample, int | float)
+    if is_wrong or (sign == "~" and isinstance(sample, float)):
+        return f"operator '{sign}' on {_sampled(sample)}"
+    return f"{operand.name} has no operator '{sign}'" if isinstance(operand, Message) else None
 
 
 def _problem_of_times(left: Value, sign: str, right: Value) -> str | None:
@@ -154,10 +201,6 @@ def _defines(value: Value, method: str) -> bool:
         return False
     known = known_attributes(value.of) if is_plain(value.of) else None
     return known is None or method in known
-
-
-def _is_list(type_: Value) -> TypeGuard[Collection]:
-    return isinstance(type_, Collection) and type_.python in (list, tuple, dict, set)
 
 
 def order_problem(left: Value, operator: ast.cmpop, right: Value) -> str | None:
@@ -240,4 +283,27 @@ _SIGNS: dict[type[ast.operator], str] = {
     ast.BitXor: "^",
     ast.LShift: "<<",
     ast.RShift: ">>",
+}
+_FUNCTIONS: dict[type[ast.operator], Callable[[Any, Any], object]] = {
+    ast.Add: calculation.add,
+    ast.Sub: calculation.sub,
+    ast.Mult: calculation.mul,
+    ast.Div: calculation.truediv,
+    ast.FloorDiv: calculation.floordiv,
+    ast.Mod: calculation.mod,
+    ast.Pow: calculation.pow,
+    ast.BitAnd: calculation.and_,
+    ast.BitOr: calculation.or_,
+    ast.BitXor: calculation.xor,
+    ast.LShift: calculation.lshift,
+    ast.RShift: calculation.rshift,
+}
+_UNARY: dict[type[ast.unaryop], str] = {ast.Invert: "~", ast.UAdd: "+", ast.USub: "-"}
+_OF_COLLECTIONS: dict[type, object] = {
+    bytes: b"",
+    deque: deque(),
+    dict: {},
+    list: [],
+    set: set(),
+    tuple: (),
 }

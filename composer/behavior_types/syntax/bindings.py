@@ -117,6 +117,37 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     return found
 
 
+def reads_attribute(node: ast.expr | None, receiver: str | None, name: str) -> bool:
+    """Return whether an expression reads an attribute of the object of a method."""
+    return node is not None and any(
+        isinstance(item, ast.Attribute)
+        and item.attr == name
+        and isinstance(item.value, ast.Name)
+        and item.value.id == receiver
+        for item in ast.walk(node)
+    )
+
+
+def created_attributes(function: Function) -> Iterator[str]:
+    """Yield the attributes that a method assigns, without those that it only computes again.
+
+    ``self.count = self.count + 1`` fails without ``self.count``, unless the method expects that.
+    """
+    found = bindings_of(function)
+    expects = any(
+        isinstance(node, ast.ExceptHandler)
+        or (isinstance(node, ast.Name) and node.id in {"getattr", "hasattr", "suppress", "vars"})
+        for node in nodes_of(function)
+    )
+    for name, bindings in found.attributes.items():
+        is_new = (
+            item.how is How.ANNOTATION or not reads_attribute(item.expression, found.receiver, name)
+            for item in bindings
+        )
+        if expects or any(is_new):
+            yield name
+
+
 #: Decorators that make a context for 'with' of a generator.
 CONTEXTS = frozenset(
     {"asynccontextmanager", "contextlib.asynccontextmanager"}

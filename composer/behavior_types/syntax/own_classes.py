@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from composer.behavior_source import Class, Function, Module, links_version
 from composer.behavior_source.traversal import walk
-from composer.behavior_types.syntax.bindings import bindings_of
+from composer.behavior_types.syntax.bindings import created_attributes
 from composer.behavior_types.syntax.lineage import (
     ENUMS,
     NAMED_TUPLE,
@@ -184,7 +184,7 @@ def _own(definition: Class) -> Iterator[str]:
     for method in definition.methods:
         yield method.name
         if method.node is not None:
-            yield from bindings_of(method.node).attributes
+            yield from created_attributes(method.node)
 
 
 @lru_cache(maxsize=128)

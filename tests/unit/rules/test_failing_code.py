@@ -1,0 +1,69 @@
+"""Code of behaviors that fails when it runs, and code like it that does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.unit.support.behavior_code import found
+from tests.unit.support.checking import quoted
+
+
+@pytest.mark.parametrize(
+    ("statement", "rule", "text"),
+    [
+        # values for several names
+        ("a, b, c = 1, 2", "invalid-value", "1, 2"),
+        ("self.a, self.b = [1.0]", "invalid-value", "[1.0]"),
+        # operators
+        ("'a' / 'b'", "invalid-value", "'a' / 'b'"),
+        ("self.parameters.mode / 'log'", "invalid-value", "self.parameters.mode / 'log'"),
+        ("'a' + [1]", "invalid-value", "'a' + [1]"),
+        ("(1, 2) + [3]", "invalid-value", "(1, 2) + [3]"),
+        ("{'a': 1} + {'b': 2}", "invalid-value", "{'a': 1} + {'b': 2}"),
+        ("{1, 2} + {3}", "invalid-value", "{1, 2} + {3}"),
+        ("self.parameters.speed & 1", "invalid-value", "self.parameters.speed & 1"),
+        ("-self.parameters.names", "invalid-value", "-self.parameters.names"),
+        ("-message.pose.pose.position", "invalid-value", "-message.pose.pose.position"),
+        ("place = message.pose.pose.position\nplace += self.parameters.speed", "invalid-value",
+         "self.parameters.speed"),
+        # attributes that are only computed from themselves
+        ("self.phase = self.phase + 0.1\nself.phase.real", "unknown-attribute", "phase"),
+        # 'except'
+        ("try:\n    pass\nexcept [ValueError, KeyError]:\n    pass", "invalid-value",
+         "[ValueError, KeyError]"),
+        ("try:\n    pass\nexcept ValueError():\n    pass", "invalid-value", "ValueError()"),
+        ("try:\n    pass\nexcept (ValueError, 'b'):\n    pass", "invalid-value", "'b'"),
+        # calls
+        ("self.scale(1.0, factor=2.0)", "call-arguments", "factor"),
+    ],
+)  # fmt: skip
+def test_it_is_reported_once(statement: str, rule: str, text: str, tmp_path: Path) -> None:
+    [diagnostic] = found("odometry", statement, tmp_path)
+    assert (diagnostic.rule.name, quoted(diagnostic)) == (rule, text)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "a, b, *c = 1, 2\n(a, b), c = (1, 2), 3",
+        "True * [1], [0] * self.count, '%d' % 1, 'a' * True, {1} - {2}, {1: 2} | {3: 4}",
+        "b'a' + b'b', (1, 2) + (3,), [1] + ['a'], 1 / 0, -True, ~1, 1 << 2, 2 ** -1",
+        "self.phase = self.phase + 0.1 if hasattr(self, 'phase') else 0.0\nself.phase.real",
+        "try:\n    self.phase = self.phase + 1\nexcept AttributeError:\n    self.phase = 0",
+        "try:\n    pass\nexcept (ValueError, (KeyError, OSError)):\n    pass",
+        "errors = ValueError, KeyError\ntry:\n    pass\nexcept errors:\n    pass",
+    ],
+)
+def test_right_code_is_not_reported(statement: str, tmp_path: Path) -> None:
+    assert found("odometry", statement, tmp_path) == []
+
+
+@pytest.mark.parametrize(("field", "is_known"), [("pose", True), ("point", False)])
+def test_a_transformed_message_has_the_type_of_the_message(
+    field: str, is_known: bool, tmp_path: Path
+) -> None:
+    statement = f"self.transforms.transform(PoseStamped(), 'map').{field}"
+    rules = {diagnostic.rule.name for diagnostic in found("odometry", statement, tmp_path)}
+    assert ("unknown-field" not in rules) is is_known
