@@ -73,6 +73,9 @@ _OF_ARRAYS = frozenset(
     }
 )
 
+#: The attributes of classes that are derived from dict.
+_OF_DICTS = frozenset({"default_factory", "elements", "most_common", "move_to_end", "subtract"})
+
 #: The problem of an attribute: its kind, message and hint.
 Found = tuple[Kind, str, str | None]
 
@@ -102,6 +105,8 @@ def attribute_problem(types: BehaviorTypes, owner: Value, name: str) -> Found | 
             hint = "write str(...)" if name == "message" else suggestion(name, dir(python))
             return Kind.ATTRIBUTE, f"{python.__name__} has no attribute '{name}'", hint
         case Collection(python=python) if not isabstract(python) and not hasattr(python, name):
+            if python is dict and name in _OF_DICTS:
+                return None
             close = nearest(name, dir(python))
             hint = f"did you mean '{close}'?" if close is not None else None
             return Kind.ATTRIBUTE, f"a {python.__name__} has no attribute '{name}'", hint

@@ -40,6 +40,11 @@ def iteration_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 return
             yield from _iterated(iterated, scope)
             yield from _unpacked(target, scope.element(scope.type_of(iterated)), iterated, scope)
+        case ast.Assign(
+            targets=[ast.Tuple(elts=targets) | ast.List(elts=targets)],
+            value=ast.Constant(value=str() | bytes() as text),
+        ) if len(targets) == len(text):
+            return
         case ast.Assign(targets=[target], value=value):
             found = scope.type_of(value)
             yield from _unpacked(target, found, value, scope)

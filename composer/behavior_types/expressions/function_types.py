@@ -21,6 +21,7 @@ from composer.behavior_types.libraries.standard_types import exception_type, sli
 from composer.behavior_types.syntax.bindings import Binding, Bindings, How, reads_attribute
 from composer.behavior_types.syntax.lineage import class_named
 from composer.behavior_types.syntax.literals import constant_type, integer_constant
+from composer.behavior_types.syntax.module_names import hides
 from composer.behavior_types.syntax.names import (
     constant_named,
     full_name,
@@ -115,7 +116,8 @@ class FunctionTypes:
         name = dotted(function)
         full = self.global_name(name) if name else ""
         is_builtin = not full and name.isidentifier() and not self.is_local(name)
-        return name if is_builtin and not self.home.may_have(name) else full
+        is_builtin = is_builtin and not self.home.may_have(name)
+        return name if is_builtin and name not in hides(self.home) else full
 
     def is_local(self, name: str) -> bool:
         """Return whether the function itself binds ``name``."""
@@ -128,7 +130,7 @@ class FunctionTypes:
             case ast.JoinedStr():
                 return STRING
             case ast.Name(id=name):
-                caught = self._caught(node)
+                caught = self.bindings.uses.get(id(node)) or self._caught(node)
                 return self.name(name) if caught is None else self.bound(caught)
             case ast.Attribute(value=value):
                 name = dotted(node)
@@ -155,7 +157,7 @@ class FunctionTypes:
 
     def _caught(self, node: ast.Name) -> Binding | None:
         """Return the ``except`` that a name is bound by, if several of them bind it."""
-        bindings = self.bindings.names.get(node.id, ())
+        bindings = self.bindings.of_name(node.id)
         if len(bindings) < _SEVERAL or any(item.how is not How.EXCEPTION for item in bindings):
             return None
         earlier = [
@@ -175,8 +177,8 @@ class FunctionTypes:
         return self._names[name]
 
     def _named(self, name: str) -> Value:
-        bindings = self.bindings.names.get(name)
-        if bindings is None:
+        bindings = self.bindings.of_name(name)
+        if not bindings:
             return self._of_module(name)
         if name in self.bindings.distinguished:
             return ANYTHING
@@ -199,7 +201,7 @@ class FunctionTypes:
         """Return the type of a name, with the elements that the function puts into it."""
         if self.function is None or not isinstance(found, Collection) or not found.is_empty:
             return found
-        if not all(is_fresh(item.expression) for item in self.bindings.names[name]):
+        if not all(is_fresh(item.expression) for item in self.bindings.of_name(name)):
             return found
         known = fillings_of(self.function, self.home)
         fillings = known.found.get(name, ())
@@ -209,7 +211,7 @@ class FunctionTypes:
 
     def before_changes(self, name: str) -> Value:
         """Return the type of a name of the function without what '+=' and the like do to it."""
-        bindings = self.bindings.names.get(name, [])
+        bindings = self.bindings.of_name(name)
         return joined((self.bound(binding), binding.how) for binding in bindings)
 
     def _of_module(self, name: str) -> Value:

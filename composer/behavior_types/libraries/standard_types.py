@@ -62,10 +62,6 @@ _CALLS: Mapping[str, Value] = {
     "time.perf_counter": NUMBER,
     "time.time": NUMBER,
     "time.time_ns": INTEGER,
-    "re.compile": BuiltinObject(re.Pattern),
-    "re.fullmatch": BuiltinObject(re.Match),
-    "re.match": BuiltinObject(re.Match),
-    "re.search": BuiltinObject(re.Match),
     "re.sub": STRING,
 }
 _COLLECTIONS: Mapping[str, type] = {
@@ -256,6 +252,19 @@ def builtin_result(
     return _METHODS.get((python, name), ANYTHING)
 
 
+def _match(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return ANYTHING if _is_of_bytes(arguments) else _MATCH
+
+
+def _pattern(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return ANYTHING if _is_of_bytes(arguments) else _PATTERN
+
+
+def _is_of_bytes(arguments: Sequence[Value]) -> bool:
+    pattern = arguments[0] if arguments else ANYTHING
+    return isinstance(pattern, Collection) and pattern.python is bytes
+
+
 def _random(_: Sequence[Value], __: Mapping[str, Value]) -> Value:
     return BuiltinObject(importlib.import_module("random").Random)  # it takes time to import
 
@@ -273,6 +282,10 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
     "min": _least,
     "next": _next,
     "random.Random": _random,
+    "re.compile": _pattern,
+    "re.fullmatch": _match,
+    "re.match": _match,
+    "re.search": _match,
     "round": _round,
     "sum": _sum,
     "zip": _zip,

@@ -35,6 +35,7 @@ class Binding:
     how: How = How.VALUE
     creates: bool = True
     positions: tuple[int, ...] = ()
+    is_inner: bool = False  # of a comprehension, which has names of its own
 
 
 @dataclass(slots=True)
@@ -52,9 +53,16 @@ class Bindings:
     #: The names that the function asks for anything about their class, anywhere.
     asked: set[str] = field(default_factory=set)
     #: The arguments of lambdas that get the elements of a list.
-    elements: set[ast.AST] = field(default_factory=set)
+    elements: dict[ast.AST, ast.expr] = field(default_factory=dict)
     #: The annotations of the arguments of functions within the function, by name.
     inner: dict[str, list[ast.expr | None]] = field(default_factory=dict)
+    #: The bindings of names in comprehensions and in lambdas that get elements, by the id of a use.
+    uses: dict[int, Binding] = field(default_factory=dict)
+
+    def of_name(self, name: str) -> list[Binding]:
+        """Return the bindings of a name outside comprehensions, or else those in them."""
+        found = self.names.get(name, [])
+        return [item for item in found if not item.is_inner] or found
 
     def bind(
         self,
@@ -106,6 +114,7 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
         found.name(other.arg if other is not None else None)
     for node in nodes_of(function):
         _bind(node, found)
+        _bind_uses(node, found)
     for name, inner in found.inner.items():
         # what the function around it calls the same may be something else
         is_only = len(inner) == 1 and name not in found.names
@@ -192,9 +201,12 @@ def _bind(node: ast.AST, found: Bindings) -> None:
             found.changes.setdefault(attribute, []).append((operator, value))
         case ast.AugAssign(target=ast.Name(id=name), op=operator, value=value):
             found.name_changes.setdefault(name, []).append((operator, value))
-        case ast.For() | ast.AsyncFor() | ast.comprehension():
-            is_async = isinstance(node, ast.AsyncFor) or bool(getattr(node, "is_async", False))
+        case ast.For() | ast.AsyncFor():
+            is_async = isinstance(node, ast.AsyncFor)
             found.bind(node.target, None if is_async else node.iter, How.ELEMENT)
+        case ast.comprehension():
+            for name, binding in _of_generators([node]).items():
+                found.names.setdefault(name, []).append(binding)
         case ast.withitem(optional_vars=ast.expr() as target):
             found.bind(target, node.context_expr, How.CONTEXT)
         case ast.ExceptHandler(type=ast.expr() as caught, name=str() as name):
@@ -225,6 +237,48 @@ def _bind(node: ast.AST, found: Bindings) -> None:
                 found.name(name)
         case _:
             pass
+
+
+def _of_generators(generators: list[ast.comprehension]) -> dict[str, Binding]:
+    """Return the bindings of the names of a comprehension."""
+    found = Bindings()
+    for item in generators:
+        found.bind(item.target, None if item.is_async else item.iter, How.ELEMENT)
+    return {
+        name: Binding(
+            items[0].expression if len(items) == 1 else None,
+            How.ELEMENT,
+            positions=items[0].positions,
+            is_inner=True,
+        )
+        for name, items in found.names.items()
+    }
+
+
+def _bind_uses(node: ast.AST, found: Bindings) -> None:
+    """Bind the uses of the names of a comprehension, or of a lambda that gets elements."""
+    match node:
+        case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
+            bindings: dict[str, Binding | None] = {**_of_generators(node.generators)}
+            outside = {id(item) for item in walk([node.generators[0].iter])}
+        case ast.Lambda(args=arguments):
+            outside = set()
+            bindings = {
+                item.arg: Binding(found.elements[item], How.ELEMENT, is_inner=True)
+                if item in found.elements
+                else None
+                for item in walk([arguments])
+                if isinstance(item, ast.arg)
+            }
+        case _:
+            return
+    for item in walk([node]):
+        if isinstance(item, ast.Name) and item.id in bindings and id(item) not in outside:
+            binding = bindings[item.id]
+            if binding is not None:
+                found.uses[id(item)] = binding
+            else:  # it is not that of a comprehension around it
+                found.uses.pop(id(item), None)
 
 
 def assigned_pairs(target: ast.expr, value: ast.expr) -> Iterator[tuple[ast.expr, ast.expr]]:
@@ -266,8 +320,9 @@ def _bind_keys(call: ast.Call, found: Bindings) -> None:
             case ast.keyword(
                 arg="key", value=ast.Lambda(args=ast.arguments(args=[argument], posonlyargs=[]))
             ):
-                found.elements.add(argument)
-                found.bind(ast.Name(argument.arg), items, How.ELEMENT)
+                found.elements[argument] = items
+                binding = Binding(items, How.ELEMENT, is_inner=True)
+                found.names.setdefault(argument.arg, []).append(binding)
 
 
 _ASKING = frozenset({"callable", "getattr", "hasattr", "isinstance", "issubclass", "type"})

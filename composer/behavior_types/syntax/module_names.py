@@ -17,6 +17,14 @@ def module_names(module: Module) -> frozenset[str] | None:
     return None if module.dynamic else _defined_names(module)
 
 
+@lru_cache(maxsize=128)
+def hides(module: Module) -> frozenset[str]:
+    """Return the names of the functions and classes at the top level of a file."""
+    closed = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
+    top = walk(module.tree.body, closed=closed)
+    return frozenset(node.name for node in top if isinstance(node, closed[:3]))
+
+
 @lru_cache(maxsize=128)  # as many as there are modules in memory; those of rclpy are large
 def _defined_names(module: Module) -> frozenset[str]:
     found = {name.partition(".")[0] for name in module.imports} | {*module.imports}

@@ -28,6 +28,11 @@ from tests.unit.support.checking import quoted
         ("-message.pose.pose.position", "invalid-value", "-message.pose.pose.position"),
         ("place = message.pose.pose.position\nplace += self.parameters.speed", "invalid-value",
          "self.parameters.speed"),
+        # names of comprehensions and lambdas are others than those outside
+        ("points = [p for p in Path().poses]\nmin((p for p in points), key=lambda p: p.w)",
+         "unknown-field", "w"),
+        ("p = Point()\n[p.z for p in self.parameters.names]", "unknown-field", "z"),
+        ("p = Point()\n[p for p in self.parameters.names]\np.upper()", "unknown-field", "upper"),
         # attributes that are only computed from themselves
         ("self.phase = self.phase + 0.1\nself.phase.real", "unknown-attribute", "phase"),
         # 'except'
@@ -53,6 +58,12 @@ def test_it_is_reported_once(statement: str, rule: str, text: str, tmp_path: Pat
         "self.phase = self.phase + 0.1 if hasattr(self, 'phase') else 0.0\nself.phase.real",
         "try:\n    self.phase = self.phase + 1\nexcept AttributeError:\n    self.phase = 0",
         "try:\n    pass\nexcept (ValueError, (KeyError, OSError)):\n    pass",
+        "a, b = 'ab'",
+        "p = Point()\n[p.upper() for p in self.parameters.names]\np.x",
+        "p = Point()\n[lambda p: p.upper() for p in Path().poses]\np.x",
+        "[p.x for p in [q.pose.position for q in Path().poses]], [p for p in 'ab']",
+        "(lambda p: p.upper())('a'), [p.pose for p in Path().poses]",
+        "max(self.parameters.names, key=lambda p: p.upper())\np = Point()\np.x",
         "errors = ValueError, KeyError\ntry:\n    pass\nexcept errors:\n    pass",
     ],
 )
