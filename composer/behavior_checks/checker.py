@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from composer.behavior_checks.attributes.changing_attributes import changing_attributes
+from composer.behavior_checks.attributes.fixed_attributes import fixed_problems
 from composer.behavior_checks.attributes.misspelled_attributes import misspelled_attributes
 from composer.behavior_checks.attributes.unknown_attributes import attribute_problem
 from composer.behavior_checks.calls.collection_calls import (
@@ -35,7 +36,9 @@ from composer.behavior_checks.operations.operations import (
     operation_problems,
     returned_exceptions,
 )
+from composer.behavior_checks.operations.protocols import CHECKED, protocol_problems
 from composer.behavior_checks.operations.returns import must_return, return_problems
+from composer.behavior_checks.operations.truth import TESTING, truth_problems
 from composer.behavior_checks.parts import outside_functions, scalar_name
 from composer.behavior_checks.problems import CodeProblem, Kind, distinct
 from composer.behavior_source import BehaviorSource, Function
@@ -171,6 +174,8 @@ class _FunctionChecker:
             match node:
                 case ast.Attribute():
                     yield from self._attribute(node)
+                    if not isinstance(node.ctx, ast.Load):
+                        yield from fixed_problems(node, self.scope)
                 case ast.Subscript():
                     yield from self._index(node)
                     yield from key_problems_of(node, self.function, self.scope)
@@ -182,6 +187,10 @@ class _FunctionChecker:
                 case ast.AnnAssign(annotation=annotation, value=ast.expr() as value):
                     yield from self._annotated(annotation, value)
             yield from unawaited(node, self.function, self.scope)
+            if isinstance(node, CHECKED):
+                yield from protocol_problems(node, self.scope)
+            if isinstance(node, TESTING):
+                yield from truth_problems(node, self.function, self.scope)
             yield from operation_problems(node, self.scope)
             yield from text_problems(node, self.scope)
             yield from element_problems(node, self.function, self.scope)

@@ -1,10 +1,11 @@
-"""Checks the fields of dataclasses."""
+"""Checks the classes in the files of a behavior: their definitions, the defaults of fields."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
 
+from composer.behavior_checks.class_definitions import definition_problems
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
@@ -19,8 +20,9 @@ _FIELD = "dataclasses.field"
 
 
 def class_problems(types: BehaviorTypes) -> Iterator[CodeProblem]:
-    """Yield the problems of the dataclasses in the files of a behavior."""
+    """Yield the problems of the classes in the files of a behavior."""
     for home in types.source.own_modules:
+        yield from definition_problems(home, types.project_classes)
         for definition in home.classes.values():
             own = OwnClass(definition, home)
             if is_dataclass(own):

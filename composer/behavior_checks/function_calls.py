@@ -27,7 +27,7 @@ from composer.behavior_types.expressions.protocols import special_method
 from composer.behavior_types.expressions.results import changed_tuple
 from composer.behavior_types.hosted import rclpy_function
 from composer.behavior_types.libraries.api_values import api_parameters
-from composer.behavior_types.syntax.own_classes import constructor_of
+from composer.behavior_types.syntax.own_classes import abstract_methods, constructor_of
 from composer.behavior_types.values import (
     ApiMethod,
     ApiValue,
@@ -39,6 +39,7 @@ from composer.behavior_types.values import (
     OwnMethod,
     Value,
 )
+from composer.diagnostics import nearest
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Message, Service
 from composer.source import Span
@@ -80,10 +81,7 @@ class CallChecker:
             case ModuleFunction(node=function, home=home, is_bound=is_bound):
                 yield from self._own_call(node, function, home, is_bound=is_bound)
             case OwnClass() as own if not self._may_be_derived(node.func, own):
-                parameters = constructor(own)
-                if parameters is not None:
-                    fields = self._of_constructor(own)
-                    yield from call_problems(node, parameters, self.scope, fields)
+                yield from self._created(node, own)
             case BuiltinMethod(python=python, name=name) if python.__module__ == "random":
                 parameters = method_signature(python, name)
                 if parameters is not None:
@@ -103,6 +101,23 @@ class CallChecker:
                 reason = uncallable(other)
                 if reason is not None:
                     yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
+
+    def _created(self, node: ast.Call, own: OwnClass) -> Iterator[CodeProblem]:
+        parameters = constructor(own)
+        missing = abstract_methods(own)
+        if missing:
+            yield self._abstract(node, own, missing)
+        elif parameters is not None:
+            fields = self._of_constructor(own)
+            yield from call_problems(node, parameters, self.scope, fields)
+
+    def _abstract(self, node: ast.Call, own: OwnClass, missing: list[str]) -> CodeProblem:
+        name = own.definition.name
+        close = nearest(missing[0], [method.name for method in own.definition.methods])
+        hint = f"rename '{close}' to '{missing[0]}'" if close else None
+        listed = " and ".join(f"'{item}'" for item in missing)
+        message = f"'{name}' cannot be created: it does not implement {listed}"
+        return CodeProblem(Kind.CALL, message, self._span(node.func), hint)
 
     def _own_call(
         self, node: ast.Call, function: Function, home: Module, *, is_bound: bool

@@ -23,6 +23,7 @@ from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.expressions.objects import method_value
 from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.libraries.handlers import Handler, handlers_of
+from composer.behavior_types.libraries.rclpy_api import rclpy_object
 from composer.behavior_types.outside_assignments import set_from_outside
 from composer.behavior_types.syntax.bindings import (
     Binding,
@@ -46,7 +47,7 @@ from composer.behavior_types.values import (
     Value,
 )
 from composer.fast_dataclass import dataclass
-from composer.field_types import ANYTHING
+from composer.field_types import ANYTHING, STRING
 from composer.interfaces import Interfaces
 from composer.model import Node, PortKind
 
@@ -319,8 +320,11 @@ class BehaviorTypes:
             return Ports(CONTAINERS[name])
         if name == "parameters":
             return Parameters()
+        if name == "node":
+            return rclpy_object("Node")
         api = attribute_class(name)
-        return ApiValue(api) if api is not None else ANYTHING
+        known = STRING if name == "name" else ANYTHING
+        return ApiValue(api) if api is not None else known
 
     def _joined(self, name: str) -> Value:
         """Return the type of an attribute that methods assign, also from its own old value."""

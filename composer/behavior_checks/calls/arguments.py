@@ -24,6 +24,7 @@ from composer.behavior_types.syntax.own_classes import (
     is_dataclass,
     is_enumeration,
     known_attributes,
+    misplaced_field,
 )
 from composer.behavior_types.values import OwnClass
 from composer.diagnostics import suggestion
@@ -161,6 +162,8 @@ def _of_fields(own: OwnClass) -> Signature | None:
     names: list[str] = []
     by_name: list[str] = []
     required: list[str] = []
+    if misplaced_field(own) is not None:
+        return None  # the class itself is wrong
     for field in all_fields(own):
         is_by_name, is_required = field.by_name, field.value is None
         match field.value:

@@ -14,6 +14,7 @@ from composer.behavior_checks.operations.formats import percent_problem
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.flow import returned_values
+from composer.behavior_source.method_body import argument as given
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.annotations import annotated
@@ -130,7 +131,7 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             yield from unreachable_handlers(node, scope)
         case ast.Expr(value=value):
             yield from _unused(value, scope)
-        case ast.Await(value=ast.Call(func=function)):
+        case ast.Await(value=ast.Call(func=function) as call) if not _lets_others_run(call):
             name = scope.global_name(dotted(function))
             if name.startswith("asyncio.") and not _runs_asyncio(scope.home):
                 message = f"'{name}' needs the event loop of asyncio, which does not run here"
@@ -202,6 +203,12 @@ def returned_exceptions(function: Function, scope: FunctionTypes) -> Iterator[Co
 def _is_exception(name: str) -> bool:
     found = exception_class(name)
     return found is not None and issubclass(found, Exception)
+
+
+def _lets_others_run(call: ast.Call) -> bool:
+    """Return whether a call is ``asyncio.sleep(0)``, which needs no event loop of asyncio."""
+    delay = given(call, 0, "delay")
+    return isinstance(delay, ast.Constant) and delay.value == 0
 
 
 def _runs_asyncio(home: Module) -> bool:

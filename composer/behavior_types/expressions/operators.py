@@ -36,20 +36,32 @@ def binary(left: Value, operator: ast.operator, right: Value) -> Value:
     if isinstance(operator, ast.Add | ast.Sub) and (is_time(left) or is_time(right)):
         return time_arithmetic(left, _SIGNS[type(operator)], right)
     if is_text(left) and (
-        (isinstance(operator, ast.Add) and is_text(right))
-        or (isinstance(operator, ast.Mult) and is_number(right))
-        or isinstance(operator, ast.Mod)
+        (isinstance(operator, ast.Add) and is_text(right)) or isinstance(operator, ast.Mod)
     ):
         return STRING
-    if isinstance(left, Collection) and left.python is not dict:
-        if isinstance(operator, ast.Add) and isinstance(right, Collection):
-            joined = join_all((left, right))
-            if isinstance(joined, Collection) and joined.items is not None:
-                return Collection(tuple, joined.element)
-            return joined
-        if isinstance(operator, ast.Mult) and is_integer(right):
-            return left
+    if isinstance(left, Collection) and isinstance(right, Collection) and left.python is not dict:
+        joined = join_all((left, right)) if isinstance(operator, ast.Add) else ANYTHING
+        if isinstance(joined, Collection) and joined.items is not None:
+            return Collection(tuple, joined.element)
+        return joined
+    if isinstance(operator, ast.Mult):
+        return _repeated(left, right)
     return ANYTHING
+
+
+def _repeated(left: Value, right: Value) -> Value:
+    """Return the type of a text, a list or a tuple that is repeated."""
+    for value, count in ((left, right), (right, left)):
+        if _is_count(count) and isinstance(value, Collection) and value.python is not dict:
+            return Collection(value.python, value.element, is_empty=value.is_empty)
+        if _is_count(count) and is_text(value):
+            return STRING
+    return ANYTHING
+
+
+def _is_count(type_: Value) -> bool:
+    """Return whether a value can say how often something is repeated: an int or a bool."""
+    return is_integer(type_) or type_ == BOOL
 
 
 def _arithmetic(left: Value, operator: ast.operator, right: Value) -> Value:

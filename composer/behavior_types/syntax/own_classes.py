@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from composer.behavior_source import Class, Function, Module, links_version
+from composer.behavior_source.method_body import dotted
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.syntax.bindings import created_attributes
 from composer.behavior_types.syntax.lineage import (
@@ -148,6 +149,59 @@ def all_fields(owner: OwnClass) -> tuple[ClassField, ...]:
         if is_dataclass(own) or is_named_tuple(own):
             found.update((item.name, item) for item in fields_of_class(own))
     return tuple(found.values())
+
+
+def misplaced_field(owner: OwnClass) -> ClassField | None:
+    """Return the first field that must have a default, because the one before it has; or None."""
+    if not (is_dataclass(owner) or is_named_tuple(owner)):
+        return None
+    if is_dataclass(owner) and not _makes_constructor(owner):
+        return None
+    has_default = False
+    for field in all_fields(owner):
+        if field.by_name or "InitVar" in ast.unparse(field.annotation):
+            continue
+        value = field.value
+        options: dict[str | None, ast.expr] = {}
+        if isinstance(value, ast.Call) and dotted(value.func).rpartition(".")[2] == "field":
+            options = {item.arg: item.value for item in value.keywords}
+            if {"init", "kw_only", None} & options.keys():
+                continue
+            value = options.get("default") or options.get("default_factory")
+        if value is None and has_default:
+            return field
+        has_default = has_default or value is not None
+    return None
+
+
+def is_frozen(owner: OwnClass) -> bool:
+    """Return whether objects of a class refuse that their attributes are set."""
+    option = _options(owner).get("frozen")
+    is_set = isinstance(option, ast.Constant) and option.value is True
+    return is_named_tuple(owner) or (is_dataclass(owner) and is_set)
+
+
+def abstract_methods(owner: OwnClass) -> list[str]:
+    """Return the abstract methods that keep objects of a class from being created."""
+    family = lineage(owner)
+    is_abstract = "abc.ABC" in family.others or any(
+        own.definition.node.keywords for own in family.classes
+    )
+    if not is_abstract or not family.others <= PLAIN_BASES or known_attributes(owner) is None:
+        return []
+    abstract: dict[str, None] = {}
+    others: set[str] = set()
+    for own in family.classes:
+        for statement in own.definition.node.body:
+            if isinstance(statement, Function):
+                decorators = {decorator_name(item, own.home) for item in statement.decorator_list}
+                if "abc.abstractmethod" in decorators:
+                    abstract[statement.name] = None
+                else:
+                    others.add(statement.name)
+            else:
+                others.update(defined_names(statement))
+    return [name for name in abstract if name not in others]
 
 
 def _all_by_name(own: OwnClass) -> bool:

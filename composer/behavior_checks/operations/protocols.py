@@ -1,0 +1,173 @@
+"""Checks what is awaited, entered by ``with``, or given an index, although it cannot be."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from inspect import isabstract
+from types import GeneratorType
+
+from composer.behavior_checks.fitting import shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function
+from composer.behavior_source.flow import is_stub
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.libraries.rclpy_api import is_rclpy
+from composer.behavior_types.scalars import is_scalar, is_text
+from composer.behavior_types.syntax.own_classes import (
+    all_fields,
+    has_fields,
+    is_named_tuple,
+    is_plain,
+    known_attributes,
+)
+from composer.behavior_types.values import (
+    NONE,
+    ApiMethod,
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Pending,
+    Value,
+)
+from composer.interfaces import FieldType, Message
+
+#: The nodes that are checked here.
+CHECKED = (ast.Await, ast.Subscript, ast.With)
+_OF_ITEMS: Mapping[type[ast.expr_context], str] = {
+    ast.Load: "__getitem__",
+    ast.Store: "__setitem__",
+    ast.Del: "__delitem__",
+}
+
+
+def protocol_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield why a value cannot be awaited, entered or given an index."""
+    match node:
+        case ast.Await(value=value):
+            yield from _awaited(value, scope)
+        case ast.With(items=items):
+            for item in items:
+                yield from _entered(item.context_expr, scope)
+        case ast.Subscript():
+            yield from _subscripted(node, scope)
+
+
+def _awaited(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    found, span = scope.type_of(node), span_of(node, scope.home.source)
+    name = _function_name(found)
+    if name and isinstance(node, ast.Attribute | ast.Name):
+        message = f"the function '{name}' cannot be awaited"
+        yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
+        return
+    if isinstance(node, ast.Call):
+        function = scope.type_of(node.func)
+        name = _plain_function(function, found, scope)
+        if name:
+            message = f"'{name}' is not asynchronous, so that it cannot be awaited"
+            span = span_of(node.func, scope.home.source)
+            yield CodeProblem(Kind.VALUE, message, span, "remove 'await'")
+
+
+def _plain_function(function: Value, result: Value, scope: FunctionTypes) -> str:
+    """Return the name of a function that returns nothing awaitable, "" if it may."""
+    if isinstance(function, ApiMethod):
+        return "" if function.member.is_async else function.member.name
+    called = _node_of(function)
+    if called is None or isinstance(called, ast.AsyncFunctionDef) or called.decorator_list:
+        return ""
+    is_other = isinstance(function, ModuleFunction) and function.is_bound and function.of is None
+    if is_other or is_stub(called):
+        return ""  # another class may define it differently
+    is_plain = result is NONE or _kind(result, "__await__", scope) is not None
+    return called.name if is_plain else ""
+
+
+def _entered(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    found, span = scope.type_of(node), span_of(node, scope.home.source)
+    name = _function_name(found)
+    if name and isinstance(node, ast.Attribute):
+        message = f"the function '{name}' is not a context manager"
+        yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
+        return
+    called = _node_of(scope.type_of(node.func)) if isinstance(node, ast.Call) else None
+    if called is not None and called.decorator_list:
+        return
+    kind = _kind(found, "__enter__", scope)
+    if kind is not None:
+        is_generator = isinstance(found, Collection) and found.python in (GeneratorType, Iterator)
+        hint = f"decorate '{called.name}' with @contextmanager" if called and is_generator else None
+        yield CodeProblem(Kind.VALUE, f"{kind} is not a context manager", span, hint)
+
+
+def _subscripted(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    owner, span = scope.type_of(node.value), span_of(node.slice, scope.home.source)
+    needed = _OF_ITEMS[type(node.ctx)]
+    is_tuple = isinstance(owner, OwnObject) and is_named_tuple(owner.of)
+    if needed != "__getitem__" and (is_text(owner) or is_tuple):
+        yield CodeProblem(Kind.VALUE, f"{shown(owner)} cannot be changed", span)
+        return
+    if not isinstance(owner, Collection | OwnObject):
+        return
+    kind = _kind(owner, needed, scope)
+    if kind is None:
+        return
+    if isinstance(owner, Collection):
+        is_fixed = hasattr(owner.python, "__getitem__")
+        problem = "cannot be changed" if is_fixed else "has no items to index"
+        hint: str | None = "write list(...)"
+    else:
+        problem = "has no items"
+        fields = all_fields(owner.of) if has_fields(owner.of) else ()
+        name = node.slice.value if isinstance(node.slice, ast.Constant) else None
+        hint = next((f"write .{field.name}" for field in fields if field.name == name), None)
+    yield CodeProblem(Kind.VALUE, f"{kind} {problem}", span, hint)
+
+
+def _function_name(found: Value) -> str:
+    match found:
+        case OwnMethod(method=method):
+            return method.name
+        case ModuleFunction(node=function, is_bound=True):
+            return function.name
+        case ModuleFunction(node=function) if not function.decorator_list:
+            return function.name
+        case ApiMethod(member=member):
+            return member.name
+        case _:
+            return ""
+
+
+def _node_of(function: Value) -> Function | None:
+    match function:
+        case OwnMethod(method=method):
+            return method.node
+        case ModuleFunction(node=node):
+            return node
+        case _:
+            return None
+
+
+def _kind(found: Value, method: str, scope: FunctionTypes) -> str | None:
+    """Return what a value is if it lacks a special method, None if it may have it."""
+    match found:
+        case Collection(python=python):
+            has_it = hasattr(python, method)
+            # an annotation such as Iterable may stand for a class with further methods
+            is_open = isabstract(python) and (python is not Iterator or method != "__enter__")
+            return None if has_it or is_open else shown(found)
+        case Message():
+            return shown(found)
+        case FieldType() if is_scalar(found):
+            return shown(found)
+        case OwnObject(of=of) if is_plain(of) and not is_rclpy(of.home):
+            classes = (of, *scope.owner.project_classes.derived(of))
+            known = [known_attributes(item) for item in classes]
+            may_have = any(names is None or method in names for names in known)
+            return None if may_have else shown(found)
+        case Pending(name=name) if method == "__enter__":
+            return f"the awaitable of '{name}'"
+        case _:
+            return None
