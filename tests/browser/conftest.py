@@ -1,4 +1,4 @@
-"""Pages in a headless Chromium: a fresh context for each test."""
+"""Files of ours in a headless Chromium."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Page, ViewportSize
 
 HERE = Path(__file__).parent
 
@@ -19,6 +19,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.parent == HERE:
             item.add_marker(pytest.mark.browser)
+
+
+SIZE: ViewportSize = {"width": 1280, "height": 800}
 
 
 @dataclass
@@ -30,33 +33,55 @@ class Opened:
     complaints: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self._listeners: dict[Any, Callable[[Any], None]] = {
+            "console": lambda message: self.complaints.append(message.text),
+            "pageerror": lambda error: self.complaints.append(str(error)),
+            "request": lambda request: self.requests.append(request.url),
+        }
+        for event, listener in self._listeners.items():
+            self.page.on(event, listener)
+
     def go(self, path: Path) -> None:
         """Open a file in place of the one before."""
         self.files.append(path.as_uri())
         self.page.goto(path.as_uri())
 
+    def check(self) -> None:
+        """Check that no file has complained or asked for anything else."""
+        for event, listener in self._listeners.items():
+            self.page.remove_listener(event, listener)
+        assert self.complaints == []
+        assert self.requests == self.files
+
+
+@pytest.fixture(scope="module")
+def shared_page(browser: Browser) -> Iterator[Page]:
+    """The page of all tests of a file: a new one takes ten times as long to open a file."""
+    page = browser.new_page(viewport=SIZE)
+    yield page
+    page.close()
+
 
 @pytest.fixture
-def open_file(browser: Browser) -> Iterator[Callable[..., Opened]]:
-    """Opens a file; at the end no file may have complained or asked for anything else."""
-    contexts = []
+def open_file(browser: Browser, shared_page: Page) -> Iterator[Callable[..., Opened]]:
+    """Opens a file; at the end no file may have complained or asked for anything else.
+
+    A file with options gets a page of its own. Without, the files of a test share one.
+    """
     opened_files: list[Opened] = []
 
     def open_it(path: Path, **options: Any) -> Opened:
-        context = browser.new_context(viewport={"width": 1280, "height": 800}, **options)
-        contexts.append(context)
-        page = context.new_page()
+        page = browser.new_page(viewport=SIZE, **options) if options else shared_page
+        page.set_viewport_size(SIZE)
+        page.mouse.move(0, 0)
         opened = Opened(page)
         opened_files.append(opened)
-        page.on("console", lambda message: opened.complaints.append(message.text))
-        page.on("pageerror", lambda error: opened.complaints.append(str(error)))
-        page.on("request", lambda request: opened.requests.append(request.url))
         opened.go(path)
         return opened
 
     yield open_it
     for opened in opened_files:
-        assert opened.complaints == []
-        assert opened.requests == opened.files
-    for context in contexts:
-        context.close()
+        opened.check()
+        if opened.page is not shared_page:
+            opened.page.close()

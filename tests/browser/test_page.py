@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,6 +26,13 @@ PLANNER = "node:/planning/planner"
 
 def written(folder: Path, name: str = "pipeline") -> Path:
     """Write the page of an example system, or of a made-up one (``fleet_30``)."""
+    path = folder / f"{name}.html"
+    path.write_bytes(rendered(name))
+    return path
+
+
+@functools.cache
+def rendered(name: str) -> bytes:
     if name.startswith("fleet_"):
         system, diagnostics = fleet(int(name.removeprefix("fleet_")))
         scene = scene_of([system], diagnostics)
@@ -32,10 +40,7 @@ def written(folder: Path, name: str = "pipeline") -> Path:
         loading = load(systems_folder() / f"{name}.yaml")
         assert loading.system is not None
         scene = scene_of([loading.system], loading.diagnostics)
-    path = folder / f"{name}.html"
-    graphs = [build_graph(scene, view) for view in View]
-    path.write_bytes(render(graphs, Format.HTML, Engine.BUNDLED))
-    return path
+    return render([build_graph(scene, view) for view in View], Format.HTML, Engine.BUNDLED)
 
 
 @pytest.fixture
