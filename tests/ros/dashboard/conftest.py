@@ -9,7 +9,7 @@ import pytest
 
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import Browser, Dashboard, browser, dashboard
-from tests.ros.support.pages import allowed, watched
+from tests.ros.support.pages import SIZE, allowed, watched
 from tests.ros.support.system_process import REPOSITORY, RunningSystem
 
 if TYPE_CHECKING:
@@ -47,8 +47,24 @@ def context(browser: sync_api.Browser, server: Dashboard) -> Iterator[sync_api.B
         yield shared
 
 
+@pytest.fixture(scope="module")
+def shared_page(context: sync_api.BrowserContext) -> sync_api.Page:
+    """The page of most tests of a file: a new one starts a process and compiles all scripts."""
+    return context.new_page()
+
+
 @pytest.fixture
-def view(context: sync_api.BrowserContext, server: Dashboard) -> Iterator[sync_api.Page]:
-    """A page in a real browser, before it has loaded a view."""
-    with watched(context, server.address) as page:
+def view(shared_page: sync_api.Page, server: Dashboard) -> Iterator[sync_api.Page]:
+    """The page, which shows what the test before has left: a test begins with ``goto``."""
+    shared_page.set_viewport_size(SIZE)
+    shared_page.emulate_media(color_scheme="light")
+    with watched(shared_page, server.address) as page:
         yield page
+
+
+@pytest.fixture
+def own_view(context: sync_api.BrowserContext, server: Dashboard) -> Iterator[sync_api.Page]:
+    """A page before it has loaded a view, for a test that changes its way to the server."""
+    with watched(context.new_page(), server.address) as page:
+        yield page
+    page.close()

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.programs import require_package
-from tests.ros.support.dashboard import Dashboard
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.pages import VIEWS, opened, visit
+from tests.ros.support.pages import VIEWS, visit
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Route
+    from playwright.sync_api import Page, Route
 
 pytestmark = pytest.mark.browser
 PLANNER = "/planning/planner"
@@ -31,19 +30,19 @@ PACKAGES = Path(__file__).parents[2] / "browser"
 AXE = PACKAGES / "node_modules" / "axe-core" / "axe.min.js"
 
 
-def test_a_view_is_busy_until_its_module_is_loaded(view: Page) -> None:
+def test_a_view_is_busy_until_its_module_is_loaded(own_view: Page) -> None:
     held: list[Route] = []
 
     def hold(route: Route) -> None:
         held.append(route)
 
-    view.route("**/views/timing.js", hold)
-    view.goto("/log")
-    view.click("#rail a[href='/timing']")
-    view.locator("#main[aria-busy=true]").wait_for()
-    wait_until(lambda: view.title() and held, "the request of the module")
+    own_view.route("**/views/timing.js", hold)
+    own_view.goto("/log")
+    own_view.click("#rail a[href='/timing']")
+    own_view.locator("#main[aria-busy=true]").wait_for()
+    wait_until(lambda: own_view.title() and held, "the request of the module")
     held[0].continue_()
-    view.locator("#main:not([aria-busy]) .view-title", has_text="Timing").wait_for()
+    own_view.locator("#main:not([aria-busy]) .view-title", has_text="Timing").wait_for()
 
 
 #: Marks the control with the focus. Returns it if the focus cannot be seen there, and the visible
@@ -158,15 +157,16 @@ def test_no_view_has_a_serious_accessibility_violation(view: Page) -> None:
 
 
 @pytest.mark.parametrize("width", [360, 768])
-def test_no_view_is_wider_than_the_screen(width: int, browser: Browser, server: Dashboard) -> None:
-    with opened(browser, server.address, viewport={"width": width, "height": 800}) as page:
-        for path in (*VIEWS, *DETAILS):
-            visit(page, f"/{path}")
-            assert page.evaluate("document.scrollingElement.scrollWidth") <= width
-            cut = page.evaluate(
-                """() => [...document.querySelectorAll("#bar *, #rail a, .view-head *, .toolbar *")]
-                .filter(element => element.checkVisibility({contentVisibilityAuto: true}))
-                .filter(element => element.getBoundingClientRect().right > innerWidth + 1)
-                .map(element => element.outerHTML.slice(0, 80))"""
-            )
-            assert cut == [], path
+def test_no_view_is_wider_than_the_screen(width: int, view: Page) -> None:
+    view.set_viewport_size({"width": width, "height": 800})
+    view.goto("/log")
+    for path in (*VIEWS, *DETAILS):
+        visit(view, f"/{path}")
+        assert view.evaluate("document.scrollingElement.scrollWidth") <= width
+        cut = view.evaluate(
+            """() => [...document.querySelectorAll("#bar *, #rail a, .view-head *, .toolbar *")]
+            .filter(element => element.checkVisibility({contentVisibilityAuto: true}))
+            .filter(element => element.getBoundingClientRect().right > innerWidth + 1)
+            .map(element => element.outerHTML.slice(0, 80))"""
+        )
+        assert cut == [], path

@@ -290,37 +290,37 @@ def test_the_log_is_filtered_and_leads_to_nodes(view: Page) -> None:
     view.wait_for_url("**/nodes/control/motor_controller")
 
 
-def test_the_log_is_filtered_by_level_and_paused(view: Page, peer: Peer) -> None:
-    log, lines = peer.node.get_logger(), view.locator(".log li .text")
+def test_the_log_is_filtered_by_level_and_paused(own_view: Page, peer: Peer) -> None:
+    log, lines = peer.node.get_logger(), own_view.locator(".log li .text")
     sockets: list[WebSocketRoute] = []
 
     def connect(socket: WebSocketRoute) -> None:
         socket.connect_to_server()
         sockets.append(socket)
 
-    view.route_web_socket("**/ws", connect)
-    view.goto("/log?text=mark")
+    own_view.route_web_socket("**/ws", connect)
+    own_view.goto("/log?text=mark")
     log.info("mark 1")
     log.warning("mark 2")
     log.error("mark 3")
     expect_texts(lines, "mark 1", "mark 2", "mark 3")
-    view.get_by_label("Lowest level").select_option("warn and above")
+    own_view.get_by_label("Lowest level").select_option("warn and above")
     expect_texts(lines, "mark 2", "mark 3")
-    assert view.url.endswith("/log?level=warn&text=mark")
-    view.click(".toolbar >> text=Pause")
+    assert own_view.url.endswith("/log?level=warn&text=mark")
+    own_view.click(".toolbar >> text=Pause")
     log.error("mark 4")
-    expect_text(view.locator(".toolbar"), "1 more while paused")
+    expect_text(own_view.locator(".toolbar"), "1 more while paused")
     expect_texts(lines, "mark 2", "mark 3")
     # New filters apply to what has arrived by then.
-    view.get_by_label("Lowest level").select_option("error and above")
+    own_view.get_by_label("Lowest level").select_option("error and above")
     expect_texts(lines, "mark 3", "mark 4")
     log.error("mark 5")
-    expect_text(view.locator(".toolbar"), "1 more while paused")
-    view.click(".toolbar >> text=Pause")
+    expect_text(own_view.locator(".toolbar"), "1 more while paused")
+    own_view.click(".toolbar >> text=Pause")
     expect_texts(lines, "mark 3", "mark 4", "mark 5")
     # What arrives again after a lost connection is not shown twice.
     sockets[-1].close()
-    wait_until(lambda: view.title() and len(sockets) > 1)
+    wait_until(lambda: own_view.title() and len(sockets) > 1)
     log.fatal("mark 6")
     expect_texts(lines, "mark 3", "mark 4", "mark 5", "mark 6")
 

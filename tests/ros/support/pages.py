@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from tests.ros.support.dashboard import Address
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Locator, Page
+    from playwright.sync_api import Browser, BrowserContext, Locator, Page, ViewportSize
 
 PATIENCE_MS = 60_000
+SIZE: ViewportSize = {"width": 1280, "height": 800}
 VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
 #: What a view shows once its data has arrived.
 _READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
@@ -20,7 +21,7 @@ _READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
 
 @contextmanager
 def _new_context(browser: Browser, address: Address, options: Any) -> Iterator[BrowserContext]:
-    settings: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}, **options}
+    settings: dict[str, Any] = {"viewport": SIZE, **options}
     context = browser.new_context(base_url=address.origin, **settings)
     context.set_default_timeout(PATIENCE_MS)
     try:
@@ -39,18 +40,21 @@ def allowed(browser: Browser, address: Address) -> Iterator[BrowserContext]:
 
 
 @contextmanager
-def watched(context: BrowserContext, address: Address) -> Iterator[Page]:
-    """Return a page, on which nothing is loaded yet, for the length of the block.
+def watched(page: Page, address: Address) -> Iterator[Page]:
+    """Return a page for the length of the block.
 
     At the end, it must not have complained, nor requested anything beyond the server.
     """
-    page = context.new_page()
     complaints: list[str] = []
     requests: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("request", lambda request: requests.append(request.url))
-    page.on("websocket", lambda socket: requests.append(socket.url))
+    listeners: dict[Any, Callable[[Any], None]] = {
+        "console": lambda message: complaints.append(message.text),
+        "pageerror": lambda error: complaints.append(str(error)),
+        "request": lambda request: requests.append(request.url),
+        "websocket": lambda socket: requests.append(socket.url),
+    }
+    for event, listener in listeners.items():
+        page.on(event, listener)
     try:
         yield page
         assert not complaints, complaints
@@ -58,13 +62,17 @@ def watched(context: BrowserContext, address: Address) -> Iterator[Page]:
         foreign = [url for url in requests if not url.startswith(own)]
         assert not foreign, foreign
     finally:
-        page.close()
+        for event, listener in listeners.items():
+            page.remove_listener(event, listener)
 
 
 @contextmanager
 def opened(browser: Browser, address: Address, **options: Any) -> Iterator[Page]:
     """Open the page, as a user does, for the length of the block."""
-    with _new_context(browser, address, options) as context, watched(context, address) as page:
+    with (
+        _new_context(browser, address, options) as context,
+        watched(context.new_page(), address) as page,
+    ):
         page.goto(f"{address.origin}/?token={address.token}")
         yield page
 
