@@ -40,6 +40,6 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
     """An environment with the wheel and its dependencies."""
     environment = tmp_path_factory.mktemp("environment")
-    venv.create(environment, with_pip=True, symlinks=True)
-    _pip(environment / "bin" / "python", "install", "-qq", wheel)
+    venv.create(environment, symlinks=True)
+    _pip(sys.executable, "--python", environment, "install", "-qq", wheel)
     return Installation(environment, tmp_path_factory.mktemp("elsewhere"))
