@@ -16,6 +16,7 @@ from functools import cache
 from composer import behavior
 from composer.behavior_source import Function, Method
 from composer.behavior_source.method_body import dotted
+from composer.behavior_types.libraries.numpy_signatures import NUMPY_ARRAYS, NUMPY_PARAMETERS
 from composer.behavior_types.syntax.bindings import CONTEXTS, is_class_method, is_static
 from composer.behavior_types.syntax.lineage import PLAIN_BASES, lineage
 from composer.behavior_types.syntax.own_classes import (
@@ -81,6 +82,13 @@ class Signature:
             plural = "s" if len(missing) > 1 else ""
             return f"'{self.name}' needs the argument{plural} {listed}", call.func, None
         return None
+
+    def accepts(self, count: int) -> bool:
+        """Return whether a call with that many arguments, by position, succeeds."""
+        if self.required & set(self.keywords):
+            return False
+        least = sum(name in self.required for name in self.positional)
+        return least <= count <= (count if self.takes_more else len(self.positional))
 
     def _twice(self, call: ast.Call) -> ast.keyword | None:
         """Return the keyword of a parameter that an argument before it sets as well."""
@@ -218,7 +226,10 @@ def method_signature(python: type, name: str) -> Signature | None:
 
 
 #: Modules of the standard library whose functions have signatures.
-_LIBRARY = frozenset({"copy", "json", "random"})
+_LIBRARY = frozenset(
+    {"bisect", "colorsys", "copy", "glob", "heapq", "json", "operator", "os.path", "random"}
+    | {"shutil", "statistics", "struct", "textwrap"}
+)
 _OF_FIELD = frozenset(inspect.signature(dataclasses.field).parameters)
 _BY_NAME: Mapping[str, Signature] = {
     "collections.deque": Signature("deque", ("iterable", "maxlen"), (), frozenset()),
@@ -237,12 +248,31 @@ def library_signature(name: str) -> Signature | None:
     """Return the parameters of a built-in function or one of the library; None if unknown."""
     if name in _BY_NAME:
         return _BY_NAME[name]
+    if name.startswith("numpy."):
+        return _of_numpy(name, name.removeprefix("numpy."))
     module, _, last = name.rpartition(".")
     home = {"": builtins, "math": math}.get(module)
     if module in _LIBRARY:
         home = importlib.import_module(module)
     found = getattr(home, last, None)
     return None if isinstance(found, type) else _signature(found, name)
+
+
+def _of_numpy(full: str, name: str) -> Signature | None:
+    count = NUMPY_ARRAYS.get(name)
+    if count is not None:  # the next argument is where to store the result
+        names = tuple(f"x{at + 1}" for at in range(count))
+        return Signature(full, (*names, "out"), (), frozenset(names), takes_keywords=True)
+    if name not in NUMPY_PARAMETERS:
+        return None
+    positional, keywords = NUMPY_PARAMETERS[name]
+    required = frozenset(item for item in (*positional, *keywords) if not item.endswith("="))
+    return Signature(
+        full,
+        tuple(item.removesuffix("=") for item in positional),
+        tuple(item.removesuffix("=") for item in keywords),
+        required,
+    )
 
 
 def _signature(function: object, name: str) -> Signature | None:

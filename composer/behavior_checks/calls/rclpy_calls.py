@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 
-from composer.behavior_checks.calls.arguments import Signature, signature_of
+from composer.behavior_checks.calls.arguments import signature_of
 from composer.behavior_checks.calls.call import call_problems
 from composer.behavior_checks.fitting import argument_problem, kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -167,7 +167,7 @@ def _signature_problems(call: ast.Call, scope: FunctionTypes) -> Iterator[CodePr
         match scope.type_of(callback.node), callback.node:
             case OwnMethod(method=method, home=home), _ if method.node is not None:
                 signature = signature_of(method.node, is_bound=True) if method.known else None
-                wrong = signature is not None and not _accepts(signature, count)
+                wrong = signature is not None and not signature.accepts(count)
                 if wrong and callback.gets_info and _takes_info(method.node):
                     continue
                 if wrong and method.node is not None:
@@ -175,7 +175,7 @@ def _signature_problems(call: ast.Call, scope: FunctionTypes) -> Iterator[CodePr
                     yield _signature_problem(method.node, callback, span)
             case ModuleFunction(node=function, home=home, is_bound=is_bound), _:
                 signature = signature_of(function, is_bound=is_bound)
-                if signature is not None and not _accepts(signature, count):
+                if signature is not None and not signature.accepts(count):
                     yield _signature_problem(
                         function, callback, name_span(function, "def", home.source)
                     )
@@ -213,14 +213,6 @@ def transition_problems(types: HostedTypes) -> Iterator[CodeProblem]:
             hint = f"write 'def {method.name}(self, state)'"
             span = name_span(method.node, "def", home.source)
             yield CodeProblem(Kind.SIGNATURE, message, span, hint)
-
-
-def _accepts(signature: Signature, count: int) -> bool:
-    if signature.required & set(signature.keywords):
-        return False
-    least = sum(name in signature.required for name in signature.positional)
-    most = count if signature.takes_more else len(signature.positional)
-    return least <= count <= most
 
 
 def _signature_problem(function: Function, callback: Callback, span: Span) -> CodeProblem:

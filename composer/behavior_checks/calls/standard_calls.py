@@ -14,6 +14,7 @@ from composer.behavior_checks.calls.arguments import (
     signature_of,
 )
 from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.calls.library_arguments import library_argument_problems
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
@@ -42,7 +43,9 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
         return
     signature = library_signature(name)
     if signature is not None:
-        yield from call_problems(call, signature, scope)
+        found = list(call_problems(call, signature, scope))
+        found = found or list(library_argument_problems(call, signature, scope))
+        yield from found
     if name == "time.sleep" or name.startswith("math."):
         takes_numbers = name not in _OF_ITERABLES
         for argument in call.args:

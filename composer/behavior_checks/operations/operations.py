@@ -9,6 +9,7 @@ from itertools import pairwise
 
 from composer.behavior_checks.calls.standard_calls import library_call_problems
 from composer.behavior_checks.fitting import kind_of, shown
+from composer.behavior_checks.operations.array_shapes import product_problem
 from composer.behavior_checks.operations.caught import exception_class, unreachable_handlers
 from composer.behavior_checks.operations.formats import percent_problem
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -98,6 +99,8 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
         case ast.BinOp(left=left, op=operator, right=right):
             problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
             problem = problem or percent_problem(left, operator, right, scope)
+            if isinstance(operator, ast.MatMult):
+                problem = product_problem(left, right, scope)
             if problem is not None:
                 about = blamed_name((left, right), scope)
                 yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)

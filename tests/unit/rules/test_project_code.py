@@ -128,6 +128,9 @@ def nothing():
 """
 PACKAGE = "from shapes.shapes import Plan, Side\n"
 CODE = """\
+import heapq
+import random
+
 import numpy as np
 import shapes
 from geometry_msgs.msg import Point, Pose
@@ -138,6 +141,13 @@ from dataclasses import replace
 from shapes.shapes import (
     SIZES, Filter, Light, Named, Place, Shape, ShapeError, Side, Size, Square, lit, nothing
 )
+
+
+TABLE = np.array([1.0, 2.0, 3.0])
+
+
+def turned():
+    return np.linalg.pinv(np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]))
 
 
 class Code:
@@ -166,6 +176,11 @@ RIGHT = [
     "self.square.color = 'red'; print(self.square.color)",
     "point.x = float(self.plan.values().mean())",
     "print(np.fft.rfft(self.plan.values()), np.some_function_of_the_future)",
+    "np.zeros((2, 3)), np.zeros(3, float), np.array([1.0], dtype=np.uint8), np.zeros(shape=3)",
+    "np.interp(point.x, TABLE, 2 * TABLE), np.interp(point.x, [*TABLE], [1.0, 2.0])",
+    "np.concatenate([TABLE, TABLE]), np.concatenate((TABLE, TABLE), 0), np.sqrt(2.0, where=True)",
+    "turned() @ TABLE, turned() @ turned().T, np.eye(2) @ turned(), TABLE @ TABLE",
+    "heapq.heappush([], point), heapq.nsmallest(1, [2]), random.choice('ab'), np.clip(1, 2, 3)",
     "raise ShapeError(self.square, 'too large')",
     "print(Size(1.0).height, Size(height=2, width=1)[0], Size(*'ab')._asdict())",
     "print(Size(1.0)._replace(height='a').height, Size._fields)",
@@ -222,6 +237,20 @@ RIGHT = [
         ("deque([1], max=5)", "call-arguments", "max"),
         ("np.columnstack((point.x, point.y))", "unknown-import", "columnstack"),
         ("np.fft.rfftt([1.0])", "unknown-import", "rfftt"),
+        ("np.interp(point.x, [1.0, 2.0])", "call-arguments", "np.interp"),
+        ("np.interp(point.x, np.array([1.0, 2.0]), TABLE)", "call-arguments", "TABLE"),
+        ("np.zeros(2, 3, dtype=bool)", "call-arguments", "dtype"),
+        ("np.zeros(2, 3)", "call-arguments", "3"),
+        ("np.zeros((point.x, 2))", "call-arguments", "(point.x, 2)"),
+        ("np.linspace(0.0, 1.0, num=point.x / 2)", "call-arguments", "point.x / 2"),
+        ("np.concatenate(TABLE, np.zeros(3))", "call-arguments", "np.zeros(3)"),
+        ("np.vstack(TABLE, np.zeros(3), TABLE)", "call-arguments", "np.zeros(3)"),
+        ("np.maximum(TABLE)", "call-arguments", "np.maximum"),
+        ("np.eye(3) @ np.array([1.0, 2.0])", "invalid-value", "np.eye(3) @ np.array([1.0, 2.0])"),
+        ("turned() @ [1.0, 2.0]", "invalid-value", "turned() @ [1.0, 2.0]"),
+        ("heapq.heappush(point, [])", "call-arguments", "point"),
+        ("heapq.heappush([1])", "call-arguments", "heapq.heappush"),
+        ("random.choice(point.x)", "call-arguments", "point.x"),
     ],
 )
 def test_a_mistake_is_reported_once(statement: str, rule: str, text: str, tmp_path: Path) -> None:
