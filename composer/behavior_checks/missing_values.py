@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 
+from composer.behavior_checks.needed_values import direct_names, needed_values, passed_values
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import always_executed, empty_returns, returned_values
@@ -41,23 +42,45 @@ def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodePro
         if len(bindings) == 1 and bindings[0].how is How.VALUE and not bindings[0].positions
         if (reason := _reason(bindings[0].expression, scope)) is not None
     }
-    uses = [node for node in nodes if isinstance(node, ast.Attribute | ast.Subscript)]
-    direct = [node for node in uses if isinstance(node.value, ast.Call)]
-    if (not reasons and not direct) or _expects_none(function):
+    if not reasons and not any(map(_has_direct_use, nodes)):
         return
-    tested = _tested_names(function)
-    seen = set(tested)
-    for node in uses:
-        owner = node.value
-        name = owner.id if isinstance(owner, ast.Name) else ""
-        reason = reasons.get(name) if name not in seen else None
-        if isinstance(owner, ast.Call) and ast.unparse(owner) not in seen:
-            reason, name = _reason(owner, scope), ast.unparse(owner)
-        if reason is not None:
-            seen.add(name)
-            span = span_of(owner, scope.home.source)
-            hint = "check it first, as in 'if ... is not None'"
-            yield CodeProblem(Kind.NONE, f"this may be None: {reason}", span, hint)
+    if _expects_none(function):
+        return
+    seen = set(_tested_names(function, scope))
+    for node in nodes:
+        for used in needed_values(node, scope):
+            reason, name = None, used.id if isinstance(used, ast.Name) else ""
+            if name and name not in seen:
+                reason = reasons.get(name)
+            elif isinstance(used, ast.Call):
+                reason = _reason(used, scope)
+                name = ast.unparse(used) if reason is not None else ""
+            if reason is not None and name not in seen and _is_certain(node, reason):
+                seen.add(name)
+                span = span_of(used, scope.home.source)
+                hint = "check it first, as in 'if ... is not None'"
+                yield CodeProblem(Kind.NONE, f"this may be None: {reason}", span, hint)
+
+
+_MISSING_KEY = "'get' returns None for a missing key"
+
+
+def _has_direct_use(node: ast.AST) -> bool:
+    """Return whether a statement may use what a call returns directly."""
+    match node:
+        case ast.Attribute(value=ast.Call()) | ast.Subscript(value=ast.Call()):
+            return True
+        case ast.Assign(targets=[ast.Tuple() | ast.List()], value=ast.Call()):
+            return True
+        case ast.Call(args=arguments):
+            return any(isinstance(item, ast.Call) for item in arguments)
+        case _:
+            return False
+
+
+def _is_certain(node: ast.AST, reason: str) -> bool:
+    """Return whether a use needs a value, also one of a dict that may have all keys."""
+    return reason != _MISSING_KEY or isinstance(node, ast.Attribute | ast.Subscript)
 
 
 def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
@@ -71,7 +94,7 @@ def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
     match scope.type_of(call.func):
         case CollectionMethod(owner=owner, name="get") if owner.python is dict:
             is_plain = len(call.args) == 1 and not call.keywords
-            return "'get' returns None for a missing key" if is_plain else None
+            return _MISSING_KEY if is_plain else None
         case BuiltinMethod(python=python, name=method) if python is re.Pattern:
             is_known = method in _MATCHING and not _may_be_empty(_pattern(call.func, scope))
             return f"'{method}' returns None without a match" if is_known else None
@@ -152,7 +175,7 @@ def _is_none_at_first(value: ast.expr, function: Function) -> bool:
     outside = sum(id(node) not in in_loops for node in stored)
     tests = (node.test for node in nodes_of(function) if isinstance(node, ast.If))
     asked = (test for test in tests if id(test) not in in_loops)
-    return outside == len(starts) == 1 and not any(value.id in _direct(test) for test in asked)
+    return outside == len(starts) == 1 and not any(value.id in direct_names(test) for test in asked)
 
 
 def _is_none(node: ast.expr | None) -> bool:
@@ -177,10 +200,17 @@ def _expects_none(function: Function) -> bool:
     return False
 
 
-def _tested_names(function: Function) -> set[str]:
+def _tested_names(function: Function, scope: FunctionTypes) -> set[str]:
     """Return the names and calls whose values a function asks for."""
     found: set[str] = set()
-    for node in nodes_of(function):
+    nodes = nodes_of(function)
+    passed = {
+        id(item)
+        for node in nodes
+        if isinstance(node, ast.Call)
+        for item in passed_values(node, scope)
+    }
+    for node in nodes:
         match node:
             case (
                 ast.If(test=test)
@@ -188,35 +218,20 @@ def _tested_names(function: Function) -> set[str]:
                 | ast.IfExp(test=test)
                 | ast.Assert(test=test)
             ):
-                found |= _direct(test)
+                found |= direct_names(test, passed)
             case ast.BoolOp(values=values):
-                found.update(*map(_direct, values))
+                found.update(*(direct_names(value, passed) for value in values))
             case ast.UnaryOp() | ast.Compare():
-                found |= _direct(node)
+                found |= direct_names(node, passed)
             case ast.comprehension(ifs=tests):
-                found.update(*map(_direct, tests))
+                found.update(*(direct_names(test, passed) for test in tests))
             case ast.NamedExpr(target=ast.Name(id=name)):
                 found.add(name)
             case ast.Match(subject=subject):
-                found |= _direct(subject)
+                found |= direct_names(subject)
             case ast.Call(args=arguments):  # another function may ask
-                found.update(item.id for item in arguments if isinstance(item, ast.Name))
-    return found
-
-
-def _direct(test: ast.expr) -> set[str]:
-    """Return the names in a test, and its calls, but not those whose attributes it reads."""
-    owners: set[int] = set()
-    found: set[str] = set()
-    for node in walk([test]):
-        if isinstance(node, ast.Attribute | ast.Subscript):
-            owners.add(id(node.value))
-        if id(node) in owners:
-            continue
-        if isinstance(node, ast.Name):
-            found.add(node.id)
-        elif isinstance(node, ast.Call):
-            found.add(ast.unparse(node))
+                names = (item for item in arguments if isinstance(item, ast.Name))
+                found.update(item.id for item in names if id(item) not in passed)
     return found
 
 

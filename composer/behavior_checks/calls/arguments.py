@@ -228,7 +228,7 @@ def method_signature(python: type, name: str) -> Signature | None:
 #: Modules of the standard library whose functions have signatures.
 _LIBRARY = frozenset(
     {"bisect", "colorsys", "copy", "glob", "heapq", "json", "operator", "os.path", "random"}
-    | {"shutil", "statistics", "struct", "textwrap"}
+    | {"statistics", "struct", "textwrap"}
 )
 _OF_FIELD = frozenset(inspect.signature(dataclasses.field).parameters)
 _BY_NAME: Mapping[str, Signature] = {

@@ -43,9 +43,8 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
         return
     signature = library_signature(name)
     if signature is not None:
-        found = list(call_problems(call, signature, scope))
-        found = found or list(library_argument_problems(call, signature, scope))
-        yield from found
+        problems = list(call_problems(call, signature, scope))
+        yield from problems or library_argument_problems(call, signature, scope)
     if name == "time.sleep" or name.startswith("math."):
         takes_numbers = name not in _OF_ITERABLES
         for argument in call.args:

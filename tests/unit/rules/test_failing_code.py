@@ -33,6 +33,15 @@ from tests.unit.support.checking import quoted
          "unknown-field", "w"),
         ("p = Point()\n[p.z for p in self.parameters.names]", "unknown-field", "z"),
         ("p = Point()\n[p for p in self.parameters.names]\np.upper()", "unknown-field", "upper"),
+        # values that may be None
+        ("a, b = self.ends('a')", "unchecked-none", "self.ends('a')"),
+        ("found = self.ends('a')\na, b = found", "unchecked-none", "found"),
+        ("near = self.find('a')\nself.use(near)", "unchecked-none", "near"),
+        ("near = self.find('a')\nself.use(point=near)", "unchecked-none", "near"),
+        ("self.use(self.find('a'))", "unchecked-none", "self.find('a')"),
+        ("PoseStamped().pose.position = self.find('a')", "unchecked-none", "self.find('a')"),
+        ("longest = self.longest()\nString(data=longest)", "unchecked-none", "longest"),
+        ("longest = self.longest()\n'a' + longest", "unchecked-none", "longest"),
         # attributes that are only computed from themselves
         ("self.phase = self.phase + 0.1\nself.phase.real", "unknown-attribute", "phase"),
         # 'except'
@@ -59,6 +68,9 @@ def test_it_is_reported_once(statement: str, rule: str, text: str, tmp_path: Pat
         "try:\n    self.phase = self.phase + 1\nexcept AttributeError:\n    self.phase = 0",
         "try:\n    pass\nexcept (ValueError, (KeyError, OSError)):\n    pass",
         "a, b = 'ab'",
+        "found = self.ends('a')\nif found is not None:\n    a, b = found",
+        "near = self.find('a')\nif near:\n    self.use(near)",
+        "near = self.find('a')\nself.show(near)\nself.keep(near)\nself.look(near)",
         "p = Point()\n[p.upper() for p in self.parameters.names]\np.x",
         "p = Point()\n[lambda p: p.upper() for p in Path().poses]\np.x",
         "[p.x for p in [q.pose.position for q in Path().poses]], [p for p in 'ab']",

@@ -127,6 +127,18 @@ class Code(Behavior):
     def find(self, name) -> Point | None:
         return Point() if name else None
 
+    def use(self, point: Point) -> float:
+        return point.x
+
+    def ends(self, name) -> tuple[float, float] | None:
+        return (0.0, 1.0) if name else None
+
+    def look(self, point: Point) -> float:
+        return point.x if point else 0.0
+
+    def show(self, point: Point | None):
+        self.shown = point
+
     def longest(self):
         found = None
         for name in self.parameters.names:
