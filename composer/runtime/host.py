@@ -305,6 +305,7 @@ class Host:
         return problem
 
     def _on_older_instance(self, namespace: str, instance: Instance) -> None:
+        self._node_set.leave_others()
         if not self._main_queue.stopping:
             self._fail(str(already_running(namespace, instance.host, instance.pid)))
 

@@ -43,6 +43,7 @@ class ExternalNode(OutsideNode):
         self._presence = NodePresence(self._manager, model)
         self._remote: RemoteLifecycle | None = None
         self._is_lost = False  # it disappeared, and its return has not been reported
+        self._is_left = False
         self._timer = self.loop.call_every(_PERIOD_S, self._check)
 
     @property
@@ -59,7 +60,13 @@ class ExternalNode(OutsideNode):
     def _is_managed(self) -> bool:
         return self._external.lifecycle is LifecycleKind.MANAGED
 
+    def leave(self) -> None:
+        """Leave it in its state from now on: another system uses it. Thread-safe."""
+        self._is_left = True
+
     async def _work(self, transition: str) -> None:
+        if self._is_left:
+            return
         if self._is_managed and transition != "shutdown":
             await self._work_managed(transition)
         elif transition == "activate":

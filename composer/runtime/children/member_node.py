@@ -170,8 +170,8 @@ class MemberNode(OutsideNode):
         return not self._is_moving and self._reported not in (INACTIVE, ACTIVE)
 
     async def _request(self, transition: str) -> None:
-        is_left = transition == "shutdown" and self._process.pid is None
-        if is_left or self._reported in _DONE[transition]:
+        is_kept = transition == "shutdown" and self._process.pid is None
+        if is_kept or self._process.is_left or self._reported in _DONE[transition]:
             return  # a process that was not started here may be used again
         goal, reported = GOALS[transition], Future[None]()
         self._awaited = goal, reported

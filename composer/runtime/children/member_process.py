@@ -99,6 +99,7 @@ class MemberProcess:
         self._refused_s = -math.inf  # when another process last reported, not the child
         self._starting: Future[None] | None = None
         self._is_ending = False
+        self._belongs_to_another = False
         manager = f"{self._name}/{NAME}"
         service = f"{manager}/{CHANGE_STATES}"
         self.requests = MemberRequests(context.manager, context.loop, service, self._on_figures)
@@ -120,6 +121,11 @@ class MemberProcess:
     def pid(self) -> int | None:
         """Its process id, if it was started here."""
         return None if self._life is None or self._life.child is None else self._life.child.pid
+
+    @property
+    def is_left(self) -> bool:
+        """Whether it was not started here, and its nodes are to stay as they are."""
+        return self._belongs_to_another and self.pid is None
 
     @property
     def is_absent(self) -> bool:
@@ -144,9 +150,13 @@ class MemberProcess:
         """Whether it certainly runs: it reports, or holds the instance lock on this computer."""
         return (self._life is not None and self._life.is_up) or is_held(self._name)
 
+    def leave(self) -> None:
+        """Leave its nodes as they are, unless it was started here. Thread-safe."""
+        self._belongs_to_another = True
+
     def keep_goals(self, goals: str) -> None:
         """Let the process keep the goals of the system."""
-        if self._life is not None and self._life.is_up:
+        if self._life is not None and self._life.is_up and not self.is_left:
             self.requests.keep(goals)
 
     def ask_for_figures(self) -> None:
@@ -191,8 +201,8 @@ class MemberProcess:
         Raises ProcessUnavailable if the process does not run; so does the future if it ends.
         """
         life = self._life
-        if life is None or life.lost:
-            how = "does not run" if life is None else life.lost
+        if life is None or not life.is_up:
+            how = "does not run" if life is None else life.lost or "has not reported yet"
             raise ProcessUnavailable(f"{self} {how}")
         result = self.requests.request(node, transition, after)
         result.add_done_callback(partial(self._on_response, life, node))

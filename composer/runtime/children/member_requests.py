@@ -22,7 +22,7 @@ from rclpy.node import Node as RosNode
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.ros.graph import participant, servers_of
-from composer.runtime.ros.manager_protocol import FIGURES, GOALS, LAST_STEPS, STEPS
+from composer.runtime.ros.manager_protocol import FIGURES, GOALS, LAST_STEPS, PARTICIPANT, STEPS
 
 _MAX_STEPS = 500  # per request; a service takes up to 1000
 _MAX_REQUESTS = 8
@@ -217,9 +217,10 @@ class MemberRequests:
         )
         name = LAST_STEPS if self.are_last else STEPS
         parameters = [Parameter(name=name, value=value)]
-        if sent.goals:
-            text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=sent.goals)
-            parameters.append(Parameter(name=GOALS, value=text))
+        for key, text in ((PARTICIPANT, self._participant), (GOALS, sent.goals)):
+            if text:
+                string = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=text)
+                parameters.append(Parameter(name=key, value=string))
         if sent.figures:
             yes = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True)
             parameters.append(Parameter(name=FIGURES, value=yes))

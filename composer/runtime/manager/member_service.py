@@ -19,7 +19,14 @@ from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
-from composer.runtime.ros.manager_protocol import CHANGE_STATES, CREATE, FIGURES, GOALS, LAST_STEPS
+from composer.runtime.ros.manager_protocol import (
+    CHANGE_STATES,
+    CREATE,
+    FIGURES,
+    GOALS,
+    LAST_STEPS,
+    PARTICIPANT,
+)
 
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
@@ -49,9 +56,13 @@ class MemberCallbacks:
 class MemberService:
     """The service ``change_states``."""
 
-    def __init__(self, node: Node, loop: EventLoop, callbacks: MemberCallbacks) -> None:
+    def __init__(
+        self, node: Node, loop: EventLoop, callbacks: MemberCallbacks, participant: str
+    ) -> None:
+        """``participant`` is that of the process, as it reports it."""
         self._loop = loop
         self._callbacks = callbacks
+        self._participant = participant
         self._running: dict[str, Future[TransitionOutcome]] = {}  # by node, the last one requested
         service = node.create_service(limited(SetParameters), f"~/{CHANGE_STATES}", unused_callback)
         loop.add_service(service, self._on_request)
@@ -59,8 +70,13 @@ class MemberService:
     def _on_request(self, request: Any, reply: Reply) -> None:
         if isinstance(request, TooLarge):
             reply(SetParameters.Response())
-        else:
+        elif self._is_meant(request):
             self._loop.run_task(self._change_states(request, reply))
+
+    def _is_meant(self, request: Any) -> bool:
+        """Return whether a request is not for another process of the same name."""
+        meant = [item.value.string_value for item in request.parameters if item.name == PARTICIPANT]
+        return meant in ([], [self._participant])
 
     async def _change_states(self, request: Any, reply: Reply) -> None:
         """Run all steps of a request, at the same time unless they wait for each other."""

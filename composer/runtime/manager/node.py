@@ -187,7 +187,7 @@ class ManagerNode:
                 status.keep_goals,
                 self._figures_text,
             )
-            MemberService(self._node, self._loop, callbacks)
+            MemberService(self._node, self._loop, callbacks, self._reported_participant)
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
         self._graph = GraphObserver(self._node, own_participant)

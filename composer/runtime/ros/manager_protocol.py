@@ -20,13 +20,16 @@ CHANGE_STATE = "change_state"
 #: requested of the whole system, which the process keeps and reports: see ``plan/system_goals.py``.
 #: The step ``create /arm`` creates a finalized node again, which is unconfigured then.
 #: With the parameter ``figures``, a last result has the timings of callbacks and chains as its
-#: reason, as JSON: see ``metrics/diagnostics.py``.
+#: reason, as JSON: see ``metrics/diagnostics.py``. The parameter ``participant`` has the one that
+#: is meant, as it reports itself: another process of the same name, on another computer for
+#: example, receives the request as well, but neither follows nor answers it.
 CHANGE_STATES = "change_states"
 STEPS = "steps"
 CREATE = "create"
 LAST_STEPS = "last_steps"
 GOALS = "goals"
 FIGURES = "figures"
+PARTICIPANT = "participant"
 #: rcl_interfaces/srv/SetParametersAtomically, with the full names of nodes in the parameter
 #: ``nodes``: the only standard service that takes names and returns a reason.
 RESTART = "restart"

@@ -243,6 +243,13 @@ class NodeSet:
             return f"cannot be created again: {describe(error)}"
         return None
 
+    def leave_others(self) -> None:
+        """Leave nodes alone that were not started here. Thread-safe."""
+        self.other_processes.leave()
+        for node in tuple(self.nodes.values()):
+            if isinstance(node, ExternalNode):
+                node.leave()
+
     def limit_end(self, end_s: float) -> None:
         """Pass on that the system shuts down until ``end_s`` (monotonic)."""
         for node in self.nodes.values():

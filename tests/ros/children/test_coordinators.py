@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.runtime.host_options import HostOptions
+from composer.runtime.manager.other_instances import Instance
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
@@ -68,6 +69,13 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
             assert not moves  # it was active all the time
             assert system.node("camera").activations == 2
+            # Refused, because of one on another computer: the nodes belong to that.
+            older = Instance("elsewhere", 4321, 3600.0)
+            system.host._on_older_instance("/lab/robot", older)
+            assert "already runs" in system.end().reason
+            found.clear()
+            wait_until(lambda: len(found) > 10, "messages of nodes that are still active")
+            assert not moves
         assert all(member.poll() is None for member in members)
     finally:
         for member in members:

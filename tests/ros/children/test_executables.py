@@ -15,6 +15,7 @@ from lifecycle_msgs.srv import GetState
 from std_msgs.msg import String
 
 from composer.runtime.host_options import HostOptions
+from composer.runtime.manager.other_instances import Instance
 from composer.runtime.supervision.events import (
     BroughtUp,
     NodeFailed,
@@ -295,6 +296,25 @@ def test_an_absent_external_node_fails_the_bring_up(tmp_path: Path) -> None:
         assert system.end().exit_code == 1
     reason = str(system.reported(RollingBack)[0])
     assert "it has no publisher /scan, service /reset after 0.3 s" in reason
+
+
+def test_a_refused_system_leaves_an_external_node_as_it_is(tmp_path: Path, peer: Peer) -> None:
+    """Another computer runs the system already, with the same node."""
+    text = "{system: robot, nodes: {some_managed_driver: {external: {lifecycle: managed}}}}"
+    driver, state = (
+        [sys.executable, PROGRAMS / "managed_driver.py"],
+        "/some_managed_driver/get_state",
+    )
+    with subprocess.Popen(driver, stderr=subprocess.DEVNULL) as process:
+        try:
+            with running(text, tmp_path) as system:
+                assert peer.call(GetState, state).current_state.label == "active"
+                older = Instance("elsewhere", 4321, 3600.0)
+                system.host._on_older_instance("/robot", older)
+                assert "already runs" in system.end().reason
+                assert peer.call(GetState, state).current_state.label == "active"
+        finally:
+            process.kill()
 
 
 def start_external(folder: Path) -> subprocess.Popen[Any]:

@@ -28,6 +28,7 @@ class Process:
 
     moved_s = 0.0
     pid = 1
+    is_left = False
 
     def __init__(self) -> None:
         self.killed = ""

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 
 from composer.model import ExecutorKind
-from composer.runtime.children import member_requests
+from composer.runtime.children import member_process, member_requests
+from composer.runtime.children.child_processes import Child, ChildProcesses
+from composer.runtime.children.kept_goals import KeptGoals
+from composer.runtime.children.member_context import MemberContext, ProcessUnavailable
+from composer.runtime.children.member_process import MemberProcess
 from composer.runtime.children.member_requests import MemberRequests
 from composer.runtime.executors.loop import Reply
+from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.ros.graph import participant, servers_of
-from composer.runtime.ros.manager_protocol import FIGURES, GOALS
+from composer.runtime.ros.manager_protocol import CHANGE_STATES, FIGURES, GOALS
+from tests.ros.support.in_process import system_of
 from tests.ros.support.loops import Bench, bench, wait_until
 
 SERVICE = "/robot/acting/manager/change_states"
@@ -105,6 +113,53 @@ def test_timings_and_goals_need_no_steps() -> None:
         assert (process.goals, process.asked, process.steps) == (["1 stopped active"], 1, [])
 
 
+def test_a_process_that_is_not_meant_neither_follows_nor_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(member_requests, "_DISCOVERED_WITHIN_S", 0.0)
+    asked: list[str] = []
+
+    def nothing(*_: object) -> Any:
+        asked.append("")
+
+    with bench(ExecutorKind.EVENTS) as on:
+        callbacks = MemberCallbacks(dict, *[nothing] * 6)
+        MemberService(on.node, on.loop, callbacks, MEANT)
+        service = on.node.resolve_service_name(f"~/{CHANGE_STATES}")
+        requests = MemberRequests(on.node, on.loop, service, nothing)
+        on.loop.run(lambda: requests.on_report(KILLED, "goals"))
+        others = on.loop.run(lambda: requests.request("/camera", "activate"))
+        on.loop.run(lambda: requests.on_report(MEANT, None))
+        own = on.loop.run(lambda: requests.request("/camera", "activate"))
+        wait_until(own.done, "the response")
+        assert own.result().reason == "the process has no such node"
+        assert not others.done()
+        assert not asked
+        others.cancel()
+
+
+def test_a_process_that_has_not_reported_is_asked_for_nothing(tmp_path: Path) -> None:
+    """Another one, of another computer, would follow the request."""
+    text = "{system: robot, processes: {acting: {nodes: [arm]}}, nodes: {arm: {}, leg: {}}}"
+    system = system_of(text, tmp_path)
+    with bench(ExecutorKind.EVENTS) as on:
+        context = MemberContext(
+            loop=on.loop,
+            manager=on.node,
+            children=ChildProcesses(),
+            namespace="/robot",
+            command=("unused",),
+            goals=KeptGoals(system),
+            write_log=lambda *_: None,
+        )
+        process = MemberProcess(system.processes[0], context)
+        process._life = member_process._Life(child=Child(1))
+        with pytest.raises(ProcessUnavailable, match="has not reported yet"):
+            process.request("/arm", "shutdown")
+        process.close()
+
+
+MEANT = "11" * 12
 KILLED = "00" * 12
 
 
