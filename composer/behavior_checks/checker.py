@@ -48,6 +48,7 @@ from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import attribute_span, span_of
 from composer.behavior_types.expressions.annotations import annotated
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.objects import annotation_of
 from composer.behavior_types.hosted import HostedTypes
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.handlers import Handler
@@ -55,6 +56,7 @@ from composer.behavior_types.syntax.bindings import assigned_pairs, nodes_of
 from composer.behavior_types.values import (
     Collection,
     OwnClass,
+    OwnObject,
     Parameters,
     Pending,
     Ports,
@@ -247,8 +249,12 @@ class _FunctionChecker:
                 yield from pending_value(value, self.function, self.scope)
             return
         owner = self.scope.type_of(target.value)
-        if isinstance(owner, Self):
-            expected = self.types.annotation(target.attr)
+        if isinstance(owner, Self | OwnObject):
+            expected = (
+                self.types.annotation(target.attr)
+                if isinstance(owner, Self)
+                else annotation_of(self.scope, owner.of, target.attr)
+            )
             wrong = argument_problem(value, self.scope.type_of(value), expected, self.scope.type_of)
             if wrong is not None:
                 problem = f"attribute '{target.attr}': {wrong}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Callable
 from inspect import isabstract
 
@@ -217,6 +218,7 @@ def kind_of(type_: Value) -> str | None:
 
 _NUMBERS = ("enum.IntEnum", "enum.IntFlag", "int")
 _KINDS: dict[type, str | None] = {
+    Counter: "dict",
     dict: "dict",
     bytes: "bytes",
     bytearray: None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import deque
 from collections.abc import Iterator
 
 from composer.behavior_checks.calls.arguments import method_signature
@@ -12,7 +13,8 @@ from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.scalars import is_text
-from composer.behavior_types.values import Collection, Parameters, Ports, Value
+from composer.behavior_types.syntax.own_classes import defines
+from composer.behavior_types.values import Collection, OwnObject, Parameters, Ports, Value
 from composer.field_types import STRING
 from composer.interfaces import FieldType, Message
 
@@ -20,6 +22,8 @@ from composer.interfaces import FieldType, Message
 _ADDING = frozenset({"add", "append", "appendleft", "insert"})
 #: The methods of dicts and of sets that take a key first.
 _KEYED = frozenset({"get", "pop", "setdefault"})
+#: The methods that fail without an element that equals their first argument.
+_SEARCHING = frozenset({"index", "remove"})
 _HASHING = frozenset({"add", "discard", "remove"})
 
 
@@ -38,8 +42,21 @@ def method_problems(
         yield from key_problems(call.args[0], owner, scope)
     if name in _ADDING and owner.python is not dict:
         yield from _stored(call.args[-1], owner.element, f"'{name}'", scope)
+    elif name in _SEARCHING and not _may_equal(owner, scope):
+        yield from _stored(call.args[0], owner.element, f"'{name}' finds nothing", scope)
     elif name == "join" and owner.python is str:
         yield from _joined(call.args[0], scope)
+
+
+def _may_equal(owner: Collection, scope: FunctionTypes) -> bool:
+    """Return whether an element may be equal to a value of another class."""
+    if owner.python not in (list, deque, tuple):
+        return True
+    if not isinstance(owner.element, OwnObject):
+        return False
+    of = owner.element.of
+    classes = (of, *scope.owner.project_classes.derived(of))
+    return any(defines(item, "__eq__") for item in classes)
 
 
 def key_problems(node: ast.expr, owner: Collection, scope: FunctionTypes) -> Iterator[CodeProblem]:

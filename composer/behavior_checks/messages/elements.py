@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
+from composer.behavior_checks.messages.lengths import length_of
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.spans import span_of
@@ -53,13 +54,20 @@ def element_problems(
                 yield CodeProblem(Kind.INDEX, message, span, lines=lines)
 
 
-def size_problem(node: ast.expr, expected: FieldType) -> str | None:
+def size_problem(node: ast.expr, expected: FieldType, scope: FunctionTypes) -> str | None:
     """Return why a list of a known length does not fit a field, None if it may fit."""
     size, bound = expected.array_size, expected.array_bound
-    length = _length(node) if size is not None or bound is not None else None
-    if length is None or length == size or (bound is not None and length <= bound):
+    if size is None and bound is None:
         return None
-    return f"{counted(length)} where {described(expected)} is expected"
+    least, most = length_of(node, scope)
+    if size is not None and most is not None and most < size:
+        few = "" if least == most else "at most "
+        return f"{few}{counted(most)} where {described(expected)} is expected"
+    limit = bound if size is None else size
+    if limit is None or least <= limit:
+        return None
+    many = "" if least == most else "at least "
+    return f"{many}{counted(least)} where {described(expected)} is expected"
 
 
 def counted(count: int) -> str:
@@ -85,14 +93,3 @@ def _looks_first(function: Function) -> bool:
         isinstance(node, ast.Try) or (isinstance(node, ast.Name) and node.id == "len")
         for node in nodes_of(function)
     )
-
-
-def _length(node: ast.expr) -> int | None:
-    match node:
-        case ast.List(elts=items) | ast.Tuple(elts=items):
-            return None if any(isinstance(item, ast.Starred) for item in items) else len(items)
-        case ast.BinOp(left=ast.List() | ast.Tuple() as items, op=ast.Mult(), right=times):
-            length, count = _length(items), integer_constant(times)
-            return length * max(count, 0) if length is not None and count is not None else None
-        case _:
-            return None

@@ -89,7 +89,7 @@ class ValueChecker:
                 return
         problem = value_problem(node, found, expected, self.scope.owner.interfaces)
         if problem is None and isinstance(expected, FieldType):
-            size = size_problem(node, expected)
+            size = size_problem(node, expected, self.scope)
             problem = (size, None) if size is not None else None
         if problem is not None:
             yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])

@@ -9,6 +9,7 @@ from composer.behavior_checks.fitting import shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.libraries.standard_types import is_asynchronous
 from composer.behavior_types.scalars import is_byte, is_number, is_text
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
@@ -70,7 +71,11 @@ def _iterated(
     node: ast.expr, scope: FunctionTypes, what: str = "iterated over"
 ) -> Iterator[CodeProblem]:
     found = scope.type_of(node)
-    if is_scalar(found):
+    if is_asynchronous(found):
+        span = span_of(node, scope.home.source)
+        problem = "an async generator cannot be iterated over by 'for'"
+        yield CodeProblem(Kind.VALUE, problem, span, "write 'async for'")
+    elif is_scalar(found):
         problem = f"{shown(found)} cannot be {what}"
         yield CodeProblem(Kind.VALUE, problem, span_of(node, scope.home.source))
 

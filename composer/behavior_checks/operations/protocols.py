@@ -12,8 +12,10 @@ from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import is_stub
 from composer.behavior_source.spans import span_of
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
+from composer.behavior_types.libraries.standard_types import is_asynchronous
 from composer.behavior_types.scalars import is_scalar, is_text
 from composer.behavior_types.syntax.own_classes import (
     all_fields,
@@ -34,8 +36,9 @@ from composer.behavior_types.values import (
 )
 from composer.interfaces import FieldType, Message
 
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 #: The nodes that are checked here.
-CHECKED = (ast.Await, ast.Subscript, ast.With)
+CHECKED = (ast.AsyncFor, ast.Await, ast.Expr, ast.Subscript, ast.With)
 _OF_ITEMS: Mapping[type[ast.expr_context], str] = {
     ast.Load: "__getitem__",
     ast.Store: "__setitem__",
@@ -51,6 +54,16 @@ def protocol_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProbl
         case ast.With(items=items):
             for item in items:
                 yield from _entered(item.context_expr, scope)
+        case ast.AsyncFor(iter=iterated):
+            kind = _kind(scope.type_of(iterated), "__aiter__", scope)
+            if kind is not None:
+                span = span_of(iterated, scope.home.source)
+                yield CodeProblem(Kind.VALUE, f"{kind} is not asynchronous", span, "write 'for'")
+        case ast.Expr(value=ast.Call(func=function) as call):
+            called = _node_of(scope.type_of(function))
+            if called is not None and not called.decorator_list and _yields(called):
+                message = f"'{called.name}' is a generator: nothing happens without a loop over it"
+                yield CodeProblem(Kind.UNUSED, message, span_of(call, scope.home.source))
         case ast.Subscript():
             yield from _subscripted(node, scope)
 
@@ -62,7 +75,10 @@ def _awaited(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
         message = f"the function '{name}' cannot be awaited"
         yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
         return
-    if isinstance(node, ast.Call):
+    if is_asynchronous(found):
+        message = "an async generator cannot be awaited"
+        yield CodeProblem(Kind.VALUE, message, span, "write 'async for'")
+    elif isinstance(node, ast.Call):
         function = scope.type_of(node.func)
         name = _plain_function(function, found, scope)
         if name:
@@ -124,6 +140,11 @@ def _subscripted(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProb
         name = node.slice.value if isinstance(node.slice, ast.Constant) else None
         hint = next((f"write .{field.name}" for field in fields if field.name == name), None)
     yield CodeProblem(Kind.VALUE, f"{kind} {problem}", span, hint)
+
+
+def _yields(function: Function) -> bool:
+    inside = walk(function.body, closed=(*_FUNCTIONS, ast.ClassDef))
+    return any(isinstance(node, ast.Yield | ast.YieldFrom) for node in inside)
 
 
 def _function_name(found: Value) -> str:

@@ -17,13 +17,17 @@ from composer.behavior_source.flow import (
 )
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.syntax import name_span
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.annotations import allows_none, annotated
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.handlers import Handler
+from composer.behavior_types.libraries.standard_types import ITERATORS
 from composer.behavior_types.scalars import is_float, is_integer
 from composer.behavior_types.values import NONE, Collection, OwnObject, Pending, Value
 from composer.field_types import ANYTHING, BOOL
 from composer.interfaces import FieldType, Message
+
+_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
 def return_problems(
@@ -87,17 +91,35 @@ def _without_end(function: Function, scope: FunctionTypes, expected: Value) -> C
 def _wrong(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
     """Yield the returned values that contradict the annotation."""
     if _yields(function):
+        yield from _wrong_elements(function, scope, expected)
         return
     for value in returned_values(function):
         found = scope.type_of(value)
         if isinstance(found, Pending):
             continue
         problem = argument_problem(value, found, expected, scope.type_of)
+        if problem is None and _is_iterator(found) and _is_concrete(expected):
+            problem = f"{shown(found)} where {shown(expected)} is expected"
         if problem is None and is_float(found) and (is_integer(expected) or expected == BOOL):
             problem = f"{shown(found)} where {shown(expected)} is expected"
         if problem is not None:
             message = f"the result of '{function.name}': {problem}"
             yield CodeProblem(Kind.RETURN, message, span_of(value, scope.home.source))
+
+
+def _wrong_elements(
+    function: Function, scope: FunctionTypes, expected: Value
+) -> Iterator[CodeProblem]:
+    """Yield the values that a generator yields although its annotation names others."""
+    if not isinstance(expected, Collection):
+        return
+    for node in walk(function.body, closed=_SCOPES):
+        if isinstance(node, ast.Yield) and node.value is not None:
+            found = scope.type_of(node.value)
+            problem = argument_problem(node.value, found, expected.element, scope.type_of)
+            if problem is not None:
+                message = f"'{function.name}' yields {problem}"
+                yield CodeProblem(Kind.RETURN, message, span_of(node.value, scope.home.source))
 
 
 def _unused(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -109,6 +131,15 @@ def _unused(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
             yield CodeProblem(
                 Kind.UNUSED, message, span, "publish it: self.publishers.NAME.publish"
             )
+
+
+def _is_iterator(found: Value) -> bool:
+    """Return whether a value can be iterated over only once."""
+    return isinstance(found, Collection) and found.python in ITERATORS
+
+
+def _is_concrete(expected: Value) -> bool:
+    return isinstance(expected, Collection) and expected.python in (dict, list, set, tuple)
 
 
 def _yields(function: Function) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 import warnings
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter, deque
+from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
 from types import GeneratorType
 
 from composer.behavior_source import Module
@@ -41,14 +41,20 @@ _COLLECTIONS: dict[str, type] = {
     "tuple": tuple,
 }
 _GENERIC: dict[str, type] = {
+    "collections.Counter": Counter,
     "collections.OrderedDict": dict,
     "collections.defaultdict": dict,
     "typing.DefaultDict": dict,
     "collections.deque": deque,
+    "collections.abc.AsyncGenerator": AsyncIterator,
+    "collections.abc.AsyncIterator": AsyncIterator,
     "collections.abc.Generator": GeneratorType,
     "collections.abc.Iterable": Iterable,
     "collections.abc.Iterator": Iterator,
     "collections.abc.Sequence": Sequence,
+    "typing.AsyncGenerator": AsyncIterator,
+    "typing.AsyncIterator": AsyncIterator,
+    "typing.Counter": Counter,
     "typing.Generator": GeneratorType,
     "typing.Iterable": Iterable,
     "typing.Iterator": Iterator,
@@ -107,7 +113,9 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
 def _collection(python: type, parts: list[Value], *, has_length: bool = True) -> Collection:
     if python is dict and len(parts) > 1:
         return Collection(dict, parts[1], parts[0])
-    if python is GeneratorType or (python is tuple and not has_length):
+    if python is Counter:
+        return Collection(Counter, key=parts[0])
+    if python in (GeneratorType, AsyncIterator) or (python is tuple and not has_length):
         return Collection(python, parts[0])
     items = tuple(parts) if python is tuple else None
     return Collection(python, join_all(parts), items=items)

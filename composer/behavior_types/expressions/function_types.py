@@ -18,6 +18,7 @@ from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.expressions.results import awaited, result_of
 from composer.behavior_types.libraries.rclpy_api import rclpy_value
 from composer.behavior_types.libraries.standard_types import exception_type, sliced
+from composer.behavior_types.scalars import is_text
 from composer.behavior_types.syntax.bindings import Binding, Bindings, How, reads_attribute
 from composer.behavior_types.syntax.lineage import class_named
 from composer.behavior_types.syntax.literals import constant_type, integer_constant
@@ -115,9 +116,10 @@ class FunctionTypes:
         """Return the full name of an imported or built-in function, or ""."""
         name = dotted(function)
         full = self.global_name(name) if name else ""
-        is_builtin = not full and name.isidentifier() and not self.is_local(name)
-        is_builtin = is_builtin and not self.home.may_have(name)
-        return name if is_builtin and name not in hides(self.home) else full
+        first = "dict" if name == "dict.fromkeys" else name
+        is_builtin = not full and first.isidentifier() and not self.is_local(first)
+        is_builtin = is_builtin and not self.home.may_have(first)
+        return name if is_builtin and first not in hides(self.home) else full
 
     def is_local(self, name: str) -> bool:
         """Return whether the function itself binds ``name``."""
@@ -270,6 +272,8 @@ class FunctionTypes:
         if isinstance(owner, Collection) and owner.items is not None:
             count = len(owner.items)
             return owner.items[position] if -count <= position < count else ANYTHING
+        if is_text(owner):
+            return ANYTHING  # it is hardly unpacked on purpose
         return self.element(owner)
 
     def normal(self, type_: FieldType) -> Value:

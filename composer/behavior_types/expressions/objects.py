@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
+from types import AsyncGeneratorType
 from typing import TYPE_CHECKING
 
 from composer.behavior_source import Function, Module
@@ -69,6 +70,25 @@ def attribute_of_object(scope: FunctionTypes, owner: OwnObject, name: str) -> Va
     return ANYTHING if is_rclpy(of.home) else _assigned_in(scope, of, name)
 
 
+def annotation_of(scope: FunctionTypes, own: OwnClass, name: str) -> Value:
+    """Return the type that a class annotates an attribute of its objects with, or ANYTHING."""
+    for known in lineage(own).classes if not is_rclpy(own.home) else ():
+        for statement in known.definition.node.body:
+            match statement:
+                case ast.AnnAssign(target=ast.Name(id=found), annotation=annotation):
+                    if found == name:
+                        return scope.annotated(annotation, known.home)
+        for method in known.definition.methods:
+            if method.node is None:
+                continue
+            if method.name == name:  # a property
+                return ANYTHING
+            for binding in bindings_of(method.node).attributes.get(name, ()):
+                if binding.how is How.ANNOTATION and binding.expression is not None:
+                    return scope.annotated(binding.expression, known.home)
+    return ANYTHING
+
+
 def value_of_member(own: OwnClass) -> Value:
     """Return the type of the value of a member of an enumeration of constants."""
     if is_rclpy(own.home) or {method.name for method in own.definition.methods if method.node}:
@@ -108,7 +128,7 @@ def _assigned_to(scope: FunctionTypes, own: OwnClass, name: str) -> Value:
         for statement in known.definition.node.body:
             match statement:
                 case ast.Assign(targets=[ast.Name(id=target)], value=value) if target == name:
-                    plain.append((_of_constant(value), How.VALUE))
+                    plain.append((_of_constant(value, scope, known.home), How.VALUE))
         for method in known.definition.methods:
             if method.node is None:
                 continue
@@ -198,7 +218,7 @@ def attribute_of_class(scope: FunctionTypes, owner: OwnClass, name: str) -> Valu
                 case ast.Assign(targets=[ast.Name(id=found)], value=value) if found == name:
                     if is_enum:
                         return OwnObject(owner)
-                    return _of_constant(value)
+                    return _of_constant(value, scope, own.home)
                 case ast.AnnAssign(target=ast.Name(id=found), annotation=annotation, value=value):
                     if found == name and value is not None:
                         return scope.annotated(annotation, own.home)
@@ -207,8 +227,12 @@ def attribute_of_class(scope: FunctionTypes, owner: OwnClass, name: str) -> Valu
     return ANYTHING
 
 
-def _of_constant(node: ast.expr) -> Value:
-    return constant_type(node.value) if isinstance(node, ast.Constant) else ANYTHING
+def _of_constant(node: ast.expr, scope: FunctionTypes, home: Module) -> Value:
+    """Return the type of what the body of a class assigns, if it cannot change."""
+    if isinstance(node, ast.Constant):
+        return constant_type(node.value)
+    is_fixed = isinstance(node, ast.Tuple)
+    return scope.owner.at_module(home).type_of(node) if is_fixed else ANYTHING
 
 
 def _function_of_class(function: Function, own: OwnClass) -> Value:
@@ -277,8 +301,12 @@ def returned_by(
         result = inferred_result(inside, function)
     if not isinstance(function, ast.AsyncFunctionDef):
         return result
-    is_plain = is_plain and not any(isinstance(inner, ast.Yield) for inner in nodes_of(function))
-    return Pending(function.name, call, result) if is_plain else ANYTHING
+    if not is_plain:
+        return ANYTHING
+    if any(isinstance(inner, ast.Yield) for inner in nodes_of(function)):
+        element = result.element if isinstance(result, Collection) else ANYTHING
+        return Collection(AsyncGeneratorType, element)
+    return Pending(function.name, call, result)
 
 
 def has_plain_result(function: Function) -> bool:

@@ -9,10 +9,20 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeGuard
 
 from composer.behavior_types.libraries.numpy_types import ARRAY, array_operation
-from composer.behavior_types.libraries.rclpy_api import is_time, order_of_rclpy, time_arithmetic
+from composer.behavior_types.libraries.rclpy_api import (
+    is_rclpy,
+    is_time,
+    order_of_rclpy,
+    time_arithmetic,
+)
 from composer.behavior_types.scalars import is_float, is_integer, is_number, is_scalar, is_text
 from composer.behavior_types.syntax.lineage import NAMED_TUPLE, lineage
-from composer.behavior_types.syntax.own_classes import is_plain, known_attributes
+from composer.behavior_types.syntax.own_classes import (
+    defines,
+    is_enumeration,
+    is_plain,
+    known_attributes,
+)
 from composer.behavior_types.values import (
     NONE,
     Collection,
@@ -228,6 +238,8 @@ def order_problem(left: Value, operator: ast.cmpop, right: Value) -> str | None:
 def equality_problem(left: Value, right: Value) -> str | None:
     """Return why two values are never equal, None if they may be."""
     for first, second in ((left, right), (right, left)):
+        if isinstance(first, OwnObject) and _order(second) in _PLAIN and _equals_itself(first):
+            return f"a {first.of.definition.name} is never equal to {_order(second)}"
         if isinstance(first, Message) and (is_number(second) or is_text(second)):
             return f"{first.name} is never equal to {_order(second)}"
         if isinstance(first, OwnMethod | ModuleFunction) and _order(second) not in (
@@ -236,6 +248,16 @@ def equality_problem(left: Value, right: Value) -> str | None:
         ):
             return f"a function is never equal to {_order(second)}"
     return None
+
+
+_PLAIN = frozenset({"a dict", "a list", "a number", "a string", "a tuple"})
+
+
+def _equals_itself(value: OwnObject) -> bool:
+    """Return whether a value is a member of an enumeration, which equals nothing else."""
+    of = value.of
+    is_member = is_enumeration(of) and is_plain(of) and not is_rclpy(of.home)
+    return is_member and not defines(of, "__eq__")
 
 
 def _order(type_: Value) -> str:

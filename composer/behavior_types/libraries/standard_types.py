@@ -6,9 +6,9 @@ import builtins
 import importlib
 import itertools
 import re
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from types import GeneratorType
+from collections import Counter, deque
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from types import AsyncGeneratorType, GeneratorType
 
 from composer import behavior
 from composer.behavior_types.libraries.numpy_types import ARRAY, numpy_method_result, numpy_result
@@ -34,7 +34,7 @@ _VALUES, _KEYS, _ITEMS = (
 #: What can be iterated over once only, and has no length.
 ITERATORS = frozenset({GeneratorType, enumerate, filter, map, reversed, zip, itertools.cycle})
 #: What messages do not accept as an array.
-NO_SEQUENCES = ITERATORS | {dict, _VALUES, _ITEMS}
+NO_SEQUENCES = ITERATORS | {dict, Counter, _VALUES, _ITEMS}
 
 _MATH_TO_INTEGER = frozenset({"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "trunc"})
 _MATH_TO_BOOL = frozenset({"isclose", "isfinite", "isinf", "isnan"})
@@ -97,10 +97,16 @@ _OF_TEXT: Mapping[str, Value] = {
 _DERIVED_FROM = frozenset({BaseException, Exception})
 
 
+def is_asynchronous(type_: Value) -> bool:
+    """Return whether a value is iterated over by ``async for``."""
+    asynchronous = (AsyncGeneratorType, AsyncIterator)
+    return isinstance(type_, Collection) and type_.python in asynchronous
+
+
 def element_of(type_: Value) -> Value:
     """Return the type of what iterating over a value gives, as it is written in its type."""
     if isinstance(type_, Collection):
-        return type_.key if type_.python is dict else type_.element
+        return type_.key if issubclass(type_.python, dict) else type_.element
     if isinstance(type_, FieldType) and type_.is_array:
         return type_.element
     return STRING if is_text(type_) else ANYTHING
@@ -155,13 +161,25 @@ def _math(function: str) -> Value:
 
 def _dict(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
     source = arguments[0] if len(arguments) == 1 and not keywords else ANYTHING
-    if isinstance(source, Collection) and source.python is dict:
-        return source
+    if isinstance(source, Collection) and issubclass(source.python, dict):
+        return Collection(dict, source.element, source.key, is_empty=source.is_empty)
     item = element_of(source)
     if isinstance(item, Collection) and item.items is not None and len(item.items) == _PAIR:
         key, value = item.items
         return Collection(dict, value, key)
     return Collection(dict)
+
+
+def _counter(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
+    source = arguments[0] if len(arguments) == 1 and not keywords else ANYTHING
+    return Collection(Counter, key=element_of(source))
+
+
+def _from_keys(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    """Return the type of a call of ``dict.fromkeys``; None is the place of a value."""
+    keys = element_of(arguments[0]) if arguments else ANYTHING
+    value = arguments[1] if len(arguments) > 1 else NONE
+    return Collection(dict, ANYTHING if value is NONE else value, keys)
 
 
 def _default_dict(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
@@ -271,9 +289,11 @@ def _random(_: Sequence[Value], __: Mapping[str, Value]) -> Value:
 
 _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] = {
     "abs": _number,
+    "collections.Counter": _counter,
     "collections.OrderedDict": _dict,
     "collections.defaultdict": _default_dict,
     "dict": _dict,
+    "dict.fromkeys": _from_keys,
     "divmod": _divmod,
     "enumerate": _enumerate,
     "filter": _filter,
@@ -297,7 +317,7 @@ def method_result(owner: Collection, name: str, arguments: Sequence[Value]) -> V
     """Return the type of what a method of a collection or of a text returns."""
     if owner.python is str:
         return _OF_TEXT.get(name, ANYTHING)
-    if owner.python is dict:
+    if issubclass(owner.python, dict):
         return _of_dict(owner, name, arguments)
     if name in {"copy", "difference", "intersection"}:
         return owner
@@ -323,6 +343,8 @@ def _of_dict(owner: Collection, name: str, arguments: Sequence[Value]) -> Value:
             return join_all((owner.element, *arguments[1:]))
         case "copy":
             return owner
+        case "most_common" if owner.python is Counter:
+            return Collection(list, pair(owner.key, owner.element))
         case _:
             return ANYTHING
 

@@ -215,6 +215,12 @@ def _options(own: OwnClass) -> dict[str | None, ast.expr]:
     return {item.arg: item.value for node in decorators for item in getattr(node, "keywords", ())}
 
 
+def defines(owner: OwnClass, name: str) -> bool:
+    """Return whether a class of the project, or one that it is derived from, has a method."""
+    family = lineage(owner).classes
+    return any(method.name == name for own in family for method in own.definition.methods)
+
+
 def is_enumeration(owner: OwnClass, *bases: str) -> bool:
     """Return whether a class is an enumeration, derived from one of ``bases`` if given."""
     return not lineage(owner).others.isdisjoint(bases or ENUMS)

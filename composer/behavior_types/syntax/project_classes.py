@@ -9,6 +9,7 @@ from functools import cached_property
 from composer.behavior_source import Function, Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.traversal import walk
+from composer.behavior_types.syntax.bindings import is_class_method
 from composer.behavior_types.syntax.lineage import class_named, lineage
 from composer.behavior_types.syntax.own_classes import assigned_from_outside, is_enumeration
 from composer.behavior_types.values import OwnClass
@@ -61,6 +62,10 @@ class ProjectClasses:
         for module in self._modules:
             for name in set(_values(module.tree.body)) - {""}:
                 own = class_named(name, module)
+                if own is None:  # Class.method(...), where the method creates an object
+                    owner, _, method = name.rpartition(".")
+                    own = class_named(owner, module) if owner else None
+                    own = own if own is not None and _creates(own, method) else None
                 if own is not None:
                     found.add(own)
         return frozenset(found)
@@ -76,6 +81,15 @@ def _values(body: Sequence[ast.AST]) -> Iterator[str]:
             case ast.Raise(exc=exc):
                 found = [exc]
         yield from (dotted(item) for item in found if item is not None)
+
+
+def _creates(own: OwnClass, name: str) -> bool:
+    """Return whether a class method creates an object of its class by ``cls(...)``."""
+    for method in own.definition.methods:
+        if method.name == name and method.node is not None and is_class_method(method.node):
+            first = method.node.args.args[0].arg if method.node.args.args else ""
+            return first in set(_values(method.node.body))
+    return False
 
 
 def takes_object(function: Function) -> bool:

@@ -13,10 +13,16 @@ SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_m
 CODE = """\
 import abc
 import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator
 from contextlib import contextmanager
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass, field, replace
+from enum import Enum
 from functools import cached_property
 from typing import Iterator, NamedTuple
+
+from geometry_msgs.msg import PoseWithCovariance
+from std_msgs.msg import String
 
 TUPLE = (1.0, 2.0)
 
@@ -57,14 +63,55 @@ class Pair(NamedTuple):
     right: float = 1.0
 
 
+class Mode(Enum):
+    FAST = "fast"
+
+
+@dataclass
+class Task:
+    name: str
+    mode: Mode = Mode.FAST
+
+    @classmethod
+    def parse(cls, text: str) -> "Task":
+        return cls(text)
+
+    def renamed(self):
+        {inside}
+
+
+class Joints:
+    names = ("a", "b")
+
+    def __init__(self):
+        self.last: Task | None = None
+
+    def keep(self, task: Task):
+        {keep}
+
+
 class Code:
     def on_configure(self):
         self.square = Square()
         self.done = False
         self.names = {"a": 1.0}
+        self.joints = Joints()
+        self.task = Task.parse("a")
+        self.row = [0.0] * 6
+        self.counts: Counter[str] = Counter()
+        self.places = dict.fromkeys(Joints.names, 0.0)
 
     async def on_tick(self):
         {statement}
+
+    async def rows(self) -> AsyncIterator[int]:
+        yield 1
+
+    def pair(self) -> list[float]:
+        return [1.0, 2.0]
+
+    def parts(self, tasks: list[Task]):
+        {parts}
 
     async def wait(self) -> float:
         await self.clock.sleep(0.1)
@@ -116,6 +163,22 @@ MISTAKES = [
     ("self.square.side = 1.0", "side"),
     ("Circle()", "Circle"),
     ("Shape()", "Shape"),
+    # iteration
+    ("for row in self.rows():\n    pass", "self.rows()"),
+    ("async for row in self.names:\n    pass", "self.names"),
+    ("await self.rows()", "self.rows()"),
+    ("self.steps()", "self.steps()"),
+    ("for name, place in self.places:\n    pass", "self.places"),
+    ("String(data=self.counts)", "self.counts"),
+    ("self.counts.most_common(1).items()", "items"),
+    # lengths
+    ("PoseWithCovariance(covariance=self.pair()[:1])", "self.pair()[:1]"),
+    ("PoseWithCovariance(covariance=self.row * 5)", "self.row * 5"),
+    ("PoseWithCovariance(covariance=[float(x) for x in TUPLE])", "[float(x) for x in TUPLE]"),
+    ("PoseWithCovariance(covariance=[0.0] * 35 + self.pair())", "[0.0] * 35 + self.pair()"),
+    ("PoseWithCovariance(covariance=[*self.row, *TUPLE])", "[*self.row, *TUPLE]"),
+    # equality
+    ("if self.task.mode == 'fast':\n    pass", "self.task.mode == 'fast'"),
     # repetition
     ("[1] * 2.5", "[1] * 2.5"),
 ]  # fmt: skip
@@ -132,6 +195,15 @@ RIGHT = [
     "Square().area()",
     "self.done * ['a'], 2 * ['a'], ['a'] * self.done, self.done * 'a', 3 * TUPLE",
     "a, b, c, d = TUPLE * 2",
+    "async for row in self.rows():\n    row + 1",
+    "for name, place in self.places.items():\n    place + 1.0",
+    "dict(self.counts), sum(self.counts.values()), [k for k, v in self.counts.most_common()]",
+    "PoseWithCovariance(covariance=[0.0] * 34 + self.pair())",
+    "PoseWithCovariance(covariance=(self.row * 6)[:36])",
+    "PoseWithCovariance(covariance=[x for x in range(40) if x])",
+    "PoseWithCovariance(covariance=list(PoseWithCovariance().covariance))",
+    "items = [0.0]\nitems.extend(self.pair())\nPoseWithCovariance(covariance=items)",
+    "self.task.mode == Mode.FAST or self.task.mode.value == 'fast'",
     "import random\n(random.random() < 0.5) * [1.0]",
 ]
 #: Definitions of classes, and the text that is underlined.
@@ -144,10 +216,14 @@ WRONG_CLASSES = [
      "__post_init__"),
     ("@dataclass\nclass A:\n    a: InitVar[int]\n    def __post_init__(self):\n        pass",
      "__post_init__"),
+    ("def a() -> Iterator[tuple[int, int]]:\n    yield 1", "1"),
+    ("def a() -> list[int]:\n    return (x for x in range(3))", "(x for x in range(3))"),
     ("class A:\n    __slots__ = ('a',)\n    def __init__(self):\n        self.a = self.b = 1\n"
      "A()", "self.b"),
 ]  # fmt: skip
 RIGHT_CLASSES = [
+    "def a() -> Iterator[tuple[int, int]]:\n    yield 1, 2",
+    "def a() -> Iterator[int]:\n    return (x for x in range(3))",
     "class A:\n    @cached_property\n    def b(self):\n        return 1",
     "@dataclass()\nclass A:\n    a: int = field(init=False, default=1)\n    b: int\nA(1)",
     "@dataclass\nclass A:\n    a: int = 1\n    b: int = field(kw_only=True)\nA(b=1)",
@@ -165,9 +241,16 @@ RIGHT_CLASSES = [
 ]
 
 
-def _found(folder: Path, statement: str = "pass", definition: str = "") -> list[Diagnostic]:
+PLACES = ("inside", "keep", "parts")
+
+
+def _found(
+    folder: Path, statement: str = "pass", definition: str = "", **places: str
+) -> list[Diagnostic]:
     indented = statement.replace("\n", "\n        ")
     code = CODE.replace("{statement}", indented).replace("{definition}", definition)
+    for place in PLACES:
+        code = code.replace("{" + place + "}", places.get(place, "pass"))
     (folder / "code.py").write_text(code, encoding="utf-8")
     return diagnostics_in(SYSTEM, folder)
 
@@ -184,8 +267,29 @@ def test_a_wrong_definition_is_reported(definition: str, text: str, tmp_path: Pa
     assert quoted(diagnostic) == text
 
 
+@pytest.mark.parametrize(
+    ("place", "statement", "text"),
+    [
+        ("inside", "return replace(self, nam='b')", "nam"),
+        ("keep", "self.last = task.name", "task.name"),
+        ("parts", "tasks.remove(tasks[0].name)", "tasks[0].name"),
+    ],
+)
+def test_a_mistake_is_reported_in_other_classes(
+    place: str, statement: str, text: str, tmp_path: Path
+) -> None:
+    [diagnostic] = _found(tmp_path, **{place: statement})
+    assert quoted(diagnostic) == text
+
+
 def test_right_code_is_not_reported(tmp_path: Path) -> None:
-    found = _found(tmp_path, "\n".join(RIGHT))
+    found = _found(
+        tmp_path,
+        "\n".join(RIGHT),
+        inside="return replace(self, name='b')",
+        keep="self.last = task",
+        parts="tasks.remove(tasks[0])",
+    )
     assert [(item.message, quoted(item)) for item in found] == []
 
 
