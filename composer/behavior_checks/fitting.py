@@ -11,9 +11,15 @@ from composer.behavior_types.libraries.numpy_types import ARRAY
 from composer.behavior_types.libraries.standard_types import NO_SEQUENCES
 from composer.behavior_types.scalars import is_byte, is_float, is_integer, is_number, is_text
 from composer.behavior_types.syntax.lineage import is_derived
-from composer.behavior_types.syntax.own_classes import is_enumeration, is_named_tuple, is_plain
+from composer.behavior_types.syntax.own_classes import (
+    is_enumeration,
+    is_named_tuple,
+    is_plain,
+    known_attributes,
+)
 from composer.behavior_types.values import (
     NONE,
+    AnyFunction,
     ApiMethod,
     ApiValue,
     Collection,
@@ -136,6 +142,10 @@ def argument_problem(
         first = argument_problem(node.body, type_of(node.body), expected, type_of)
         return first or argument_problem(node.orelse, type_of(node.orelse), expected, type_of)
     kind, wanted = kind_of(found), kind_of(expected)
+    if isinstance(expected, AnyFunction) and isinstance(found, OwnObject):
+        known = known_attributes(found.of)
+        if known is None or "__call__" in known:
+            return None
     if "tuple" in (kind, wanted):
         # a tuple may take the place of a named tuple
         kinds = {kind, wanted} - {"tuple", "collection"}
@@ -203,7 +213,7 @@ def kind_of(type_: Value) -> str | None:
         kind = _KINDS.get(type_.python, None if isabstract(type_.python) else "collection")
     elif isinstance(type_, FieldType) and type_.is_array:
         kind = None if type_.name in {"byte", "char", "octet", "uint8"} else "collection"
-    elif isinstance(type_, OwnMethod | ModuleFunction):
+    elif isinstance(type_, AnyFunction | OwnMethod | ModuleFunction):
         kind = "function"
     elif isinstance(type_, OwnObject) and is_enumeration(
         type_.of, "enum.IntEnum", "enum.IntFlag", "int"
@@ -236,7 +246,7 @@ def shown(type_: Value) -> str:
             return f"a {python.__name__}"
         case OwnObject(of=of):
             return f"a {of.definition.name}"
-        case OwnMethod() | ModuleFunction():
+        case AnyFunction() | OwnMethod() | ModuleFunction():
             return "a function"
         case FieldType() | Message():
             return described(type_)

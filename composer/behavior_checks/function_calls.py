@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator, Mapping
 
 from composer.behavior_checks.calls.arguments import (
+    Signature,
     api_signature,
     constructor,
     fields_signature,
@@ -29,6 +30,7 @@ from composer.behavior_types.hosted import rclpy_function
 from composer.behavior_types.libraries.api_values import api_parameters
 from composer.behavior_types.syntax.own_classes import abstract_methods, constructor_of
 from composer.behavior_types.values import (
+    AnyFunction,
     ApiMethod,
     ApiValue,
     BuiltinMethod,
@@ -82,6 +84,8 @@ class CallChecker:
                 yield from self._own_call(node, function, home, is_bound=is_bound)
             case OwnClass() as own if not self._may_be_derived(node.func, own):
                 yield from self._created(node, own)
+            case AnyFunction(arguments=tuple() as takes):
+                yield from self._described(node, takes)
             case BuiltinMethod(python=python, name=name) if python.__module__ == "random":
                 parameters = method_signature(python, name)
                 if parameters is not None:
@@ -118,6 +122,13 @@ class CallChecker:
         listed = " and ".join(f"'{item}'" for item in missing)
         message = f"'{name}' cannot be created: it does not implement {listed}"
         return CodeProblem(Kind.CALL, message, self._span(node.func), hint)
+
+    def _described(self, node: ast.Call, takes: tuple[Value, ...]) -> Iterator[CodeProblem]:
+        """Check a call of a function that only its annotation describes."""
+        names = tuple(f"argument {at + 1}" for at in range(len(takes)))
+        signature = Signature(ast.unparse(node.func), names, (), frozenset(names), len(takes))
+        types = dict(zip(names, takes, strict=True))
+        yield from call_problems(node, signature, self.scope, types)
 
     def _own_call(
         self, node: ast.Call, function: Function, home: Module, *, is_bound: bool

@@ -55,14 +55,14 @@ def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodePro
             elif isinstance(used, ast.Call):
                 reason = _reason(used, scope)
                 name = ast.unparse(used) if reason is not None else ""
-            if reason is not None and name not in seen and _is_certain(node, reason):
+            if reason is None or name in seen:
+                continue
+            value = scope.bindings.names[name][0].expression if isinstance(used, ast.Name) else used
+            if _is_certain(node, value, scope):
                 seen.add(name)
                 span = span_of(used, scope.home.source)
                 hint = "check it first, as in 'if ... is not None'"
                 yield CodeProblem(Kind.NONE, f"this may be None: {reason}", span, hint)
-
-
-_MISSING_KEY = "'get' returns None for a missing key"
 
 
 def _has_direct_use(node: ast.AST) -> bool:
@@ -78,9 +78,25 @@ def _has_direct_use(node: ast.AST) -> bool:
             return False
 
 
-def _is_certain(node: ast.AST, reason: str) -> bool:
-    """Return whether a use needs a value, also one of a dict that may have all keys."""
-    return reason != _MISSING_KEY or isinstance(node, ast.Attribute | ast.Subscript)
+def _is_certain(node: ast.AST, value: ast.expr | None, scope: FunctionTypes) -> bool:
+    """Return whether a use is reported: only some are, unless a function declares None.
+
+    A dict may have all keys, and a function may always find what it looks for.
+    """
+    if isinstance(node, ast.Attribute | ast.Subscript):
+        return True
+    call = value.value if isinstance(value, ast.Await) else value
+    if not isinstance(call, ast.Call):
+        return False
+    match scope.type_of(call.func):
+        case OwnMethod(method=own) if own.node is not None:
+            return own.node.returns is not None
+        case ModuleFunction(node=function):
+            return function.returns is not None
+        case CollectionMethod():
+            return False
+        case _:
+            return True
 
 
 def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
@@ -94,7 +110,7 @@ def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
     match scope.type_of(call.func):
         case CollectionMethod(owner=owner, name="get") if owner.python is dict:
             is_plain = len(call.args) == 1 and not call.keywords
-            return _MISSING_KEY if is_plain else None
+            return "'get' returns None for a missing key" if is_plain else None
         case BuiltinMethod(python=python, name=method) if python is re.Pattern:
             is_known = method in _MATCHING and not _may_be_empty(_pattern(call.func, scope))
             return f"'{method}' returns None without a match" if is_known else None

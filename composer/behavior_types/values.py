@@ -157,6 +157,17 @@ class ModuleFunction:
     of: OwnClass | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class AnyFunction:
+    """A function that an annotation describes, as in ``Callable[[float], str]``.
+
+    ``arguments`` are the types that it is called with, None if they are not known.
+    """
+
+    arguments: tuple[Value, ...] | None = None
+    result: Value = ANYTHING
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Pending:
     """What an asynchronous ``call`` returns; waiting for it gives ``result``."""
@@ -169,7 +180,7 @@ class Pending:
 Value: TypeAlias = (
     "ValueType | NoneType | Self | Ports | Parameters | InterfaceClass | ApiValue | ApiMethod"
     " | OwnMethod | ModuleFunction | Pending | Collection | CollectionMethod | OwnClass | OwnObject"
-    " | BuiltinObject | BuiltinMethod | OwnModule"
+    " | AnyFunction | BuiltinObject | BuiltinMethod | OwnModule"
 )
 
 

@@ -27,7 +27,7 @@ from composer.behavior_types.syntax.own_classes import (
     known_attributes,
     misplaced_field,
 )
-from composer.behavior_types.values import OwnClass
+from composer.behavior_types.values import ModuleFunction, OwnClass, OwnMethod, Value
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 
@@ -187,6 +187,24 @@ def _of_fields(own: OwnClass) -> Signature | None:
         required += [field.name] if is_required else []
     name = own.definition.name
     return Signature(name, tuple(names), tuple(by_name), frozenset(required))
+
+
+def signature_of_function(node: ast.expr, function: Value) -> Signature | None:
+    """Return the parameters of what is passed as a function, None if they are not known."""
+    match function, node:
+        case OwnMethod(method=method), _ if method.node is not None and method.known:
+            return signature_of(method.node, is_bound=True)
+        case ModuleFunction(node=definition, is_bound=is_bound), _:
+            return signature_of(definition, is_bound=is_bound)
+        case OwnClass() as own, _:
+            return constructor(own)
+        case _, ast.Lambda(args=arguments):
+            definition = ast.FunctionDef(
+                name="lambda", args=arguments, body=[], decorator_list=[], lineno=1, col_offset=0
+            )
+            return signature_of(definition, is_bound=False)
+        case _:
+            return None
 
 
 def fields_signature(own: OwnClass, name: str, *, first: bool) -> Signature | None:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 
 from composer.behavior_checks.calls.arguments import method_signature
-from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.calls.call import call_problems, function_problems
 from composer.behavior_checks.fitting import argument_problem, kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
@@ -34,6 +34,9 @@ def method_problems(
     signature = method_signature(owner.python, name)
     found = list(call_problems(call, signature, scope)) if signature is not None else []
     yield from found
+    keys = [item.value for item in call.keywords if item.arg == "key"]
+    if (owner.python, name) == (list, "sort") and keys:
+        yield from function_problems(keys[0], 1, scope)
     if found or not call.args:
         return
     if (name in _KEYED and owner.python is dict) or (

@@ -7,13 +7,11 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from composer.behavior_checks.calls.arguments import (
-    Signature,
-    constructor,
     fields_signature,
     library_signature,
-    signature_of,
+    signature_of_function,
 )
-from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.calls.call import call_problems, function_problems
 from composer.behavior_checks.calls.library_arguments import library_argument_problems
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -23,7 +21,7 @@ from composer.behavior_types.expressions.objects import fields_expected
 from composer.behavior_types.expressions.operators import operation_problem, order_problem
 from composer.behavior_types.scalars import is_float
 from composer.behavior_types.syntax.own_classes import is_dataclass
-from composer.behavior_types.values import ModuleFunction, OwnClass, OwnMethod, OwnObject, Value
+from composer.behavior_types.values import OwnObject
 from composer.field_types import INTEGER
 
 #: Functions of math that do not take numbers only.
@@ -57,6 +55,7 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
                 message = f"{shown(found)} where the coordinates of a point are expected"
                 yield CodeProblem(Kind.VALUE, message, span_of(argument, scope.home.source))
                 return  # the other point has the same cause
+    yield from _called_functions(call, name, scope)
     if name == "sum" and len(call.args) == 1:
         element = scope.element(scope.type_of(call.args[0]))
         problem = operation_problem(INTEGER, ast.Add(), element)
@@ -69,6 +68,18 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
                 span = span_of(call, scope.home.source)
                 yield CodeProblem(Kind.VALUE, problem, span)
                 return
+
+
+def _called_functions(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check the functions that a built-in function calls: how many arguments they take."""
+    if any(isinstance(item, ast.Starred) for item in call.args):
+        return
+    keys = [item.value for item in call.keywords if item.arg == "key"]
+    if name in {"max", "min", "sorted"} and keys:
+        yield from function_problems(keys[0], 1, scope)
+    elif name in {"filter", "functools.reduce", "map"} and len(call.args) > 1:
+        count = {"filter": 1, "functools.reduce": 2}.get(name, len(call.args) - 1)
+        yield from function_problems(call.args[0], count, scope)
 
 
 def _range(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -98,19 +109,7 @@ def _partial(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
     """Check what ``functools.partial`` sets against the function; it may leave out arguments."""
     if not call.args or isinstance(call.args[0], ast.Starred):
         return
-    signature = _signature(scope.type_of(call.args[0]))
+    signature = signature_of_function(call.args[0], scope.type_of(call.args[0]))
     if signature is not None:
         given = ast.Call(func=call.func, args=call.args[1:], keywords=call.keywords)
         yield from call_problems(given, signature.partial(), scope)
-
-
-def _signature(function: Value) -> Signature | None:
-    match function:
-        case OwnMethod(method=method) if method.node is not None and method.known:
-            return signature_of(method.node, is_bound=True)
-        case ModuleFunction(node=node, is_bound=is_bound):
-            return signature_of(node, is_bound=is_bound)
-        case OwnClass() as own:
-            return constructor(own)
-        case _:
-            return None

@@ -16,6 +16,7 @@ from composer.behavior_types.syntax.lineage import class_named
 from composer.behavior_types.syntax.names import alias_named, api_class, interface_name, own_name
 from composer.behavior_types.values import (
     NONE,
+    AnyFunction,
     ApiValue,
     Collection,
     OwnObject,
@@ -60,6 +61,7 @@ _GENERIC: dict[str, type] = {
     "typing.Iterator": Iterator,
     "typing.Sequence": Sequence,
 }
+_FUNCTIONS = frozenset({"collections.abc.Callable", "typing.Callable"})
 #: The kind of port that a value of the API belongs to.
 _KINDS = {
     "Goal": PortKind.ACTION_SERVER,
@@ -89,6 +91,14 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
             parts = [annotated(item, home, node, interfaces) for item in types]
             has_length = not any(_is_ellipsis(item) for item in types)
             return _collection(_COLLECTIONS[name], parts, has_length=has_length)
+        case ast.Subscript(value=generic, slice=ast.Tuple(elts=[takes, gives])) if (
+            own_name(generic, home) in _FUNCTIONS
+        ):
+            result = annotated(gives, home, node, interfaces)
+            if not isinstance(takes, ast.List):
+                return AnyFunction(None, result)
+            taken = (annotated(item, home, node, interfaces) for item in takes.elts)
+            return AnyFunction(tuple(taken), result)
         case ast.Subscript(value=generic, slice=inner):
             python = _GENERIC.get(own_name(generic, home))
             types = inner.elts if isinstance(inner, ast.Tuple) else [inner]

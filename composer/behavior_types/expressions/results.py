@@ -12,6 +12,7 @@ from composer.behavior_types.libraries.rclpy_api import is_rclpy
 from composer.behavior_types.libraries.standard_types import builtin_result, called, method_result
 from composer.behavior_types.syntax.own_classes import is_named_tuple
 from composer.behavior_types.values import (
+    AnyFunction,
     ApiMethod,
     BuiltinMethod,
     CollectionMethod,
@@ -53,6 +54,8 @@ def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
             is_known = function.of is not None or not function.is_bound
             types = scope.owner.function(function.node, function.home, function.of)
             return returned_by(scope, function, node, inside=types if is_known else None)
+        case AnyFunction(result=result):
+            return result
         case OwnClass() as own:
             return created_object(scope, own, node)
         case OwnObject() as owner if not is_rclpy(owner.of.home):

@@ -35,6 +35,7 @@ import math
 import re
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -132,6 +133,15 @@ class Code(Behavior):
 
     def ends(self, name) -> tuple[float, float] | None:
         return (0.0, 1.0) if name else None
+
+    def highest(self) -> float | None:
+        return max(self.kept, default=None)
+
+    def find_all(self):
+        return [self.find("all")]
+
+    def apply(self, function: Callable[[float], float]) -> float:
+        return function(1.0)
 
     def look(self, point: Point) -> float:
         return point.x if point else 0.0
