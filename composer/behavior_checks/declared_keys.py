@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from composer.behavior_checks.parts import possible_values
+from composer.behavior_checks.possible_constants import possible_constants
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module, helper_named
 from composer.behavior_source.method_body import dotted
@@ -16,13 +17,14 @@ from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.syntax.bindings import Binding, bindings_of, nodes_of
 from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.names import constant_named
-from composer.behavior_types.syntax.own_classes import updated_targets
+from composer.behavior_types.syntax.own_classes import fields_of_class, updated_targets
 from composer.behavior_types.values import OwnModule, OwnObject, Self
 from composer.diagnostics import suggestion
 from composer.field_types import ANYTHING
 
 _READING = frozenset({"copy", "get", "items", "keys", "values"})
 _TAKING = frozenset({"dict", "enumerate", "iter", "len", "list", "max", "min", "set", "sorted"})
+_RECORDS = frozenset({"typing.TypedDict", "typing_extensions.TypedDict"})
 _CAUGHT = frozenset({"BaseException", "Exception", "KeyError", "LookupError"})
 
 
@@ -30,22 +32,50 @@ def key_problems_of(
     node: ast.Subscript, function: Function, scope: FunctionTypes
 ) -> Iterator[CodeProblem]:
     """Yield the constant keys that such a dict does not have."""
+    if isinstance(node.ctx, ast.Del):
+        return
+    declared = _of_record(node, scope) or _declared(node, scope)
+    if declared is None or _expects_missing(function, node.value):
+        return
     candidates = [
-        item for item in possible_values(node.slice, scope) if _constant(item) is not None
+        item for item in possible_constants(node.slice, scope) if _constant(item) is not None
     ]
-    if not candidates or isinstance(node.ctx, ast.Del) or _expects_missing(function, node.value):
-        return
-    declared = _declared(node, scope)
-    if declared is None:
-        return
     for item in candidates:
         key = _constant(item)
         if key not in declared:
             names = [other for other in declared if isinstance(other, str)]
             hint = suggestion(key, names) if isinstance(key, str) else None
             message = f"'{ast.unparse(node.value)}' has no key {key!r}"
-            yield CodeProblem(Kind.VALUE, message, span_of(item, scope.home.source), hint)
+            # what a loop or a call gives is written elsewhere
+            is_here = any(item is part for part in possible_values(node.slice, scope))
+            span = span_of(item if is_here else node.slice, scope.home.source)
+            yield CodeProblem(Kind.VALUE, message, span, hint)
             return
+
+
+def _of_record(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int] | None:
+    """Return the keys of a TypedDict that is read, with those that the files store in dicts."""
+    found = scope.type_of(node.value)
+    if not isinstance(found, OwnObject) or not isinstance(node.ctx, ast.Load):
+        return None
+    family = lineage(found.of)
+    if not family.others or not family.others <= _RECORDS:
+        return None
+    fields = (field.name for own in family.classes for field in fields_of_class(own))
+    return frozenset(fields).union(*map(_all_stored, scope.owner.source.own_modules))
+
+
+@lru_cache(maxsize=128)
+def _all_stored(module: Module) -> frozenset[str]:
+    """Return the constant keys that a file stores in anything."""
+    return frozenset(
+        node.slice.value
+        for node in walk(module.tree.body)
+        if isinstance(node, ast.Subscript)
+        and isinstance(node.ctx, ast.Store)
+        and isinstance(node.slice, ast.Constant)
+        and isinstance(node.slice.value, str)
+    )
 
 
 def _constant(node: ast.expr) -> str | int | None:

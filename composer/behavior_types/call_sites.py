@@ -117,7 +117,7 @@ class CallSites:
         found: dict[int, list[CallSite]] = {}
         unknown: set[int] = set()
         for reference in self._references:
-            scope = self._scope(reference)
+            scope = scope_of(self._types, reference)
             value = scope.type_of(reference.node)
             target = _target(value)
             if target is None:
@@ -136,15 +136,17 @@ class CallSites:
                 found.setdefault(id(function), []).append(site)
         return {key: sites for key, sites in found.items() if key not in unknown}
 
-    def _scope(self, reference: Reference) -> FunctionTypes:
-        types, function = self._types, reference.function
-        if function is None:
-            return types.at_module(reference.home)
-        known = types.scopes.get(id(function))
-        if known is not None:
-            return known
-        own = _classes_of(reference.home).get(id(function))
-        return types.function(function, reference.home, own)
+
+def scope_of(types: BehaviorTypes, reference: Reference) -> FunctionTypes:
+    """Return the types around a reference."""
+    function = reference.function
+    if function is None:
+        return types.at_module(reference.home)
+    known = types.scopes.get(id(function))
+    if known is not None:
+        return known
+    own = _classes_of(reference.home).get(id(function))
+    return types.function(function, reference.home, own)
 
 
 @lru_cache(maxsize=128)

@@ -13,6 +13,7 @@ from composer.behavior_types.expressions.annotations import annotated
 from composer.behavior_types.expressions.displays import computed
 from composer.behavior_types.expressions.fillings import filled, fillings_of, is_fresh, without_none
 from composer.behavior_types.expressions.members import attribute_of
+from composer.behavior_types.expressions.objects import value_in_record
 from composer.behavior_types.expressions.protocols import entered, iterated
 from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.expressions.results import awaited, result_of
@@ -255,6 +256,8 @@ class FunctionTypes:
             return attribute_of(self, owner, name) if isinstance(name, str) else ANYTHING
         if isinstance(index, ast.Slice):
             return sliced(owner)
+        if isinstance(owner, OwnObject) and isinstance(index, ast.Constant):
+            return value_in_record(self, owner, index.value)
         if isinstance(owner, Collection):
             position = integer_constant(index)
             if owner.items is not None and position is not None:

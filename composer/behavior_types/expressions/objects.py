@@ -25,6 +25,7 @@ from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.literals import constant_type
 from composer.behavior_types.syntax.own_classes import (
     all_fields,
+    fields_of_class,
     has_fields,
     is_enumeration,
 )
@@ -44,6 +45,7 @@ from composer.field_types import ANYTHING, STRING
 if TYPE_CHECKING:
     from composer.behavior_types.expressions.function_types import FunctionTypes
 
+_RECORDS = frozenset({"typing.TypedDict", "typing_extensions.TypedDict"})
 _PROPERTIES = frozenset({"property", "cached_property", "functools.cached_property"})
 #: Decorators of methods that change neither their arguments nor what they return.
 _OF_METHODS = frozenset(
@@ -105,6 +107,18 @@ def fields_expected(scope: FunctionTypes, own: OwnClass) -> Mapping[str, Value]:
     if not has_fields(own):
         return {}
     return {item.name: scope.annotated(item.annotation, item.home) for item in all_fields(own)}
+
+
+def value_in_record(scope: FunctionTypes, owner: OwnObject, key: object) -> Value:
+    """Return the type of the value of a key of a TypedDict, ANYTHING for other objects."""
+    family = lineage(owner.of)
+    if not family.others & _RECORDS:
+        return ANYTHING
+    for own in family.classes:
+        for field in fields_of_class(own):
+            if field.name == key:
+                return scope.annotated(field.annotation, own.home)
+    return ANYTHING
 
 
 def _assigned_in(scope: FunctionTypes, own: OwnClass, name: str) -> Value:

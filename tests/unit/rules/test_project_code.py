@@ -130,6 +130,7 @@ PACKAGE = "from shapes.shapes import Plan, Side\n"
 CODE = """\
 import heapq
 import random
+from typing import TypedDict
 
 import numpy as np
 import shapes
@@ -143,6 +144,15 @@ from shapes.shapes import (
 )
 
 
+GAINS = {"left": 1.0, "right": 2.0}
+SIDES = ("left", "right", "top")
+
+
+class Entry(TypedDict):
+    name: str
+    size: float
+
+
 TABLE = np.array([1.0, 2.0, 3.0])
 
 
@@ -154,6 +164,12 @@ class Code:
     def on_configure(self):
         self.plan = Plan()
         self.square = Square("a", 1.0)
+
+    def gain(self, side):
+        return GAINS[side]
+
+    def safe_gain(self, side):
+        return GAINS[side] if side != "top" else 0.0
 
     def on_tick(self):
         point, pose = Point(), Pose()
@@ -181,6 +197,10 @@ RIGHT = [
     "np.concatenate([TABLE, TABLE]), np.concatenate((TABLE, TABLE), 0), np.sqrt(2.0, where=True)",
     "turned() @ TABLE, turned() @ turned().T, np.eye(2) @ turned(), TABLE @ TABLE",
     "heapq.heappush([], point), heapq.nsmallest(1, [2]), random.choice('ab'), np.clip(1, 2, 3)",
+    "for side in SIDES[:2]: print(GAINS[side], GAINS.get('top'), self.safe_gain('top'))",
+    "for side in ('left', 'right'): print(GAINS[side], self.gain(side))",
+    "entry: Entry = {}; print(entry['name'].upper(), entry['size'] / 2, entry.get('nam'))",
+    "entry: Entry = {}; entry['more'] = 1; print(entry['more'])",
     "raise ShapeError(self.square, 'too large')",
     "print(Size(1.0).height, Size(height=2, width=1)[0], Size(*'ab')._asdict())",
     "print(Size(1.0)._replace(height='a').height, Size._fields)",
@@ -248,6 +268,12 @@ RIGHT = [
         ("np.maximum(TABLE)", "call-arguments", "np.maximum"),
         ("np.eye(3) @ np.array([1.0, 2.0])", "invalid-value", "np.eye(3) @ np.array([1.0, 2.0])"),
         ("turned() @ [1.0, 2.0]", "invalid-value", "turned() @ [1.0, 2.0]"),
+        ("for side in SIDES: print(GAINS[side])", "invalid-value", "side"),
+        ("print([GAINS[side] for side in SIDES])", "invalid-value", "side"),
+        ("self.gain('top')", "invalid-value", "side"),
+        ("[self.gain(side) for side in SIDES]", "invalid-value", "side"),
+        ("entry: Entry = {}; print(entry['nam'])", "invalid-value", "'nam'"),
+        ("entry: Entry = {}; print(entry['name'] / 2)", "invalid-value", "entry['name'] / 2"),
         ("heapq.heappush(point, [])", "call-arguments", "point"),
         ("heapq.heappush([1])", "call-arguments", "heapq.heappush"),
         ("random.choice(point.x)", "call-arguments", "point.x"),
