@@ -52,8 +52,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
     if sum(found) > _MOST_ENDPOINTS:
         yield Diagnostic(
             RULE,
-            f"the nodes have about {sum(found)} endpoints for tools, too many for several processes"
-            " to start within their time limit",
+            f"the nodes have about {sum(found)} endpoints for tools: their processes may not start "
+            "within the time limit",
             system.name.span,
             hint="disable those that no tool uses, in 'introspection' of the system",
         )
