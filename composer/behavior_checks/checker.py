@@ -90,6 +90,7 @@ def behavior_problems(
         yield from undeclared_parameters(types)
         yield from transition_problems(types)
     missing: set[str] = set()
+    wrong: dict[str, CodeProblem] = {}
     blame = _blame(types)
     for checker in _checkers(types, source):
         try:
@@ -97,6 +98,9 @@ def behavior_problems(
         except RecursionError:  # too deeply nested to be checked
             continue
         for problem in problems:
+            attribute = problem.attribute
+            if wrong.setdefault(attribute, problem) is not problem and attribute:
+                continue  # it has one value of a wrong type
             if problem.kind is not Kind.ATTRIBUTE or problem.message not in missing:
                 yield problem
             if problem.kind is Kind.ATTRIBUTE:
@@ -118,6 +122,8 @@ def _blame(types: BehaviorTypes) -> Blame | None:
 
 def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_FunctionChecker]:
     own = {id(known) for _, known in source.own_classes}
+    for home in source.own_modules:  # it runs first
+        yield _FunctionChecker(types, types.at_module(home), outside_functions(home))
     for home, known in source.own_classes:
         for method in known.methods:
             scope = types.scope(method, home)
@@ -127,7 +133,6 @@ def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_Functio
             if not lacks_self(method.node, len(handler.arguments) if handler else None):
                 yield _FunctionChecker(types, scope, method.node, handler)
     for home in source.own_modules:
-        yield _FunctionChecker(types, types.at_module(home), outside_functions(home))
         for item in home.tree.body:
             if isinstance(item, Function):
                 yield _FunctionChecker(types, types.function(item, home), item)

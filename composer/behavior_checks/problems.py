@@ -49,6 +49,12 @@ class CodeProblem:
     about: str = ""
     lines: tuple[int, int] | None = None
 
+    @property
+    def attribute(self) -> str:
+        """The attribute of the object whose value has a wrong type, "" for other problems."""
+        name = self.about if self.kind is Kind.VALUE else ""
+        return name if name.startswith("self.") and name.count(".") == 1 else ""
+
 
 #: The kinds of which one wrong value causes several.
 _OF_VALUES = frozenset({Kind.CALL, Kind.FIELD, Kind.VALUE})

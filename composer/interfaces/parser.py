@@ -44,6 +44,8 @@ _QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
 _UNQUOTED = re.compile(r"""[^,'"]+|[,'"]""")
 #: The line between the parts of a service or an action.
 SEPARATOR = "---"
+#: What is written by mistake instead, also by editors.
+_DASHES = "-_=*~\u2013\u2014"
 _MAX_DIGITS = 100  # of an integer
 _QUOTES = ("'", '"')
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
@@ -78,6 +80,10 @@ def parse_definition(name: str, text: str) -> Interface:
     expected = {"msg": 1, "srv": 2, "action": 3}[folder]
     if len(parts) != expected:
         starts = _separators(text)
+        similar = _similar(text) if len(parts) < expected else None
+        if similar is not None:
+            number, line_text = similar
+            raise DefinitionError(f"'{shown(line_text)}' where '{SEPARATOR}' is expected", number)
         surplus = starts[expected - 1] if len(parts) > expected else len(text.splitlines())
         line = surplus or 1
         message = (
@@ -135,6 +141,15 @@ def _separators(text: str) -> list[int]:
     """Return the numbers of the lines with separators."""
     lines = enumerate(text.splitlines(), start=1)
     return [number for number, line in lines if line.partition("#")[0].strip() == SEPARATOR]
+
+
+def _similar(text: str) -> tuple[int, str] | None:
+    """Return the first line that was probably meant as a separator, with its number."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.partition("#")[0].strip()
+        if content and content != SEPARATOR and not content.strip(_DASHES):
+            return number, content
+    return None
 
 
 def _message(name: str, package: str, lines: _Lines) -> Message:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from composer.behavior_checks.fitting import shown
 from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.standard_types import is_asynchronous
@@ -77,7 +78,8 @@ def _iterated(
         yield CodeProblem(Kind.VALUE, problem, span, "write 'async for'")
     elif is_scalar(found):
         problem = f"{shown(found)} cannot be {what}"
-        yield CodeProblem(Kind.VALUE, problem, span_of(node, scope.home.source))
+        span = span_of(node, scope.home.source)
+        yield CodeProblem(Kind.VALUE, problem, span, about=dotted(node))
 
 
 def is_scalar(type_: Value) -> bool:

@@ -111,15 +111,17 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
         case ast.AugAssign():
             yield from _changed(node, scope)
         case ast.Subscript(value=owner, slice=index):
-            problem = _index_problem(scope.type_of(owner), scope.type_of(index))
+            problem = _owner_problem(scope.type_of(owner))
+            about = dotted(owner) if problem is not None else ""
+            problem = problem or _index_problem(scope.type_of(owner), scope.type_of(index))
             problem = problem or _position_problem(scope.type_of(owner), index)
             if problem is not None:
-                yield CodeProblem(Kind.VALUE, problem, span_of(index, source))
+                yield CodeProblem(Kind.VALUE, problem, span_of(index, source), about=about)
         case ast.Call(func=ast.Name(id="len"), args=[argument]):
             found = scope.type_of(argument)
             if _has_no_length(found):
-                message = f"{shown(found)} has no length"
-                yield CodeProblem(Kind.VALUE, message, span_of(argument, source))
+                message, about = f"{shown(found)} has no length", dotted(argument)
+                yield CodeProblem(Kind.VALUE, message, span_of(argument, source), about=about)
         case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
             yield from _equality(left, right, node, scope)
         case ast.Compare(left=left, ops=operators, comparators=others):
@@ -228,6 +230,10 @@ def _index_problem(owner: Value, index: Value) -> str | None:
     is_sequence = isinstance(owner, Collection) and owner.python in (list, tuple, bytes)
     if (is_list or is_sequence) and is_float(index):
         return "an index must be an integer, not a float"
+    return None
+
+
+def _owner_problem(owner: Value) -> str | None:
     if isinstance(owner, Message) or (is_scalar(owner) and owner != _TEXT):
         return f"{described(owner)} is not a list"  # type: ignore[arg-type]
     return None

@@ -48,7 +48,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
         known = frozenset(tree.frames)
         in_cycles = {item.child for cycle in cycles(tree) for item in cycle}
         for lookup in tree.lookups:
-            has_cycle = any(tree.root(frame.value) in in_cycles for frame in lookup.frames)
+            roots = [tree.root(frame.value) for frame in lookup.frames if frame.value in known]
+            has_cycle = bool(in_cycles) and all(root in in_cycles for root in roots)
             for frame in lookup.frames:
                 if frame.value in known or frame.value.startswith("/"):
                     continue

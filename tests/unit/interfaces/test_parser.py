@@ -135,6 +135,13 @@ def test_mistake_is_named_with_its_line(line: str, message_part: str) -> None:
     assert caught.value.line == line.count("\n") + 2
 
 
+@pytest.mark.parametrize("line", ["--", "----", "\u2014", "==="])
+def test_a_wrong_separator_is_reported_where_it_is(line: str) -> None:
+    with pytest.raises(DefinitionError, match="where '---' is expected") as caught:
+        parse_definition("demo_msgs/srv/Set", f"bool on\n{line}\nbool done\n")
+    assert caught.value.line == 2
+
+
 @pytest.mark.parametrize(
     "name",
     ["String", "std_msgs/String", "std_msgs/msg/", "/msg/A", "../msg/A", "a/idl/A", "a/msg/a/b"],

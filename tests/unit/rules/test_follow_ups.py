@@ -307,6 +307,14 @@ MISTAKES = {
         ),
         ["frame-cycle"],
     ),
+    "a frame whose parent is now in a cycle is not also unknown": (
+        system(
+            "mounts: {transforms: {static: {base: {parent: arm, translation_m: {x: 1.0}},"
+            " arm: {parent: base, translation_m: {x: 1.0}}}}}",
+            "viewer: {external: true, transforms: {lookup: [site]}}",
+        ),
+        ["frame-cycle"],
+    ),
     "a variable without a value is not checked": (
         system('motor: {namespace: "${where}", timers: {tick: {rate_hz: "${rate}", log: tick}}}'),
         ["unknown-variable", "unknown-variable"],
