@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tests.ros.support.forked import ForkedCommand
+from tests.ros.support.forked import ForkedCommand, ForkedProgram
 
 #: Python without the Fast DDS profile of the tests, so that ros2-composer chooses its own.
 PYTHON = (
@@ -27,12 +27,10 @@ PATIENCE_S = 60.0
 
 
 @contextmanager
-def hand_written(program: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def hand_written(program: str, *arguments: str) -> Iterator[ForkedProgram]:
     """Run a program of tests/ros/programs for the length of the block."""
-    command = [sys.executable, str(PROGRAMS / program), *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = ForkedProgram(PROGRAMS / program, *arguments)
     try:
-        assert process.stdout is not None
         # Fast DDS may print there first, about what a killed process left behind.
         assert "ready\n" in process.stdout
         yield process

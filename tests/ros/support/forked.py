@@ -1,19 +1,23 @@
-"""``compose`` in processes forked from one that has imported it: see docs/decisions/0035."""
+"""``compose``, and programs with rclpy, in processes forked from one that has imported both.
+
+See docs/decisions/0035.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import pkgutil
+import runpy
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import IO, TextIO
+from typing import IO, Self, TextIO
 
 import composer
 from composer.cli import main
@@ -36,38 +40,42 @@ _context = multiprocessing.get_context("forkserver")
 _context.set_forkserver_preload(_modules())
 
 
-class ForkedCommand:
-    """A ``compose`` command in a process of its own, used like a ``subprocess.Popen``.
+class ForkedProcess:
+    """A process of its own that calls a function, used like a ``subprocess.Popen``.
 
     ``stdout`` and ``stderr`` are pipes, or the given files. With ``merged``, stderr goes where
-    stdout goes.
+    stdout goes. With ``reads``, ``stdin`` is a pipe.
     """
 
     def __init__(
         self,
-        *arguments: str,
+        call: Callable[[list[str]], None],
+        arguments: tuple[str, ...],
+        environment: dict[str, str],
+        *,
         stdout: IO[str] | None = None,
         stderr: IO[str] | None = None,
         merged: bool = False,
+        reads: bool = False,
         cwd: Path | None = None,
-        env: Mapping[str, str] | None = None,
     ) -> None:
-        self.args = ("compose", *arguments)
+        self.args = arguments
         self.stdout, out = (None, _duplicate(stdout)) if stdout else _pipe()
         if merged:
             self.stderr, error = None, _duplicate(out)
         else:
             self.stderr, error = (None, _duplicate(stderr)) if stderr else _pipe()
-        environment = {**os.environ, **_DISCOVERY, **(env or {})}
-        environment.pop(_PROFILE, None)
-        work = (str(cwd or Path.cwd()), environment, list(arguments))
-        self._process = _context.Process(target=_run, args=(*work, out, error), daemon=False)
+        self.stdin, source = _pipe_to() if reads else (None, None)
+        work = (call, list(arguments), str(cwd or Path.cwd()), environment)
+        self._process = _context.Process(
+            target=_run, args=(*work, source, out, error), daemon=False
+        )
         self._process.start()
         # Whenever a process starts, multiprocessing looks at all others in this set: if one of them
         # ends while another thread waits for it, that thread gets 255 as its exit code.
         multiprocessing.process._children.discard(self._process)  # type: ignore[attr-defined]
-        out.close()
-        error.close()
+        for connection in filter(None, (source, out, error)):
+            connection.close()
         assert self._process.pid is not None
         self.pid = self._process.pid
 
@@ -87,6 +95,8 @@ class ForkedCommand:
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
         """Return what is written to the pipes until the end. Raises subprocess.TimeoutExpired."""
+        if self.stdin is not None:
+            self.stdin.close()
         texts = ["", ""]
 
         def read(number: int, stream: TextIO) -> None:
@@ -116,14 +126,59 @@ class ForkedCommand:
     def kill(self) -> None:
         self.send_signal(signal.SIGKILL)
 
-    def __enter__(self) -> ForkedCommand:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.wait()
-        for stream in (self.stdout, self.stderr):
+        for stream in (self.stdin, self.stdout, self.stderr):
             if stream is not None:
                 stream.close()
+
+
+class ForkedCommand(ForkedProcess):
+    """A ``compose`` command in a process of its own."""
+
+    def __init__(
+        self,
+        *arguments: str,
+        stdout: IO[str] | None = None,
+        stderr: IO[str] | None = None,
+        merged: bool = False,
+        cwd: Path | None = None,
+        env: Mapping[str, str] | None = None,
+    ) -> None:
+        environment = {**os.environ, **_DISCOVERY, **(env or {})}
+        environment.pop(_PROFILE, None)
+        super().__init__(
+            _run_command,
+            ("compose", *arguments),
+            environment,
+            stdout=stdout,
+            stderr=stderr,
+            merged=merged,
+            cwd=cwd,
+        )
+
+
+class ForkedProgram(ForkedProcess):
+    """A Python program in a process of its own, with pipes as stdin and stdout.
+
+    It finds rclpy and the message packages imported.
+    """
+
+    stdin: TextIO
+    stdout: TextIO
+
+    def __init__(self, program: Path, *arguments: str) -> None:
+        with os.fdopen(os.dup(2), "w") as stderr:  # where pytest captures it
+            super().__init__(
+                _run_program,
+                (str(program), *arguments),
+                dict(os.environ),
+                stderr=stderr,
+                reads=True,
+            )
 
 
 def _pipe() -> tuple[TextIO, Connection]:
@@ -131,26 +186,46 @@ def _pipe() -> tuple[TextIO, Connection]:
     return os.fdopen(reading, encoding="utf-8"), Connection(writing, readable=False)
 
 
+def _pipe_to() -> tuple[TextIO, Connection]:
+    reading, writing = os.pipe()
+    return os.fdopen(writing, "w", encoding="utf-8"), Connection(reading, writable=False)
+
+
 def _duplicate(stream: IO[str] | Connection) -> Connection:
     return Connection(os.dup(stream.fileno()), readable=False)
 
 
 def _run(
+    call: Callable[[list[str]], None],
+    arguments: list[str],
     folder: str,
     environment: Mapping[str, str],
-    arguments: list[str],
+    source: Connection | None,
     out: Connection,
     error: Connection,
 ) -> None:
-    """Make this forked process what a new one would be, and run the command."""
+    """Make this forked process what a new one would be, and call the function."""
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
-    for connection, number in ((out, 1), (error, 2)):
-        os.dup2(connection.fileno(), number)
-        connection.close()
+    for connection, number in ((source, 0), (out, 1), (error, 2)):
+        if connection is not None:
+            os.dup2(connection.fileno(), number)
+            connection.close()
+    if source is not None:
+        sys.stdin = open(0, encoding="utf-8")  # noqa: SIM115
     is_unbuffered = bool(environment.get("PYTHONUNBUFFERED"))
     sys.stdout = open(1, "w", encoding="utf-8", buffering=1 if is_unbuffered else -1)  # noqa: SIM115
     sys.stderr = open(2, "w", encoding="utf-8", buffering=1, errors="backslashreplace")  # noqa: SIM115
-    sys.argv = ["compose", *arguments]
+    sys.argv = arguments
+    call(arguments)
+
+
+def _run_command(_: list[str]) -> None:
     sys.exit(main())
+
+
+def _run_program(arguments: list[str]) -> None:
+    program = arguments[0]
+    sys.path.insert(0, str(Path(program).parent))
+    runpy.run_path(program, run_name="__main__")

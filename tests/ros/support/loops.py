@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,6 +18,7 @@ from composer.model import Executor, ExecutorKind
 from composer.runtime.executors.factory import make_loop
 from composer.runtime.executors.loop import Loop, Taken
 from composer.source import Located, SourceFile, Span
+from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.leaving import leave
 
 PEER = Path(__file__).parents[1] / "programs" / "loop_peer.py"
@@ -100,12 +98,9 @@ def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
 
 
 @contextmanager
-def peer(*arguments: object) -> Iterator[subprocess.Popen[str]]:
+def peer(*arguments: object) -> Iterator[ForkedProgram]:
     """Run ``loop_peer.py``, hand-written rclpy, in another process."""
-    command = [sys.executable, str(PEER), *map(str, arguments)]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True, env=os.environ.copy()
-    )
+    process = ForkedProgram(PEER, *map(str, arguments))
     try:
         yield process
     finally:
@@ -113,13 +108,12 @@ def peer(*arguments: object) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-def wait_for_line(process: subprocess.Popen[str], wanted: str) -> None:
+def wait_for_line(process: ForkedProgram, wanted: str) -> None:
     """Wait until a peer prints a line; Fast DDS may print others."""
-    assert process.stdout is not None
     assert any(line.strip() == wanted for line in process.stdout), f"never printed: {wanted}"
 
 
-def last_line(process: subprocess.Popen[str]) -> str:
+def last_line(process: ForkedProgram) -> str:
     """Wait until a peer has ended and return its last line."""
     output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, output
