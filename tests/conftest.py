@@ -79,9 +79,9 @@ def _begin_elsewhere(config: pytest.Config) -> None:
     if worker is not None and config.args == config.getini("testpaths"):
         folders = sorted(
             str(path)
-            for kind in ("ros", "unit")
-            for path in (TESTS / kind).iterdir()
-            if path.is_dir()
+            for folder in (TESTS, TESTS / "ros", TESTS / "unit")
+            for path in folder.iterdir()
+            if path.is_dir() and path not in (TESTS / "ros", TESTS / "unit")
         )
         number = int(worker["workerid"].removeprefix("gw"))
         config.args[:0] = folders[number :: worker["workercount"]]
