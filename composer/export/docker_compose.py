@@ -48,7 +48,6 @@ def compose_file(
     Of ``environment``, the variables that ROS reads become part of the file.
     """
     listed = services(system)
-    variables = ros_variables(environment)
     common = {
         "init": True,
         "#1": _HOST,
@@ -74,7 +73,7 @@ def compose_file(
             "command": ["compose", *service.command(str(contents.file))],
             **_conditional(system, service, listed),
             **_limits(service),
-            "environment": variables | service.environment,
+            "environment": ros_variables(environment, service) | service.environment,
             "healthcheck": _health(service.readiness(str(contents.file))),
         }
         if not found[service.label]["environment"]:

@@ -44,7 +44,6 @@ def manifests(
     """
     listed = services(system)
     hosts = sorted({service.host for service in listed if service.host is not None})
-    variables = ros_variables(environment)
     is_open = bool(hosts) or has_outside_nodes(system)
     found = []
     for host in (None, *hosts):
@@ -55,7 +54,7 @@ def manifests(
                 **({"#1": service.origin} if len(listed) > 1 else {}),
                 "image": image,
                 "imagePullPolicy": "IfNotPresent",
-                **_container(service, contents, variables, shares_memory=not is_open),
+                **_container(service, contents, environment, shares_memory=not is_open),
             }
             for service in here
         }
@@ -154,11 +153,11 @@ def _as_sidecar(container: dict[str, Any]) -> dict[str, Any]:
 def _container(
     service: Service,
     contents: Contents,
-    variables: Mapping[str, str],
+    environment: Mapping[str, str],
     *,
     shares_memory: bool,
 ) -> dict[str, Any]:
-    environment = {**variables, **service.environment}
+    variables = ros_variables(environment, service) | service.environment
     priority = service.priority
     mounts = [{"name": _TEMPORARY, "mountPath": WRITABLE}]
     if shares_memory:
@@ -169,7 +168,7 @@ def _container(
     return {
         **({} if priority is None else {"#2": _PRIORITY.format(priority=priority)}),
         "command": [_escaped(word) for word in ("compose", *service.command(file))],
-        **({"env": _variables(environment)} if environment else {}),
+        **({"env": _variables(variables)} if variables else {}),
         **({"resources": limits} if (limits := _limits(service)) else {}),
         **({} if service.is_server else {"#3": _PROBES}),
         "startupProbe": _probe(alive, period_s=2, failures=60),

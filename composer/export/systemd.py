@@ -153,7 +153,7 @@ def units(
 def _here(service: Service, path: Path, installation: Installation) -> tuple[Sequence[str], str]:
     """Return the command of a service, and the lines about its user, folder and environment."""
     environment = installation.environment
-    variables = {**_set(environment), **ros_variables(environment)}
+    variables = {**_set(environment), **ros_variables(environment, service)}
     folder = f"WorkingDirectory={_escaped(str(path.parent))}\n"
     command = [*installation.python, *service.command(str(path))]
     place = _login(installation.user) + folder

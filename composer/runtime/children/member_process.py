@@ -10,6 +10,7 @@ here is used as it is, and from then on only awaited: what has started it may st
 from __future__ import annotations
 
 import math
+import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -46,6 +47,8 @@ from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
 STARTS_WITHIN_S = 30.0
+#: The path of the enclave of a process: see :mod:`composer.export.sros2`.
+_ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 _POLL_S = 0.01
 #: How often to look whether another process holds the instance lock.
 _LOCK_POLL_S = 0.1
@@ -269,6 +272,8 @@ class MemberProcess:
         usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
         life = _Life(started_by=uuid4().hex)
         own = {STARTED_BY_VARIABLE: life.started_by}
+        if os.environ.get(_ENCLAVE_VARIABLE):  # this process has its own, as in the policy
+            usual[_ENCLAVE_VARIABLE] = self._name
         self._is_ending = False
         try:
             command = Command(words, {**usual, **environment, **own})

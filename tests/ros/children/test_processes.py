@@ -65,7 +65,10 @@ def all_alive(pids: set[int]) -> set[int]:
     return set(filter(alive, pids))
 
 
-def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
+def test_up_in_order_data_flows_and_down(
+    tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_SECURITY_ENCLAVE_OVERRIDE", "/lab/robot")
     with split(tmp_path) as system:
         active = [text for text in system.states() if text.endswith(" active")]
         assert active == ["/lab/camera active", "/lab/detector active", "/lab/arm active"]
@@ -75,6 +78,7 @@ def test_up_in_order_data_flows_and_down(tmp_path: Path, peer: Peer) -> None:
         assert os.sched_getaffinity(pids[0]) == {0}
         environment = Path("/proc", str(pids[0]), "environ").read_bytes()
         assert b"ROLE=sensing\0" in environment
+        assert b"ROS_SECURITY_ENCLAVE_OVERRIDE=/lab/robot/sensing\0" in environment
 
         reported = system.host._status.snapshot  # with the rates that the processes report
         wait_until(lambda: all(node.sent_hz > 1 for node in reported().nodes[:2]), "the rates")

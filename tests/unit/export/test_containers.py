@@ -57,6 +57,17 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_each_process_has_its_own_enclave(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_SECURITY_ENCLAVE_OVERRIDE", "/my_robot")
+    name = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+    services = yaml.safe_load(export("docker-compose"))["services"]
+    assert services["my-robot"]["environment"][name] == "/my_robot"
+    assert services["my-robot-arm"]["environment"][name] == "/my_robot/arm"
+    (deployment,) = kubernetes()
+    arm = deployment["spec"]["template"]["spec"]["containers"][2]
+    assert {"name": name, "value": "/my_robot/arm"} in arm["env"]
+
+
 def add(project: Path, text: str) -> None:
     with (project / "systems" / "robot.yaml").open("a") as file:
         file.write(text)
