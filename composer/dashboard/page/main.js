@@ -32,15 +32,16 @@ function main() {
   app.isReadOnly = () => app.hello?.read_only ?? false;
   const router = createRouter(show);
   app.go = router.go;
-  const frame = createFrame(app);
+  // First, so that it opens while the frame is made; it calls nothing before that.
   app.connection = createConnection(`ws://${location.host}/ws`, {
     onhello: (hello) => {
       app.hello = hello;
       frame.showHello(hello);
       dispatchEvent(new Event("hello"));
     },
-    onstate: frame.showConnection,
+    onstate: (state) => frame.showConnection(state),
   });
+  const frame = createFrame(app);
   frame.start(app.connection);
 
   async function show(route) {

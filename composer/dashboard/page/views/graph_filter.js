@@ -8,6 +8,7 @@ export function createFilterMenu(onchange) {
   const menu = h("div", { class: "menu" });
   const element = h("details", { class: "filter" }, h("summary", {}, "Filter"), menu);
   const cleared = { kind: new Set(), namespace: new Set() };
+  let picture = null;
   let shown = "";
 
   function choice(group, value, depth = 0) {
@@ -56,21 +57,30 @@ export function createFilterMenu(onchange) {
     event.stopPropagation();
   });
 
+  function fill() {
+    if (!picture || !element.open) return;
+    const items = [...picture.items.values()];
+    const kinds = KINDS.filter((kind) => items.some((item) => item.kind === kind));
+    const namespaces = ancestors(items.filter(isNode).map((item) => item.namespace));
+    const now = JSON.stringify([kinds, namespaces]);
+    if (now === shown) return;
+    shown = now;
+    menu.replaceChildren(
+      h("fieldset", {}, h("legend", {}, "Kind"), kinds.map((kind) => choice("kind", kind))),
+      h("fieldset", {}, h("legend", {}, "Namespace"), namespaces.map((name) => choice("namespace", name, name.split("/").filter(Boolean).length))),
+      button("Show everything", showAll),
+    );
+  }
+
+  element.addEventListener("toggle", fill);
+
   return {
     element,
     hidden: () => ({ kinds: cleared.kind, namespaces: cleared.namespace }),
-    update(picture) {
-      const items = [...picture.items.values()];
-      const kinds = KINDS.filter((kind) => items.some((item) => item.kind === kind));
-      const namespaces = ancestors(items.filter(isNode).map((item) => item.namespace));
-      const now = JSON.stringify([kinds, namespaces]);
-      if (now === shown) return;
-      shown = now;
-      menu.replaceChildren(
-        h("fieldset", {}, h("legend", {}, "Kind"), kinds.map((kind) => choice("kind", kind))),
-        h("fieldset", {}, h("legend", {}, "Namespace"), namespaces.map((name) => choice("namespace", name, name.split("/").filter(Boolean).length))),
-        button("Show everything", showAll),
-      );
+    /** Offer what is in a picture, once the menu is open. */
+    update(current) {
+      picture = current;
+      fill();
     },
   };
 }

@@ -48,8 +48,10 @@ export function createZoomLevels(picture, boxes) {
     ...frames.filter((frame) => !frame.isOuter),
   ];
   const heads = [...svg.querySelectorAll("marker")];
+  let style = null;
   for (const entry of named) {
-    measuring.font = `${entry.style.font}px ${font}`;
+    if (entry.style !== style) measuring.font = `${entry.style.font}px ${font}`;
+    style = entry.style;
     entry.width = measuring.measureText(entry.text.textContent).width + 2 * entry.style.padding + (entry.hasMark ? MARK + 2 : 0);
   }
   let shown = null;
