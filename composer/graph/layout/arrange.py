@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
 from composer.graph.diagram import Graph
+from composer.graph.layout.alike import Alike
 from composer.graph.layout.bend_removal import Obstacles
 from composer.graph.layout.boxes import Item
 from composer.graph.layout.build import Parts, build
@@ -28,16 +29,17 @@ def arrange(graph: Graph, sizes: Sizes, lay_out: LayOut | None = None) -> Layout
     Connected components are laid out separately and packed side by side. ``lay_out`` replaces the
     layered layout of components with edges.
     """
-    lay_out_component = _layered if lay_out is None else lay_out
+    lay_out_component = Alike(layered) if lay_out is None else lay_out
     return pack_components(
         [
-            lay_out_component(part, sizes) if part.edges else _layered(part, sizes)
+            lay_out_component(part, sizes) if part.edges else layered(part, sizes)
             for part in components(graph)
         ]
     )
 
 
-def _layered(graph: Graph, sizes: Sizes) -> Layout:
+def layered(graph: Graph, sizes: Sizes) -> Layout:
+    """Return the layered layout of a connected graph."""
     parts = build(graph, sizes)
     order_boxes(parts.root)
     assign_coordinates(parts.root)

@@ -14,7 +14,8 @@ from dataclasses import replace
 from itertools import accumulate, combinations
 
 from composer.graph.diagram import Cluster, Direction, Edge, Graph
-from composer.graph.layout.arrange import arrange
+from composer.graph.layout.alike import Alike
+from composer.graph.layout.arrange import arrange, layered
 from composer.graph.layout.components import outermost
 from composer.graph.layout.result import Layout, Path, Point, Rectangle, Size
 from composer.graph.layout.units import Sizes
@@ -41,7 +42,8 @@ def arrange_for_pages(graph: Graph, sizes: Sizes, directions: Collection[Directi
     if _has_parts(graph):
         # From top to bottom, names that are enlarged have room: they are wider than high.
         inside, between = _parts(replace(graph, direction=Direction.DOWN))
-        return _InParts([arrange(part, sizes) for part in inside], between)
+        lay_out = Alike(layered)
+        return _InParts([arrange(part, sizes, lay_out) for part in inside], between)
     return _Whole({item: arrange(replace(graph, direction=item), sizes) for item in directions})
 
 
