@@ -11,7 +11,7 @@ import { dropNote, searchField, tabs } from "../widgets/parts.js";
 import { createArticle } from "./graph_details.js";
 import { createFilterMenu } from "./graph_filter.js";
 import { createOverlay } from "./graph_overlay.js";
-import { createZoomLevels } from "./graph_zoom.js";
+import { createZoomLevels, showUnits } from "./graph_zoom.js";
 
 const ZOOM_STEP = 1.25;
 /** Until then, an empty graph may be one that is not discovered yet. */
@@ -101,14 +101,14 @@ export function createView(app) {
     }
     const world = s("g", { class: "world" });
     world.append(...parsed.documentElement.childNodes);
-    // Far until it is known: what is left out then takes no time.
-    const svg = s("svg", { class: "picture far", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
+    const pixels = Math.min(canvas.clientWidth / data.width, canvas.clientHeight / data.height) || 1;
+    const svg = s("svg", { class: "picture", viewBox: `0 0 ${data.width} ${data.height}`, role: "group", "aria-label": `${data.title}: ${data.view}` }, world);
     canvas.replaceChildren(svg);
     picture = readPicture(canvas);
-    // Measured before anything changes: each change makes the next measurement take a layout.
+    showUnits(picture, pixels);
+    // Measured at once: each change makes the next measurement take a layout.
     const boxes = boxesOf(picture);
     viewport = createViewport(picture, createZoomLevels(picture, boxes));
-    const pixels = viewport.pixelsPerUnit();
     overlay = createOverlay(picture, things, data.executors, boxes);
     viewport.fit(pixels);
     listenToItems(picture, selection, viewport);

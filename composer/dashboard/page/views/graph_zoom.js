@@ -37,7 +37,7 @@ const measuring = document.createElement("canvas").getContext("2d");
  * `boxes` are those of items and frames in SVG units, by their elements.
  */
 export function createZoomLevels(picture, boxes) {
-  const { svg, world } = picture;
+  const { svg } = picture;
   const font = getComputedStyle(svg.querySelector("text") ?? svg).fontFamily;
   const frames = framesOf(picture, boxes);
   const items = [...picture.items.values()].filter((item) => item.kind !== "port").map((item) => itemOf(item, boxes.get(item.element)));
@@ -47,7 +47,6 @@ export function createZoomLevels(picture, boxes) {
     ...items.filter(({ item }) => !isNode(item)),
     ...frames.filter((frame) => !frame.isOuter),
   ];
-  const heads = [...svg.querySelectorAll("marker")];
   let style = null;
   for (const entry of named) {
     if (entry.style !== style) measuring.font = `${entry.style.font}px ${font}`;
@@ -57,23 +56,34 @@ export function createZoomLevels(picture, boxes) {
   let shown = null;
 
   return (pixelsPerUnit) => {
-    const isFar = pixelsPerUnit < NEAR_PIXELS_PER_UNIT;
-    const level = Math.floor(Math.log(isFar ? pixelsPerUnit : Math.min(pixelsPerUnit, 1)) / Math.log(STEP));
+    const { isFar, level, unit } = levelOf(pixelsPerUnit);
     if (level === shown) return;
     shown = level;
-    svg.classList.toggle("far", isFar);
-    const unit = isFar ? STEP ** -level : 1;
-    world.style.setProperty("--unit", unit);
-    const enlarged = (least, drawn) => (isFar ? 1 : Math.min(Math.max(least / drawn / STEP ** level, 1), MOST_ENLARGED));
-    world.style.setProperty("--name", enlarged(LEAST_NAME, DRAWN_NAME));
-    world.style.setProperty("--small", enlarged(LEAST_SMALL, DRAWN_SMALL));
-    for (const head of heads) {
-      head.setAttribute("markerWidth", Math.max(DRAWN_HEAD, HEAD * unit));
-      head.setAttribute("markerHeight", Math.max(DRAWN_HEAD, HEAD * unit));
-    }
+    showUnits(picture, pixelsPerUnit);
     if (isFar) showFar(named, unit, svg.viewBox.baseVal.width);
     else showNear(named);
   };
+}
+
+/** Set the size of a pixel, before anything is measured: all styles depend on it. */
+export function showUnits({ svg, world }, pixelsPerUnit) {
+  const { isFar, level, unit } = levelOf(pixelsPerUnit);
+  svg.classList.toggle("far", isFar);
+  world.style.setProperty("--unit", unit);
+  const enlarged = (least, drawn) => (isFar ? 1 : Math.min(Math.max(least / drawn / STEP ** level, 1), MOST_ENLARGED));
+  world.style.setProperty("--name", enlarged(LEAST_NAME, DRAWN_NAME));
+  world.style.setProperty("--small", enlarged(LEAST_SMALL, DRAWN_SMALL));
+  for (const head of svg.querySelectorAll("marker")) {
+    head.setAttribute("markerWidth", Math.max(DRAWN_HEAD, HEAD * unit));
+    head.setAttribute("markerHeight", Math.max(DRAWN_HEAD, HEAD * unit));
+  }
+}
+
+/** Return whether a picture is far, its level, which is the same within a step, and the units of a pixel. */
+function levelOf(pixelsPerUnit) {
+  const isFar = pixelsPerUnit < NEAR_PIXELS_PER_UNIT;
+  const level = Math.floor(Math.log(isFar ? pixelsPerUnit : Math.min(pixelsPerUnit, 1)) / Math.log(STEP));
+  return { isFar, level, unit: isFar ? STEP ** -level : 1 };
 }
 
 function itemOf(item, box) {

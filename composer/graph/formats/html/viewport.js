@@ -114,7 +114,7 @@ export function createViewport(picture, onscale = () => {}) {
 
   listenToWheel(svg, zoomAt, pointAt);
   listenToPointers(svg, { zoomAt, drag, drop, pointAt });
-  return { fit, zoom, center, reveal, uncover, rescale, pixelsPerUnit };
+  return { fit, zoom, center, reveal, uncover, rescale };
 }
 
 function listenToWheel(svg, zoomAt, pointAt) {
