@@ -35,7 +35,7 @@ def key_problems_of(
     if isinstance(node.ctx, ast.Del):
         return
     declared = _of_record(node, scope) or _declared(node, scope)
-    if declared is None or _expects_missing(function, node.value):
+    if declared is None or expects_missing(function, node.value):
         return
     candidates = [
         item for item in possible_constants(node.slice, scope) if _constant(item) is not None
@@ -83,7 +83,7 @@ def _constant(node: ast.expr) -> str | int | None:
     return value if isinstance(value, str | int) and not isinstance(value, bool) else None
 
 
-def _expects_missing(function: Function, owner: ast.expr) -> bool:
+def expects_missing(function: Function, owner: ast.expr) -> bool:
     """Return whether a function handles a missing key, or asks for it."""
     written = ast.unparse(owner)
     for node in nodes_of(function):
@@ -112,20 +112,24 @@ def _declared(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int]
         if len(places) != 1 or (not is_read and not _is_updated(node, modules)):
             return None
         return _keys_of(places[0].expression, owner.attr, modules)
-    if not isinstance(node.ctx, ast.Load):
-        return None
+    constant = constant_read(owner, scope) if isinstance(node.ctx, ast.Load) else None
+    return _keys_of(constant[0], constant[1], modules) if constant is not None else None
+
+
+def constant_read(node: ast.expr, scope: FunctionTypes) -> tuple[ast.expr, str, Module] | None:
+    """Return what a constant of a file is assigned that is read, its name, and its file."""
     name, found = "", None
-    if isinstance(owner, ast.Name) and not scope.is_local(owner.id):
-        name, found = owner.id, helper_named(owner.id, scope.home)
-    elif isinstance(owner, ast.Attribute):
-        module = scope.type_of(owner.value)
+    if isinstance(node, ast.Name) and not scope.is_local(node.id):
+        name, found = node.id, helper_named(node.id, scope.home)
+    elif isinstance(node, ast.Attribute):
+        module = scope.type_of(node.value)
         if isinstance(module, OwnModule):
-            name, found = owner.attr, helper_named(owner.attr, module.module)
-    if found is None or not found.name:
+            name, found = node.attr, helper_named(node.attr, module.module)
+    if found is None or not found.name or name != found.name:
         return None
     constant = constant_named(found.name, found.module)
     written = constant.value if isinstance(constant, ast.AnnAssign) else constant
-    return _keys_of(written, name, modules) if name == found.name else None
+    return (written, name, found.module) if written is not None else None
 
 
 def _places(object_: Self | OwnObject, name: str, scope: FunctionTypes) -> list[Binding]:
@@ -163,7 +167,7 @@ def _keys_of(
     if len(known) != len(found) or not found:
         return None
     for module in modules:
-        stored = _stored_keys(module, name)
+        stored = stored_keys(module, name)
         if stored is None:
             return None
         known |= stored
@@ -171,7 +175,7 @@ def _keys_of(
 
 
 @lru_cache(maxsize=256)
-def _stored_keys(module: Module, name: str) -> frozenset[str | int] | None:
+def stored_keys(module: Module, name: str) -> frozenset[str | int] | None:
     """Return the constant keys that a file stores in what it calls ``name``.
 
     None: it may change it otherwise, by a method, or by passing it on.

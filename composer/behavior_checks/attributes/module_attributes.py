@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import importlib
 from collections.abc import Iterator
+from types import BuiltinFunctionType, FunctionType
 
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
@@ -21,6 +23,7 @@ def module_attributes(module: Module) -> Iterator[CodeProblem]:
         for bound, imported in module.imports.items()
         if not imported.name and "." not in bound and _is_known(imported.module)
     }
+    yield from _attributes_of_names(module)
     if not aliases:
         return
     uses: list[tuple[str, ast.Attribute]] = []
@@ -45,6 +48,46 @@ def module_attributes(module: Module) -> Iterator[CodeProblem]:
         message = f"module '{full}' has no '{node.attr}'"
         hint = suggestion(node.attr, names) if close else None
         yield CodeProblem(Kind.IMPORT, message, attribute_span(node, module.source), hint)
+
+
+#: Modules whose functions and classes are looked at: they import little, and change nothing.
+_LOOKED_AT = frozenset(
+    {"collections", "copy", "datetime", "itertools", "json", "math", "random", "re", "time"}
+)
+
+
+def _attributes_of_names(module: Module) -> Iterator[CodeProblem]:
+    """Check the attributes of functions and classes that are imported by name.
+
+    After ``from datetime import datetime``, for example, there is no ``datetime.datetime``.
+    """
+    names = {
+        bound: imported
+        for bound, imported in module.imports.items()
+        if imported.name and imported.module in _LOOKED_AT and not imported.level
+    }
+    if not names:
+        return
+    uses: list[tuple[str, ast.Attribute]] = []
+    for node in walk(module.tree.body):
+        match node:
+            case ast.Attribute(value=ast.Name(id=name)) if name in names:
+                uses.append((name, node))
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+                names.pop(name, None)  # means something else, at least somewhere
+    for bound, node in uses:
+        imported = names.get(bound)
+        home = importlib.import_module(imported.module) if imported is not None else None
+        found = getattr(home, imported.name or "", None) if imported is not None else None
+        if not isinstance(found, FunctionType | BuiltinFunctionType | type):
+            continue
+        if hasattr(found, node.attr) or node.attr.startswith("__") or imported is None:
+            continue
+        message = f"'{imported.module}.{imported.name}' has no attribute '{node.attr}'"
+        hint = suggestion(node.attr, dir(found))
+        if hasattr(home, node.attr):
+            hint = f"'{bound}' is '{imported.module}.{imported.name}' here, not the module"
+        yield CodeProblem(Kind.ATTRIBUTE, message, attribute_span(node, module.source), hint)
 
 
 def _is_known(module: str) -> bool:

@@ -11,7 +11,7 @@ import pytest
 from composer.analysis.python import behavior_code
 from composer.behavior_checks import CodeProblem, behavior_problems
 from composer.model import Node
-from tests.unit.support.checking import diagnostics_in
+from tests.unit.support.checking import diagnostics_in, quoted
 
 
 def test_two_nodes_with_one_class_report_it_once(tmp_path: Path) -> None:
@@ -89,3 +89,25 @@ def test_a_helper_out_of_the_project_is_reported(tmp_path: Path) -> None:
     system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
     (found,) = diagnostics_in(system, project)
     assert found.message == "module 'helper' is a symbolic link out of the project"
+
+
+@pytest.mark.parametrize(
+    ("line", "use", "attribute"),
+    [
+        ("from datetime import datetime", "datetime.datetime.now()", "datetime"),
+        ("from time import time", "time.sleep(1.0)", "sleep"),
+        ("from random import random", "random.uniform(0.0, 1.0)", "uniform"),
+        ("from datetime import datetime", "datetime.now(), datetime.max.year", ""),
+        ("from itertools import chain", "chain.from_iterable([[1]])", ""),
+        ("from datetime import datetime", "for datetime in (): print(datetime.text)", ""),
+    ],
+)
+def test_what_is_imported_by_name_is_not_its_module(
+    line: str, use: str, attribute: str, tmp_path: Path
+) -> None:
+    code = f"{line}\n\n\nclass Code:\n    def go(self):\n        {use}\n"
+    (tmp_path / "robot_code.py").write_text(code, encoding="utf-8")
+    system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
+    reported = [item for item in diagnostics_in(system, tmp_path) if item.rule.code != "RC434"]
+    assert [item.rule.name for item in reported] == ["unknown-attribute"] * bool(attribute)
+    assert [quoted(item) for item in reported] == [attribute] * bool(attribute)

@@ -139,6 +139,7 @@ from shapes import Plan
 from shapes import shapes as all_shapes
 from collections import deque, namedtuple
 from dataclasses import replace
+from enum import Enum
 from shapes.shapes import (
     SIZES, Filter, Light, Named, Place, Shape, ShapeError, Side, Size, Square, lit, nothing
 )
@@ -146,6 +147,14 @@ from shapes.shapes import (
 
 GAINS = {"left": 1.0, "right": 2.0}
 SIDES = ("left", "right", "top")
+
+
+class Gear(Enum):
+    LOW = 1
+    HIGH = 2
+
+
+GEARS = {Gear.LOW: "l"}
 
 
 class Entry(TypedDict):
@@ -162,11 +171,15 @@ def turned():
 
 class Code:
     def on_configure(self):
+        self.gear = Gear.LOW
         self.plan = Plan()
         self.square = Square("a", 1.0)
 
     def gain(self, side):
         return GAINS[side]
+
+    def show(self):
+        print(GEARS[self.gear])
 
     def safe_gain(self, side):
         return GAINS[side] if side != "top" else 0.0
@@ -197,6 +210,9 @@ RIGHT = [
     "np.concatenate([TABLE, TABLE]), np.concatenate((TABLE, TABLE), 0), np.sqrt(2.0, where=True)",
     "turned() @ TABLE, turned() @ turned().T, np.eye(2) @ turned(), TABLE @ TABLE",
     "heapq.heappush([], point), heapq.nsmallest(1, [2]), random.choice('ab'), np.clip(1, 2, 3)",
+    "self.gear = Gear.LOW; print(GEARS.get(Gear.HIGH))",
+    "self.gear = Gear.HIGH\n            if self.gear in GEARS: self.show()",
+    "self.gear = Gear.HIGH\n            if self.gear != Gear.HIGH: self.show()",
     "for side in SIDES[:2]: print(GAINS[side], GAINS.get('top'), self.safe_gain('top'))",
     "for side in ('left', 'right'): print(GAINS[side], self.gain(side))",
     "entry: Entry = {}; print(entry['name'].upper(), entry['size'] / 2, entry.get('nam'))",
@@ -268,6 +284,8 @@ RIGHT = [
         ("np.maximum(TABLE)", "call-arguments", "np.maximum"),
         ("np.eye(3) @ np.array([1.0, 2.0])", "invalid-value", "np.eye(3) @ np.array([1.0, 2.0])"),
         ("turned() @ [1.0, 2.0]", "invalid-value", "turned() @ [1.0, 2.0]"),
+        ("self.gear = Gear.HIGH", "invalid-value", "self.gear"),
+        ("print(GEARS[Gear.HIGH])", "invalid-value", "Gear.HIGH"),
         ("for side in SIDES: print(GAINS[side])", "invalid-value", "side"),
         ("print([GAINS[side] for side in SIDES])", "invalid-value", "side"),
         ("self.gain('top')", "invalid-value", "side"),
