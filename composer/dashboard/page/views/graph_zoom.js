@@ -1,9 +1,10 @@
 /**
  * Leaves out of the diagram what is too small to read, and keeps names in a readable size.
  *
- * From afar, a box has only its name and its state. Names that have no room are left out: those of
- * frames come first, then those of nodes.
+ * From afar, a box has only its name and its state. Names of nodes are shortened where others are next to
+ * them. Names that have no room are left out: those of frames come first, then those of nodes.
  */
+import { setText } from "../dom.js";
 import { isNode } from "../graph/filter.js";
 
 /** From there on, everything is shown where it is drawn. */
@@ -25,6 +26,8 @@ const INNER_FRAME = { font: 10, height: 12, padding: 0 };
 const MARK = 10;
 const HEAD = 6;
 const GAP = 1;
+/** Less of a name says nothing. */
+const LEAST_LETTERS = 3;
 /** The size of a state's shape and of an arrow head as they are drawn, in SVG units. */
 const DRAWN_MARK = 12;
 const DRAWN_HEAD = 8;
@@ -49,9 +52,12 @@ export function createZoomLevels(picture, boxes) {
   ];
   let style = null;
   for (const entry of named) {
-    if (entry.style !== style) measuring.font = `${entry.style.font}px ${font}`;
+    entry.font = `${entry.style.font}px ${font}`;
+    if (entry.style !== style) measuring.font = entry.font;
     style = entry.style;
-    entry.width = measuring.measureText(entry.text.textContent).width + 2 * entry.style.padding + (entry.hasMark ? MARK + 2 : 0);
+    entry.name = entry.text.textContent;
+    entry.around = 2 * style.padding + (entry.hasMark ? MARK + 2 : 0);
+    entry.width = measuring.measureText(entry.name).width + entry.around;
   }
   let shown = null;
 
@@ -116,6 +122,8 @@ function showFar(named, unit, right) {
   // No name covers the box of a node, and that of a channel does not hide another one.
   const boxesOf = (wanted) => named.filter(({ item }) => item && wanted(item)).map(({ box }) => box);
   const taken = boxesOf(isNode);
+  const nodes = named.filter(({ item }) => item && isNode(item));
+  for (const entry of nodes) entry.short = shortened(entry, roomOf(entry, nodes, unit));
   const channels = new Map(boxesOf((item) => !isNode(item)).map((box) => [box, innerHalf(box)]));
   for (const entry of named) {
     const place = placeOf(entry, unit, right);
@@ -132,18 +140,43 @@ function showFar(named, unit, right) {
   }
 }
 
+/** Return the width in pixels that a node has next to the others, if each takes the same. */
+function roomOf(entry, nodes, unit) {
+  let room = entry.width;
+  for (const other of nodes) {
+    const isNextTo = Math.abs(other.center.y - entry.center.y) < (entry.style.height + GAP) * unit;
+    if (other === entry || !isNextTo) continue;
+    const apart = Math.abs(other.center.x - entry.center.x) / unit - GAP;
+    room = Math.min(room, other.width < apart ? 2 * apart - other.width : apart);
+  }
+  return room;
+}
+
+/** Return a name of at most this width as {name, width}; the whole one if too little would be left. */
+function shortened({ name, width, around, font }, room) {
+  if (room >= width) return { name, width };
+  measuring.font = font;
+  for (let letters = name.length - 1; letters >= LEAST_LETTERS; letters -= 1) {
+    const short = `${name.slice(0, letters)}…`;
+    const taken = measuring.measureText(short).width + around;
+    if (taken <= room) return { name: short, width: taken };
+  }
+  return { name, width };
+}
+
 /** A name is in the middle of its box, within the picture; that of an outer frame is above it. */
-function placeOf({ item, box, center, style, width, isOuter }, unit, right) {
-  const size = { width: width * unit, height: style.height * unit };
+function placeOf({ item, box, center, style, width, short, isOuter }, unit, right) {
+  const size = { width: (short?.width ?? width) * unit, height: style.height * unit };
   if (item) {
     const x = Math.max(Math.min(center.x - size.width / 2, right - size.width), 0);
     return { x, y: center.y - size.height / 2, ...size };
   }
-  return { x: box.x + (isOuter ? 0 : 3 * unit), y: isOuter ? box.y - size.height : box.y + unit, ...size };
+  return { x: box.x + (isOuter ? 0 : 3 * unit), y: isOuter ? box.y - size.height - 2 * GAP * unit : box.y + unit, ...size };
 }
 
 function drawItem(entry, place, unit) {
-  const { item, shapes, text, box, center, style } = entry;
+  const { item, shapes, text, box, center, style, name, short } = entry;
+  setText(text, short?.name ?? name);
   item.element.classList.toggle("nameless", !place);
   const width = place ? Math.max(place.width / box.width, 1) : 1;
   const height = place ? Math.max(place.height / box.height, 1) : 1;
@@ -170,6 +203,7 @@ function showNear(named) {
   for (const entry of named) {
     const { item, element, shapes = [], text } = entry;
     (element ?? item.element).classList.remove("nameless", "covered");
+    if (item) setText(text, entry.name);
     for (const part of [...shapes, text, markOf(entry)]) {
       part?.style.removeProperty("transform");
       part?.style.removeProperty("font-size");
