@@ -32,6 +32,7 @@ from composer.behavior_checks.operations.awaiting import (
 )
 from composer.behavior_checks.operations.formats import text_problems
 from composer.behavior_checks.operations.iteration import iteration_problems
+from composer.behavior_checks.operations.membership import LOOKUPS, lookup_problems
 from composer.behavior_checks.operations.operations import (
     annotations_of,
     operation_problems,
@@ -196,6 +197,8 @@ class _FunctionChecker:
                 case ast.AnnAssign(annotation=annotation, value=ast.expr() as value):
                     yield from self._annotated(annotation, value)
             yield from unawaited(node, self.function, self.scope)
+            if isinstance(node, LOOKUPS):
+                yield from lookup_problems(node, self.scope)
             if isinstance(node, CHECKED):
                 yield from protocol_problems(node, self.scope)
             if isinstance(node, TESTING):

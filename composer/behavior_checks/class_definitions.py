@@ -44,6 +44,7 @@ def definition_problems(home: Module, classes: ProjectClasses) -> Iterator[CodeP
         own = OwnClass(definition, home)
         yield from _order(own)
         yield from _after_creation(own)
+        yield from _not_annotated(own)
         # a class that only others are derived from may leave the places for attributes to these
         if classes.is_created(own) and not classes.derived(own):
             yield from _slots(own)
@@ -67,6 +68,18 @@ def _order(own: OwnClass) -> Iterator[CodeProblem]:
         span = span_of(field.annotation, own.home.source)
         hint = "move it before the fields with defaults, or give it one"
         yield CodeProblem(Kind.VALUE, message, span, hint)
+
+
+def _not_annotated(own: OwnClass) -> Iterator[CodeProblem]:
+    """Yield the fields without an annotation, which a dataclass does not take for fields."""
+    for statement in own.definition.node.body if is_dataclass(own) else ():
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=function)):
+                written = dotted(function)
+                if (full_name(written, own.home) or written) == "dataclasses.field":
+                    message = f"'{name}' is not a field without an annotation"
+                    span = span_of(statement.targets[0], own.home.source)
+                    yield CodeProblem(Kind.VALUE, message, span, f"write '{name}: type = ...'")
 
 
 def _declares(own: OwnClass, field: ClassField) -> bool:

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from inspect import isabstract
 
+from composer.behavior_types.functions import function_name, is_function
 from composer.behavior_types.libraries.numpy_types import ARRAY
 from composer.behavior_types.libraries.standard_types import NO_SEQUENCES
 from composer.behavior_types.scalars import is_byte, is_float, is_integer, is_number, is_text
@@ -24,8 +25,6 @@ from composer.behavior_types.values import (
     ApiValue,
     Collection,
     InterfaceClass,
-    ModuleFunction,
-    OwnMethod,
     OwnObject,
     Value,
 )
@@ -56,8 +55,8 @@ def value_problem(
     if found is NONE and isinstance(node, ast.Call) and isinstance(expected, FieldType | Message):
         name = ast.unparse(node.func)
         return f"'{name}' returns nothing, and {_name(expected)} is expected", None
-    if isinstance(found, OwnMethod | ModuleFunction):
-        name = found.method.name if isinstance(found, OwnMethod) else found.node.name
+    if is_function(found) and not isinstance(found, ApiMethod):
+        name = function_name(found)
         return f"the function '{name}' where {_name(expected)} is expected", f"call it: {name}()"
     is_single = isinstance(expected, Message) or not is_array
     if found == ARRAY and is_single and isinstance(expected, FieldType | Message):
@@ -213,7 +212,7 @@ def kind_of(type_: Value) -> str | None:
         kind = _KINDS.get(type_.python, None if isabstract(type_.python) else "collection")
     elif isinstance(type_, FieldType) and type_.is_array:
         kind = None if type_.name in {"byte", "char", "octet", "uint8"} else "collection"
-    elif isinstance(type_, AnyFunction | OwnMethod | ModuleFunction):
+    elif isinstance(type_, AnyFunction) or is_function(type_):
         kind = "function"
     elif isinstance(type_, OwnObject) and is_enumeration(
         type_.of, "enum.IntEnum", "enum.IntFlag", "int"
@@ -239,6 +238,8 @@ _KINDS: dict[type, str | None] = {
 
 def shown(type_: Value) -> str:
     """Return a type as it is named in messages."""
+    if is_function(type_):
+        return "a function"
     match type_:
         case Collection(python=python, items=tuple() as items):
             return f"a {python.__name__} of {len(items)}"
@@ -246,7 +247,7 @@ def shown(type_: Value) -> str:
             return f"a {python.__name__}"
         case OwnObject(of=of):
             return f"a {of.definition.name}"
-        case AnyFunction() | OwnMethod() | ModuleFunction():
+        case AnyFunction():
             return "a function"
         case FieldType() | Message():
             return described(type_)

@@ -17,6 +17,7 @@ from composer.behavior_checks.calls.call import call_problems
 from composer.behavior_checks.calls.collection_calls import method_problems
 from composer.behavior_checks.calls.rclpy_calls import rclpy_call
 from composer.behavior_checks.messages.message_values import ValueChecker
+from composer.behavior_checks.operations.membership import enumeration_problems
 from composer.behavior_checks.operations.operations import annotations_by_name, uncallable
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
@@ -107,6 +108,7 @@ class CallChecker:
                     yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
 
     def _created(self, node: ast.Call, own: OwnClass) -> Iterator[CodeProblem]:
+        yield from enumeration_problems(node, own, self.scope)
         parameters = constructor(own)
         missing = abstract_methods(own)
         if missing:

@@ -15,7 +15,7 @@ from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.scalars import is_text
 from composer.behavior_types.syntax.own_classes import defines
 from composer.behavior_types.values import Collection, OwnObject, Parameters, Ports, Value
-from composer.field_types import STRING
+from composer.field_types import INTEGER, STRING
 from composer.interfaces import FieldType, Message
 
 #: The methods that store their last argument as an element.
@@ -24,6 +24,13 @@ _ADDING = frozenset({"add", "append", "appendleft", "insert"})
 _KEYED = frozenset({"get", "pop", "setdefault"})
 #: The methods that fail without an element that equals their first argument.
 _SEARCHING = frozenset({"index", "remove"})
+#: How many of the first arguments of methods of texts are texts.
+_OF_TEXTS = {
+    **dict.fromkeys(("count", "endswith", "find", "index", "lstrip", "partition"), 1),
+    **dict.fromkeys(("removeprefix", "removesuffix", "rfind", "rpartition", "rsplit"), 1),
+    **dict.fromkeys(("rstrip", "split", "startswith", "strip"), 1),
+    "replace": 2,
+}
 _HASHING = frozenset({"add", "discard", "remove"})
 
 
@@ -45,6 +52,16 @@ def method_problems(
         yield from key_problems(call.args[0], owner, scope)
     if name in _ADDING and owner.python is not dict:
         yield from _stored(call.args[-1], owner.element, f"'{name}'", scope)
+    elif name == "extend" and owner.python in (list, deque):
+        found_items = scope.element(scope.type_of(call.args[0]))
+        wrong = argument_problem(None, found_items, owner.element, scope.type_of)
+        if wrong is not None:
+            span = span_of(call.args[0], scope.home.source)
+            yield CodeProblem(Kind.VALUE, f"'extend': {wrong}", span)
+    elif name == "pop" and owner.python is list:
+        yield from _stored(call.args[0], INTEGER, "an index", scope)
+    elif name in _OF_TEXTS and owner.python is str:
+        yield from _text(call, name, scope)
     elif name in _SEARCHING and not _may_equal(owner, scope):
         yield from _stored(call.args[0], owner.element, f"'{name}' finds nothing", scope)
     elif name == "join" and owner.python is str:
@@ -104,6 +121,18 @@ def _stored(
     wrong = argument_problem(node, scope.type_of(node), expected, scope.type_of)
     if wrong is not None:
         yield CodeProblem(Kind.VALUE, f"{what}: {wrong}", span_of(node, scope.home.source))
+
+
+def _text(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the arguments of a method of texts that are not texts."""
+    for argument in call.args[: _OF_TEXTS[name]]:
+        found = scope.type_of(argument)
+        kind = kind_of(found)
+        is_choice = name in {"endswith", "startswith"} and kind == "collection"
+        if kind not in (None, "text", "tuple") and not is_choice:
+            problem = f"'{name}' takes a string, not {shown(found)}"
+            yield CodeProblem(Kind.VALUE, problem, span_of(argument, scope.home.source))
+            return
 
 
 def _joined(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:

@@ -6,22 +6,23 @@ import ast
 from collections.abc import Iterator
 
 from composer.behavior_checks.fitting import shown
+from composer.behavior_checks.operations.operations import before_changes
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.functions import is_function
 from composer.behavior_types.libraries.standard_types import is_asynchronous
 from composer.behavior_types.scalars import is_byte, is_number, is_text
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
     Collection,
     ModuleFunction,
-    OwnMethod,
     OwnObject,
     Value,
     pair,
 )
-from composer.field_types import BOOL
+from composer.field_types import ANYTHING, BOOL
 from composer.interfaces import FieldType, Message
 
 #: Built-in functions whose first argument is iterated over.
@@ -52,7 +53,7 @@ def iteration_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             yield from _unpacked(target, found, value, scope)
         case ast.Call(func=function, args=arguments):
             name = scope.called_name(function)
-            if name in _ITERATING and arguments:
+            if (name in _ITERATING and arguments) or (name == "iter" and len(arguments) == 1):
                 yield from _iterated(arguments[0], scope)
             elif name == "zip" or (name in {"min", "max"} and len(arguments) == 1):
                 for argument in arguments:
@@ -61,6 +62,7 @@ def iteration_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             yield from _iterated(value, scope)
         case ast.AugAssign(target=ast.expr() as target, op=ast.Add(), value=value):
             changed = scope.type_of(target)
+            changed = before_changes(target, scope) if changed is ANYTHING else changed
             is_list = isinstance(changed, Collection) and changed.python is list
             # numpy adds a number to each element of an array
             is_field = isinstance(changed, FieldType) and changed.is_array
@@ -84,10 +86,10 @@ def _iterated(
 
 def is_scalar(type_: Value) -> bool:
     """Return whether a value has no elements: a number, a message, a function or a plain object."""
-    if isinstance(type_, OwnMethod):
-        return True
     if isinstance(type_, ModuleFunction):  # a decorator may make anything of it
         return not type_.node.decorator_list
+    if is_function(type_):
+        return True
     if isinstance(type_, OwnObject):
         known = known_attributes(type_.of)
         return known is not None and not {"__iter__", "__getitem__"} & known

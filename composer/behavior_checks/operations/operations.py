@@ -12,6 +12,7 @@ from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.operations.array_shapes import product_problem
 from composer.behavior_checks.operations.caught import exception_class, unreachable_handlers
 from composer.behavior_checks.operations.formats import percent_problem
+from composer.behavior_checks.operations.membership import CONVERSIONS, conversion_problems
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.flow import returned_values
@@ -26,17 +27,15 @@ from composer.behavior_types.expressions.operators import (
     order_problem,
     unary_problem,
 )
+from composer.behavior_types.functions import is_function
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.standard_types import ITERATORS
-from composer.behavior_types.scalars import is_float, is_scalar
+from composer.behavior_types.scalars import is_float, is_scalar, is_text
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
-    ApiMethod,
     ApiValue,
     Collection,
-    ModuleFunction,
-    OwnMethod,
     OwnObject,
     Parameters,
     Ports,
@@ -131,6 +130,8 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 if problem is not None:
                     yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
         case ast.Call(func=function) if called := scope.called_name(function):
+            if called in CONVERSIONS:
+                yield from conversion_problems(node, called, scope)
             yield from library_call_problems(node, called, scope)
         case ast.Try():
             yield from unreachable_handlers(node, scope)
@@ -148,7 +149,7 @@ def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]
     """Yield why '+=' and the like fail."""
     changed = scope.type_of(node.target)
     if changed is ANYTHING:
-        before = _before_changes(node.target, scope)
+        before = before_changes(node.target, scope)
         changed = before if is_scalar(before) or isinstance(before, Message) else ANYTHING
     problem = operation_problem(changed, node.op, scope.type_of(node.value))
     is_array = isinstance(changed, FieldType) and changed.is_array
@@ -156,7 +157,7 @@ def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]
         yield CodeProblem(Kind.VALUE, problem, span_of(node.value, scope.home.source))
 
 
-def _before_changes(target: ast.expr, scope: FunctionTypes) -> Value:
+def before_changes(target: ast.expr, scope: FunctionTypes) -> Value:
     """Return the type of a name or an attribute without what '+=' and the like do to it."""
     if isinstance(target, ast.Name):
         return scope.before_changes(target.id)
@@ -228,12 +229,17 @@ _TEXT = FieldType("string")
 def _index_problem(owner: Value, index: Value) -> str | None:
     is_list = isinstance(owner, FieldType) and owner.is_array
     is_sequence = isinstance(owner, Collection) and owner.python in (list, tuple, bytes)
-    if (is_list or is_sequence) and is_float(index):
+    is_ordered = is_list or is_sequence or is_text(owner)
+    if is_ordered and is_float(index):
         return "an index must be an integer, not a float"
+    if is_ordered and (is_text(index) or isinstance(index, Message) or is_function(index)):
+        return f"an index must be an integer, not {shown(index)}"
     return None
 
 
 def _owner_problem(owner: Value) -> str | None:
+    if is_function(owner):
+        return "a function has no items: call it"
     if isinstance(owner, Message) or (is_scalar(owner) and owner != _TEXT):
         return f"{described(owner)} is not a list"  # type: ignore[arg-type]
     return None
@@ -251,8 +257,7 @@ def _position_problem(owner: Value, index: ast.expr) -> str | None:
 def _has_no_length(type_: Value) -> bool:
     if isinstance(type_, Collection):
         return type_.python in ITERATORS or type_.python is Iterator
-    is_function = isinstance(type_, OwnMethod | ModuleFunction)
-    return is_function or isinstance(type_, Message) or (is_scalar(type_) and type_ != _TEXT)
+    return is_function(type_) or isinstance(type_, Message) or (is_scalar(type_) and type_ != _TEXT)
 
 
 def _unused(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -263,6 +268,6 @@ def _unused(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
             yield CodeProblem(Kind.UNUSED, message, span_of(value, source), "assign with '='")
         case ast.Attribute(attr=name) | ast.Name(id=name):
             found = scope.type_of(value)
-            if isinstance(found, OwnMethod | ModuleFunction | ApiMethod):
+            if is_function(found):
                 message = f"'{name}' is not called"
                 yield CodeProblem(Kind.UNUSED, message, span_of(value, source), "add '()'")

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, TypeGuard
 
+from composer.behavior_types.functions import is_function
 from composer.behavior_types.libraries.numpy_types import ARRAY, array_operation
 from composer.behavior_types.libraries.rclpy_api import (
     is_rclpy,
@@ -26,8 +27,6 @@ from composer.behavior_types.syntax.own_classes import (
 from composer.behavior_types.values import (
     NONE,
     Collection,
-    ModuleFunction,
-    OwnMethod,
     OwnObject,
     Value,
     join_all,
@@ -126,7 +125,7 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
     for value in (left, right):
         if isinstance(value, Message):
             return f"{value.name} has no operator '{sign}'"
-        if isinstance(value, OwnMethod | ModuleFunction):
+        if is_function(value):
             return f"a function has no operator '{sign}'"
     if is_time(left) or is_time(right):
         return _problem_of_times(left, sign, right)
@@ -190,6 +189,8 @@ def unary_problem(operator: ast.unaryop, operand: Value) -> str | None:
     is_wrong = sample is not None and not isinstance(sample, int | float)
     if is_wrong or (sign == "~" and isinstance(sample, float)):
         return f"operator '{sign}' on {_sampled(sample)}"
+    if is_function(operand):
+        return f"a function has no operator '{sign}'"
     return f"{operand.name} has no operator '{sign}'" if isinstance(operand, Message) else None
 
 
@@ -242,7 +243,7 @@ def equality_problem(left: Value, right: Value) -> str | None:
             return f"a {first.of.definition.name} is never equal to {_order(second)}"
         if isinstance(first, Message) and (is_number(second) or is_text(second)):
             return f"{first.name} is never equal to {_order(second)}"
-        if isinstance(first, OwnMethod | ModuleFunction) and _order(second) not in (
+        if is_function(first) and _order(second) not in (
             "",
             "a function",
         ):
@@ -267,7 +268,7 @@ def _order(type_: Value) -> str:
         return "a string"
     if isinstance(type_, Message):
         return type_.name
-    if isinstance(type_, OwnMethod | ModuleFunction):
+    if is_function(type_):
         return "a function"
     is_array = isinstance(type_, FieldType) and type_.is_array
     # numpy arrays, which messages may hold, can be compared with numbers

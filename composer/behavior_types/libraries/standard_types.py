@@ -313,6 +313,13 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
 _PAIR = 2
 
 
+#: Methods that change a collection and return None.
+IN_PLACE = frozenset(
+    {"add", "append", "appendleft", "clear", "discard", "extend", "insert", "remove", "reverse"}
+    | {"sort", "update"}
+)
+
+
 def method_result(owner: Collection, name: str, arguments: Sequence[Value]) -> Value:
     """Return the type of what a method of a collection or of a text returns."""
     if owner.python is str:
@@ -327,8 +334,7 @@ def method_result(owner: Collection, name: str, arguments: Sequence[Value]) -> V
         return STRING
     if name in {"pop", "popleft"} and len(arguments) <= 1:
         return owner.element
-    in_place = {"append", "appendleft", "clear", "extend", "insert", "remove", "reverse", "sort"}
-    return NONE if name in in_place | {"add", "discard", "update"} else ANYTHING
+    return NONE if name in IN_PLACE else ANYTHING
 
 
 def _of_dict(owner: Collection, name: str, arguments: Sequence[Value]) -> Value:

@@ -211,6 +211,7 @@ WRONG_CLASSES = [
     ("class A:\n    @property()\n    def b(self):\n        return 1", "property()"),
     ("@contextmanager()\ndef b():\n    yield 1", "contextmanager()"),
     ("@dataclass\nclass A:\n    a: int = 1\n    b: int", "int"),
+    ("@dataclass\nclass A:\n    a = field(default=1)", "a"),
     ("class A(NamedTuple):\n    a: int = 1\n    b: int", "int"),
     ("@dataclass\nclass A:\n    a: int\n    def __post_init__(self, b):\n        pass",
      "__post_init__"),

@@ -1,0 +1,187 @@
+"""Checks what is looked up: by 'in', in enumerations, and what methods return that change lists."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.behavior_checks.fitting import kind_of, shown
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source.spans import span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.operators import equality_problem
+from composer.behavior_types.functions import is_function
+from composer.behavior_types.libraries.standard_types import IN_PLACE
+from composer.behavior_types.scalars import is_number, is_text
+from composer.behavior_types.syntax.lineage import lineage
+from composer.behavior_types.syntax.own_classes import is_enumeration, known_attributes
+from composer.behavior_types.values import (
+    NONE,
+    Collection,
+    CollectionMethod,
+    OwnClass,
+    OwnObject,
+    Value,
+)
+from composer.diagnostics import suggestion
+from composer.field_types import ANYTHING
+from composer.interfaces import FieldType, Message
+
+#: The nodes that are checked here.
+LOOKUPS = (ast.Assign, ast.Attribute, ast.Compare, ast.Dict, ast.For, ast.Set, ast.Subscript)
+_SEVERAL = (list, dict, set)
+
+
+def lookup_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield why a lookup fails, or finds nothing."""
+    match node:
+        case ast.Compare(left=left, ops=[ast.In() | ast.NotIn()], comparators=[owner]):
+            yield from _membership(left, owner, scope)
+        case ast.Set(elts=items):
+            yield from _hashed(items, scope, "an element of a set")
+        case ast.Dict(keys=keys):
+            yield from _hashed([key for key in keys if key is not None], scope, "a key")
+        case ast.Assign(value=value) | ast.For(iter=value):
+            yield from _nothing(value, scope)
+        case ast.Subscript(value=value):
+            yield from _nothing(value, scope)
+            yield from _member(node, scope)
+        case ast.Attribute(value=value):
+            yield from _nothing(value, scope)
+
+
+def _membership(left: ast.expr, owner: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    found, whole = scope.type_of(left), scope.type_of(owner)
+    source = scope.home.source
+    if is_number(whole) or isinstance(whole, Message) or is_function(whole):
+        message = f"{shown(whole)} has no elements to look for"
+        yield CodeProblem(Kind.VALUE, message, span_of(owner, source))
+        return
+    if isinstance(whole, OwnObject):
+        names = [known_attributes(whole.of)]
+        names += map(known_attributes, scope.owner.project_classes.derived(whole.of))
+        needed = {"__contains__", "__getitem__", "__iter__"}
+        if all(known is not None and not known & needed for known in names):
+            message = f"{shown(whole)} has no elements to look for"
+            yield CodeProblem(Kind.VALUE, message, span_of(owner, source))
+        return
+    if is_text(whole):
+        if kind_of(found) not in (None, "text"):
+            message = f"{shown(found)} cannot be in a string"
+            yield CodeProblem(Kind.VALUE, message, span_of(left, source))
+        return
+    if isinstance(whole, Collection) and _never_in(found, whole, scope):
+        message = f"this is never in it: {shown(found)} in {shown(whole)} of other values"
+        yield CodeProblem(Kind.VALUE, message, span_of(left, source))
+
+
+def _never_in(found: Value, whole: Collection, scope: FunctionTypes) -> bool:
+    elements = whole.items or (scope.element(whole),)
+    return not whole.is_empty and all(_never_equal(found, element) for element in elements)
+
+
+def _never_equal(found: Value, element: Value) -> bool:
+    if ANYTHING in (found, element) or NONE in (found, element):
+        return False
+    if equality_problem(found, element) is not None:
+        return True
+    kinds = {kind_of(found), kind_of(element)}
+    return kinds == {"number", "text"}
+
+
+def _hashed(items: list[ast.expr], scope: FunctionTypes, what: str) -> Iterator[CodeProblem]:
+    for item in items:
+        found = scope.type_of(item)
+        is_list = isinstance(found, Collection) and found.python in _SEVERAL
+        if is_list or isinstance(found, Message):
+            message = f"{shown(found)} cannot be {what}"
+            yield CodeProblem(Kind.VALUE, message, span_of(item, scope.home.source))
+            return
+
+
+def _nothing(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the use of what ``sort``, ``append`` and the like return: None."""
+    if not isinstance(value, ast.Call) or scope.type_of(value) is not NONE:
+        return
+    called = scope.type_of(value.func)
+    if isinstance(called, CollectionMethod) and called.name in IN_PLACE:
+        kind = called.owner.python.__name__
+        message = f"'{called.name}' changes the {kind} itself, and returns nothing"
+        hint = "write sorted(...)" if called.name == "sort" else f"call '{called.name}' before"
+        yield CodeProblem(Kind.VALUE, message, span_of(value, scope.home.source), hint)
+
+
+def _member(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the name that an enumeration lacks, as in ``Mode["FASTT"]``."""
+    own = scope.type_of(node.value)
+    name = node.slice.value if isinstance(node.slice, ast.Constant) else None
+    if not isinstance(own, OwnClass) or not isinstance(name, str) or not is_enumeration(own):
+        return
+    known = known_attributes(own)
+    if known is not None and name not in known:
+        message = f"'{own.definition.name}' has no member '{name}'"
+        names = [item for item in known if not item.startswith("_")]
+        span = span_of(node.slice, scope.home.source)
+        yield CodeProblem(Kind.ATTRIBUTE, message, span, suggestion(name, names))
+
+
+def enumeration_problems(
+    call: ast.Call, own: OwnClass, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield the value that no member of an enumeration has, as in ``Mode("fastt")``."""
+    given = call.args[0] if len(call.args) == 1 and not call.keywords else None
+    if not isinstance(given, ast.Constant) or not is_enumeration(own, *_PLAIN_ENUMS):
+        return
+    family = lineage(own)
+    values: list[object] = []
+    for item in family.classes:
+        if any(method.node is not None for method in item.definition.methods):
+            return  # it may compute values
+        for statement in item.definition.node.body:
+            match statement:
+                case ast.Assign(targets=[ast.Name()], value=ast.Constant(value=value)):
+                    values.append(value)
+                case ast.Expr() | ast.Pass():
+                    pass
+                case _:
+                    return
+    if values and given.value not in values:
+        message = f"no member of '{own.definition.name}' has the value {ast.unparse(given)}"
+        yield CodeProblem(Kind.VALUE, message, span_of(given, scope.home.source))
+
+
+_PLAIN_ENUMS = ("enum.Enum", "enum.IntEnum", "enum.StrEnum")
+
+
+def conversion_problems(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check calls of ``float``, ``int``, ``next``, ``abs``, ``round`` and ``isinstance``."""
+    if not call.args or isinstance(call.args[0], ast.Starred):
+        return
+    first = call.args[0]
+    found, kind = scope.type_of(first), kind_of(scope.type_of(first))
+    problem, hint, where = None, None, first
+    if name in {"float", "int"}:
+        is_wrong = isinstance(found, Message) or kind in ("dict", "function", "tuple")
+        if is_wrong or (isinstance(found, Collection) and found.python in _CONTAINERS):
+            problem = f"'{name}' takes a number or a string, not {shown(found)}"
+    elif name in {"abs", "round"}:
+        is_wrong = isinstance(found, Message) or kind in ("dict", "function", "text", "tuple")
+        if is_wrong or (isinstance(found, Collection) and found.python in _CONTAINERS):
+            problem = f"'{name}' takes a number, not {shown(found)}"
+    elif name == "next":
+        is_array = isinstance(found, FieldType) and found.is_array
+        if is_array or (isinstance(found, Collection) and found.python in _CONTAINERS):
+            problem = f"'next' takes an iterator, not {shown(found)}"
+            hint = "write next(iter(...))"
+    elif name in {"isinstance", "issubclass"} and len(call.args) > 1:
+        where = call.args[1]
+        is_literal = isinstance(where, ast.Constant) and where.value is not None
+        if is_literal or isinstance(where, ast.List | ast.Set | ast.Dict):
+            problem = f"'{name}' needs a class or a tuple of classes"
+            hint = "write (...)" if isinstance(where, ast.List | ast.Set) else None
+    if problem is not None:
+        yield CodeProblem(Kind.VALUE, problem, span_of(where, scope.home.source), hint)
+
+
+_CONTAINERS = (dict, list, range, set, tuple)
+CONVERSIONS = frozenset({"abs", "float", "int", "isinstance", "issubclass", "next", "round"})

@@ -1,0 +1,135 @@
+"""Slips that Python itself does not refuse before the line runs, and code that is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic
+from tests.unit.support.checking import diagnostics_in, quoted
+
+SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
+CODE = """\
+from dataclasses import dataclass
+from enum import Enum
+
+from geometry_msgs.msg import Point
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
+
+
+class Mode(Enum):
+    FAST = "fast"
+
+
+@dataclass
+class Task:
+    name: str
+
+    def label(self) -> str:
+        return self.name
+
+
+class Code:
+    def on_configure(self):
+        self.tasks: list[Task] = []
+        self.by_name: dict[str, Task] = {}
+        self.mode = Mode.FAST
+        self.count = 0
+        self.row = [1.0, 2.0]
+        self.point = Point()
+        self.scan = LaserScan()
+
+    def on_tick(self):
+        {statement}
+
+    def value(self) -> float:
+        return 1.0
+"""
+#: The statement and the text that is underlined.
+MISTAKES = [
+    # functions that are not called
+    ("self.clock.now - 1.0", "self.clock.now - 1.0"),
+    ("if self.clock.now > 1.0:\n    pass", "self.clock.now > 1.0"),
+    ("for name, task in self.by_name.items:\n    pass", "self.by_name.items"),
+    ("len(self.by_name.values)", "self.by_name.values"),
+    ("-self.value", "-self.value"),
+    ("self.value[0]", "0"),
+    ("self.tasks.clear", "self.tasks.clear"),
+    ("String(data=self.name.upper)", "self.name.upper"),
+    # indices and members
+    ("self.row['a']", "'a'"),
+    ("self.scan.ranges['a']", "'a'"),
+    ("self.row[self.name]", "self.name"),
+    ("self.tasks.pop('a')", "'a'"),
+    ("Mode['FASTT']", "'FASTT'"),
+    ("Mode('FAST')", "'FAST'"),
+    # what returns nothing
+    ("for task in self.tasks.sort():\n    pass", "self.tasks.sort()"),
+    ("row = self.row.append(1.0)", "self.row.append(1.0)"),
+    ("self.row.sort()[0]", "self.row.sort()"),
+    # conversions
+    ("float(self.point)", "self.point"),
+    ("int(self.row)", "self.row"),
+    ("abs(self.name)", "self.name"),
+    ("next(self.row)", "self.row"),
+    ("isinstance(self.point, [int, float])", "[int, float]"),
+    ("isinstance(self.point, 'Point')", "'Point'"),
+    ("self.name.startswith(5)", "5"),
+    ("self.name.replace('a', 5)", "5"),
+    # what is not hashable, and not in it
+    ("print({[1]: 2})", "[1]"),
+    ("print({'a', [1]})", "[1]"),
+    ("if self.mode in ('fast', 'slow'):\n    pass", "self.mode"),
+    ("if 'a' in self.row:\n    pass", "'a'"),
+    ("if self.point in self.row:\n    pass", "self.point"),
+    ("if self.count in 5:\n    pass", "5"),
+    ("if 'x' in self.point:\n    pass", "self.point"),
+    ("if self.count in self.name:\n    pass", "self.count"),
+    ("if 'a' in Task('a'):\n    pass", "Task('a')"),
+    # lists
+    ("self.tasks.extend(['a'])", "['a']"),
+    ("self.tasks += Task('a')", "Task('a')"),
+    # conditions that depend on nothing
+    ("if self.name == 'a' or 'b':\n    pass", "'b'"),
+    ("assert (self.count > 0, 'positive')", "(self.count > 0, 'positive')"),
+    ("if self.name is 'a':\n    pass", "'a'"),
+]  # fmt: skip
+RIGHT = [
+    "self.clock.now() - 1.0, self.name.upper() + 'a'",
+    "for name, task in self.by_name.items():\n    task.label()",
+    "self.row[0], self.row[-1:], self.row[True], self.scan.ranges[0], self.name[0]",
+    "Mode['FAST'], Mode('fast'), Mode.__members__['FAST']",
+    "self.row.sort()\nself.tasks.append(Task('a'))\nself.tasks.pop(0)",
+    "later = self.row.append\nlater(2.0)",
+    "float(self.name), int(self.row[0]), abs(self.value()), round(1.5, 1), float(b'1')",
+    "next(iter(self.row)), next(x for x in self.row), next(enumerate(self.row))",
+    "isinstance(self.point, (int, float)), isinstance(self.count, int | float)",
+    "self.name.startswith(('a', 'b')), self.name.split(None), self.name.replace('a', 'b', 1)",
+    "values = {None}\nvalue = values.pop()\nfor line in iter(self.value, 0.0):\n    line + 1",
+    "{(1, 2): 3}, {'a', 'b'}, {Mode.FAST: 1}, {Task: 1}",
+    "self.mode in (Mode.FAST, None), 'a' in self.name, 1 in self.row, 'a' in self.by_name",
+    "self.mode.value in ('fast', 'slow'), self.count in range(5), self.mode in Mode",
+    "self.tasks.extend([Task('a')])\nself.tasks += [Task('b')]\nself.row.extend(range(3))",
+    "self.label = self.name or 'b'\nself.other = self.name == 'a' or 'b'",
+    "if self.name == 'a' or self.name == 'b' or self.count is None:\n    pass",
+    "[].append(1), [1, 'a'].index('a'), 'a' in [1, 'a']",
+]
+
+
+def _found(folder: Path, statement: str) -> list[Diagnostic]:
+    code = CODE.replace("{statement}", statement.replace("\n", "\n        "))
+    (folder / "code.py").write_text(code, encoding="utf-8")
+    return diagnostics_in(SYSTEM, folder)
+
+
+@pytest.mark.parametrize(("statement", "text"), MISTAKES)
+def test_a_slip_is_reported_once(statement: str, text: str, tmp_path: Path) -> None:
+    [diagnostic] = _found(tmp_path, statement)
+    assert quoted(diagnostic) == text
+
+
+def test_right_code_is_not_reported(tmp_path: Path) -> None:
+    found = _found(tmp_path, "\n".join(RIGHT))
+    assert [(item.message, quoted(item)) for item in found] == []
