@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.paused import PausedPrograms
 from benchmarks.processes import ProgramFailed
-from tests.ros.support.loops import wait_until
+from tests.ros.support.in_process import wait_until
 
 RING = ("bare_external", "none", "--shape", "ring", "--nodes", "2", "--seconds", "1")
 BOTH = tuple((*RING, "--part", part) for part in "01")

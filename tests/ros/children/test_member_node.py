@@ -19,8 +19,8 @@ from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.futures import Future
 from composer.runtime.metrics.statistics import Statistics
 from tests.ros.children.split_robot import DETECTOR, TEXT
-from tests.ros.support.in_process import system_of
-from tests.ros.support.loops import Bench, bench, wait_until
+from tests.ros.support.in_process import system_of, wait_until
+from tests.ros.support.loops import Bench, bench
 
 
 class Process:

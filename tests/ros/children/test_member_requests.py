@@ -21,8 +21,8 @@ from composer.runtime.executors.loop import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import CHANGE_STATES, FIGURES, GOALS
-from tests.ros.support.in_process import system_of
-from tests.ros.support.loops import Bench, bench, wait_until
+from tests.ros.support.in_process import system_of, wait_until
+from tests.ros.support.loops import Bench, bench
 
 SERVICE = "/robot/acting/manager/change_states"
 

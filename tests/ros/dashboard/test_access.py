@@ -7,7 +7,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from websockets.sync.client import connect
 from composer.runtime.process.dds_participants import count_participants
 from tests.ros.support.commands import COMPOSE, compose, start
 from tests.ros.support.dashboard import PATIENCE_S, Address, Browser, Dashboard, browser, dashboard
+from tests.ros.support.in_process import wait_until
 from tests.ros.support.system_process import RunningSystem
 
 #: Fast DDS never ends this thread, which wakes up once a second.
@@ -178,13 +179,6 @@ def test_a_read_only_dashboard_changes_nothing(server: Dashboard) -> None:
             assert page.error(op, **values)["code"] == "read_only", op
 
 
-def until(condition: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end_s
-        time.sleep(0.02)  # poll: nothing announces it
-
-
 def count_event_files(server: Dashboard) -> int:
     """Return the number of epoll instances, eventfds and timerfds of the process."""
     count = 0
@@ -201,14 +195,14 @@ def test_nothing_happens_without_a_browser(ros_domain_id: int) -> None:
         assert count_participants(ros_domain_id) == 0
         event_files = count_event_files(server)
         with browser(server.address) as page:
-            until(lambda: page.ok("ping")["state"] == "ready")
+            wait_until(lambda: page.ok("ping")["state"] == "ready")
             assert count_participants(ros_domain_id) == 1
             assert count_event_files(server) > event_files
-        until(lambda: count_participants(ros_domain_id) == 0)
-        until(lambda: count_event_files(server) <= event_files)
-        until(lambda: is_asleep(server))
+        wait_until(lambda: count_participants(ros_domain_id) == 0)
+        wait_until(lambda: count_event_files(server) <= event_files)
+        wait_until(lambda: is_asleep(server))
         with browser(server.address) as page:  # and again
-            until(lambda: page.ok("ping")["state"] == "ready")
+            wait_until(lambda: page.ok("ping")["state"] == "ready")
 
 
 def is_asleep(server: Dashboard) -> bool:
@@ -240,7 +234,7 @@ def test_a_dashboard_of_a_system_ends_with_it(ros_domain_id: int) -> None:
         assert foxglove.endswith(f"/foxglove?token={token}")
         assert token not in command_lines()
         assert system.stop()[0] == 0
-        until(lambda: not is_open(url))
+        wait_until(lambda: not is_open(url))
         page.close()
 
 
@@ -248,7 +242,7 @@ def test_a_dashboard_of_a_killed_system_ends(ros_domain_id: int) -> None:
     with RunningSystem("systems/talker_listener.yaml", "--dashboard", program=COMPOSE) as system:
         url = system.wait_for("dashboard: http").partition(": ")[2]
         system.process.send_signal(signal.SIGKILL)
-        until(lambda: not is_open(url))
+        wait_until(lambda: not is_open(url))
 
 
 def command_lines() -> str:
@@ -294,7 +288,7 @@ def test_the_browser_opens_the_page(
     with dashboard("--open") as server:
         address = server.address
         expected = f"{address.origin}/?token={address.token} 401 {address.origin}/"
-        until(lambda: seen.exists() and seen.read_text() == expected)
+        wait_until(lambda: seen.exists() and seen.read_text() == expected)
 
 
 def test_without_a_browser_the_address_is_left_to_the_user(
@@ -303,7 +297,7 @@ def test_without_a_browser_the_address_is_left_to_the_user(
     monkeypatch.setenv("BROWSER", "")
     monkeypatch.setenv("PATH", "")
     with dashboard("--open") as server:
-        until(lambda: "the browser cannot be opened" in server.errors())
+        wait_until(lambda: "the browser cannot be opened" in server.errors())
         assert get(server.address).status == 200
 
 

@@ -15,7 +15,14 @@ from websockets.typing import Subprotocol
 
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
 from tests.ros.support.commands import hand_written
-from tests.ros.support.dashboard import PATIENCE_S, Address, Dashboard, browser, dashboard
+from tests.ros.support.dashboard import (
+    PATIENCE_S,
+    Address,
+    Dashboard,
+    browser,
+    close_code,
+    dashboard,
+)
 
 MESSAGE, SERVICE = b"\x01", b"\x02"
 
@@ -212,28 +219,19 @@ def test_malformed_cdr_is_refused(server: Dashboard) -> None:
         assert client.is_served()
 
 
-def code_of(client: Raw) -> int | None:
-    """Wait until the server closes a connection; return the code, if it could send one."""
-    try:
-        while True:
-            client.socket.recv(timeout=PATIENCE_S)
-    except ConnectionClosed as end:
-        return None if end.rcvd is None else end.rcvd.code
-
-
 def test_nonsense_and_large_messages_end_only_their_connection(server: Dashboard) -> None:
     before_mb = server.memory_mb()
     with raw(server.address) as other:
         with raw(server.address) as client:
             for number in range(20):
                 client.send(b"\x07" if number % 2 else "nonsense")
-            assert code_of(client) == 1008
+            assert close_code(client.socket) == 1008
         for size in (2_000_000, 100_000_000):
             with raw(server.address) as client:
                 client.wait(lambda client=client: client.channels)
                 with suppress(ConnectionClosed):
                     client.send(b"\x01" * size)
-                assert code_of(client) in (1009, None)
+                assert close_code(client.socket) in (1009, None)
         assert other.is_served()
     assert server.memory_mb() < before_mb + 30
 
@@ -279,4 +277,4 @@ def test_clients_that_never_read_cost_no_memory(server: Dashboard) -> None:
         with suppress(ConnectionClosed):
             for _ in range(200_000):
                 client.send({"op": "unsubscribe", "subscriptionIds": [7]})
-        assert code_of(client) in (1008, None)
+        assert close_code(client.socket) in (1008, None)

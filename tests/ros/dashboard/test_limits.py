@@ -14,7 +14,15 @@ from websockets.sync.client import ClientConnection, connect
 from composer.dashboard.app import MAX_CONNECTIONS
 from composer.dashboard.server import BACKLOG, MAX_OPEN
 from tests.ros.support.commands import hand_written
-from tests.ros.support.dashboard import PATIENCE_S, Address, Browser, Dashboard, browser, dashboard
+from tests.ros.support.dashboard import (
+    PATIENCE_S,
+    Address,
+    Browser,
+    Dashboard,
+    browser,
+    close_code,
+    dashboard,
+)
 from tests.ros.support.in_process import wait_until
 
 
@@ -85,16 +93,7 @@ def test_a_program_that_sends_only_nonsense_is_disconnected(server: Dashboard) -
     with websocket(server.address) as opened:
         for _ in range(20):
             opened.send("nonsense")
-        assert code_of(opened) == 1008
-
-
-def code_of(opened: ClientConnection) -> int | None:
-    """Wait until the server closes a connection; return the code, if it could send one."""
-    try:
-        while True:
-            opened.recv(timeout=PATIENCE_S)
-    except ConnectionClosed as end:
-        return None if end.rcvd is None else end.rcvd.code
+        assert close_code(opened) == 1008
 
 
 def test_large_messages_end_only_their_connection(server: Dashboard, page: Browser) -> None:
@@ -104,7 +103,7 @@ def test_large_messages_end_only_their_connection(server: Dashboard, page: Brows
             opened.recv(timeout=PATIENCE_S)
             with suppress(ConnectionClosed):
                 opened.send(b"x" * size)
-            assert code_of(opened) in (1009, None)
+            assert close_code(opened) in (1009, None)
     # A frame that only announces its size.
     announced = raw(server.address, handshake(server.address))
     announced.recv(4096)

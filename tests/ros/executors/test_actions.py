@@ -18,7 +18,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 
 from composer.runtime.executors.entities import actions
 from composer.runtime.executors.tasks import sleep
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
+from tests.ros.support.in_process import wait_until
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
 

@@ -16,7 +16,8 @@ from composer.runtime.executors.factory import make_loop
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.executors.wait_set import executors
-from tests.ros.support.loops import KINDS, Bench, bench, executor_of, wait_until
+from tests.ros.support.in_process import wait_until
+from tests.ros.support.loops import KINDS, Bench, bench, executor_of
 
 
 @pytest.fixture(params=KINDS)

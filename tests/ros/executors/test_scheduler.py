@@ -19,7 +19,8 @@ from composer.runtime.executors.entities import readiness
 from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.futures import Future
-from tests.ros.support.loops import Bench, bench, peer, wait_until
+from tests.ros.support.in_process import wait_until
+from tests.ros.support.loops import Bench, bench, peer
 
 
 @pytest.fixture

@@ -20,7 +20,8 @@ from type_description_interfaces.srv import GetTypeDescription
 
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep, within
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
+from tests.ros.support.in_process import wait_until
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
 

@@ -12,7 +12,8 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line, wait_until
+from tests.ros.support.in_process import wait_until
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line
 
 
 @pytest.fixture(params=KINDS)

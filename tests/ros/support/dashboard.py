@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from tests.ros.support.forked import ForkedCommand
@@ -188,6 +189,15 @@ class Browser:
             self.updates.append(content)
         else:
             self._replies[content["id"]] = content
+
+
+def close_code(socket: ClientConnection) -> int | None:
+    """Wait until the server closes a connection; return the code, if it could send one."""
+    try:
+        while True:
+            socket.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as end:
+        return None if end.rcvd is None else end.rcvd.code
 
 
 @contextmanager

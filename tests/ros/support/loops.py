@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,14 +23,6 @@ from tests.ros.support.leaving import leave
 PEER = Path(__file__).parents[1] / "programs" / "loop_peer.py"
 PATIENCE_S = 60.0
 KINDS = list(ExecutorKind)
-
-
-def wait_until(condition: Callable[[], object], what: str = "") -> None:
-    """Wait until ``condition()`` is true; fail after a time limit."""
-    until = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < until, f"did not come true: {what or condition}"
-        time.sleep(0.002)
 
 
 @dataclass
