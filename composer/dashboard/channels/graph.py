@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +49,7 @@ class DiagramFeed(Feed):
         self._ros: RosGraphSide
         self._drawn: tuple[int, frozenset[str]] | None = None
         self._is_drawing = False
-        self._finished: list[Update | Exception] = []
+        self._finished: deque[Update | Exception] = deque()
 
     def start(self, ros: RosGraphSide) -> None:
         """Subscribe to the reports of systems, which have the states of nodes."""
@@ -62,8 +63,8 @@ class DiagramFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Yield what is drawn."""
-        finished, self._finished = self._finished, []
-        for item in finished:
+        while self._finished:
+            item = self._finished.popleft()
             if isinstance(item, Exception):
                 raise item
             yield item
@@ -85,7 +86,7 @@ class DiagramFeed(Feed):
         key = (self._drawn, self._view, self._is_live)
         try:
             diagram = self._ros.observed.diagrams.of(key, lambda: self._laid_out(topology, states))
-            self._finished += self._updates(diagram, topology.revision)
+            self._finished.extend(self._updates(diagram, topology.revision))
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
         finally:
