@@ -16,10 +16,9 @@ from composer.behavior_checks.calls.collection_calls import (
 )
 from composer.behavior_checks.calls.rclpy_calls import transition_problems
 from composer.behavior_checks.classes import class_problems
-from composer.behavior_checks.declared_keys import key_problems_of
+from composer.behavior_checks.declared_keys import key_problems_of, member_key_problems_of
 from composer.behavior_checks.fitting import argument_problem
 from composer.behavior_checks.function_calls import CallChecker
-from composer.behavior_checks.member_keys import member_key_problems
 from composer.behavior_checks.messages.elements import element_problems
 from composer.behavior_checks.messages.message_values import ValueChecker
 from composer.behavior_checks.missing_values import missing_values, unset_attributes
@@ -188,7 +187,7 @@ class _FunctionChecker:
                 case ast.Subscript():
                     yield from self._index(node)
                     yield from key_problems_of(node, self.function, self.scope)
-                    yield from member_key_problems(node, self.function, self.scope)
+                    yield from member_key_problems_of(node, self.function, self.scope)
                 case ast.Call():
                     yield from calls.problems(node)
                 case ast.Assign(targets=[target], value=value):

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from composer.behavior_checks.parts import possible_values
-from composer.behavior_checks.possible_constants import possible_constants
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module, helper_named
 from composer.behavior_source.method_body import dotted
@@ -37,6 +36,10 @@ def key_problems_of(
     declared = _of_record(node, scope) or _declared(node, scope)
     if declared is None or expects_missing(function, node.value):
         return
+    from composer.behavior_checks.possible_constants import (  # noqa: PLC0415 (start-up time)
+        possible_constants,
+    )
+
     candidates = [
         item for item in possible_constants(node.slice, scope) if _constant(item) is not None
     ]
@@ -51,6 +54,21 @@ def key_problems_of(
             span = span_of(item if is_here else node.slice, scope.home.source)
             yield CodeProblem(Kind.VALUE, message, span, hint)
             return
+
+
+def member_key_problems_of(
+    node: ast.Subscript, function: Function, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    """Yield the members of an enumeration that such a dict does not have."""
+    constant = constant_read(node.value, scope) if isinstance(node.ctx, ast.Load) else None
+    written = constant[0] if constant is not None else None
+    if constant is None or not isinstance(written, ast.Dict):
+        return
+    if not all(isinstance(key, ast.Attribute) for key in written.keys):
+        return
+    from composer.behavior_checks.member_keys import member_key_problems  # noqa: PLC0415
+
+    yield from member_key_problems(node, written, constant[1:], function, scope)
 
 
 def _of_record(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 
-from composer.behavior_checks.declared_keys import constant_read, expects_missing, stored_keys
+from composer.behavior_checks.declared_keys import expects_missing, stored_keys
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.method_body import dotted
@@ -18,16 +18,18 @@ from composer.behavior_types.values import OwnClass, OwnObject
 
 
 def member_key_problems(
-    node: ast.Subscript, function: Function, scope: FunctionTypes
+    node: ast.Subscript,
+    written: ast.Dict,
+    constant: tuple[str, Module],
+    function: Function,
+    scope: FunctionTypes,
 ) -> Iterator[CodeProblem]:
-    """Yield a member that such a dict does not have, and that the subscript reads.
+    """Yield a member that a dict does not have, and that the subscript reads.
 
-    If it may be any member, one is missing that the files use, and never distinguish.
+    If it may be any member, one is missing that the files use, and never distinguish. ``constant``
+    is the name of the dict, and its file.
     """
-    constant = constant_read(node.value, scope) if isinstance(node.ctx, ast.Load) else None
-    written, name, home = constant if constant is not None else (None, "", scope.home)
-    if not isinstance(written, ast.Dict):
-        return
+    name, home = constant
     found = _keys(written.keys, scope.owner.at_module(home))
     modules = scope.owner.source.own_modules
     if found is None or any(stored_keys(module, name) != frozenset() for module in modules):

@@ -16,6 +16,7 @@ from composer.behavior_types.expressions.objects import annotation_in, given_cla
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.handlers import Handler
 from composer.behavior_types.libraries.rclpy_api import is_rclpy, rclpy_class, rclpy_object
+from composer.behavior_types.outside_assignments import set_by_methods
 from composer.behavior_types.syntax.bindings import Bindings, nodes_of
 from composer.behavior_types.syntax.literals import constant_type
 from composer.behavior_types.syntax.names import own_name
@@ -23,7 +24,6 @@ from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.syntax.self_attributes import (
     ATTRIBUTES_OF_OBJECTS,
     class_attributes,
-    created_by,
     escapes,
 )
 from composer.behavior_types.values import (
@@ -117,7 +117,7 @@ class HostedTypes(BehaviorTypes):
         of_node = {*_PRIVATE} if self.bases else set()
         for own in self.bases:
             of_node |= known_attributes(own) or set()
-        assigned = created_by(self.source)
+        assigned = set_by_methods(self)
         return frozenset(ATTRIBUTES_OF_OBJECTS | of_node) | class_attributes(self.source, assigned)
 
     @cached_property

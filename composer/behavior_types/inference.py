@@ -24,7 +24,7 @@ from composer.behavior_types.expressions.objects import method_value
 from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.libraries.handlers import Handler, handlers_of
 from composer.behavior_types.libraries.rclpy_api import rclpy_object
-from composer.behavior_types.outside_assignments import set_from_outside
+from composer.behavior_types.outside_assignments import set_by_methods, set_from_outside
 from composer.behavior_types.syntax.bindings import (
     Binding,
     Bindings,
@@ -34,7 +34,7 @@ from composer.behavior_types.syntax.bindings import (
 )
 from composer.behavior_types.syntax.lineage import class_named
 from composer.behavior_types.syntax.project_classes import ProjectClasses, takes_object
-from composer.behavior_types.syntax.self_attributes import created_by, escapes, self_attributes
+from composer.behavior_types.syntax.self_attributes import escapes, self_attributes
 from composer.behavior_types.values import (
     NONE,
     ApiValue,
@@ -161,7 +161,7 @@ class BehaviorTypes:
             for statement in known.node.body
             if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)
         }
-        created = created_by(self.source)
+        created = set_by_methods(self)
         assigned = {
             name
             for name, bindings in self.assigned.items()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from composer.behavior_source import Function
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import nodes_of
+from composer.behavior_types.syntax.bindings import created_attributes, nodes_of
 from composer.behavior_types.values import OwnClass, Self
 from composer.interfaces import FieldType, Message
 
@@ -50,3 +50,14 @@ def _functions(types: BehaviorTypes) -> Iterator[tuple[FunctionTypes, Function]]
                     scope = types.function(method.node, home, OwnClass(known, home))
                 if scope is not None:
                     yield scope, method.node
+
+
+def set_by_methods(types: BehaviorTypes) -> frozenset[str]:
+    """Return the attributes that the methods of a class set, besides computing them again."""
+    return frozenset(
+        name
+        for home, known in types.source.classes
+        for method in known.methods
+        if (scope := types.scope(method, home)) is not None and method.node is not None
+        for name in created_attributes(method.node, scope.bindings)
+    )

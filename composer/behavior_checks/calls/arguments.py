@@ -16,7 +16,6 @@ from functools import cache
 from composer import behavior
 from composer.behavior_source import Function, Method
 from composer.behavior_source.method_body import dotted
-from composer.behavior_types.libraries.numpy_signatures import NUMPY_ARRAYS, NUMPY_PARAMETERS
 from composer.behavior_types.syntax.bindings import CONTEXTS, is_class_method, is_static
 from composer.behavior_types.syntax.lineage import PLAIN_BASES, lineage
 from composer.behavior_types.syntax.own_classes import (
@@ -277,6 +276,11 @@ def library_signature(name: str) -> Signature | None:
 
 
 def _of_numpy(full: str, name: str) -> Signature | None:
+    from composer.behavior_types.libraries.numpy_signatures import (  # noqa: PLC0415 (start-up time)
+        NUMPY_ARRAYS,
+        NUMPY_PARAMETERS,
+    )
+
     count = NUMPY_ARRAYS.get(name)
     if count is not None:  # the next argument is where to store the result
         names = tuple(f"x{at + 1}" for at in range(count))

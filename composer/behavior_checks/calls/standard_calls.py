@@ -12,7 +12,6 @@ from composer.behavior_checks.calls.arguments import (
     signature_of_function,
 )
 from composer.behavior_checks.calls.call import call_problems, function_problems
-from composer.behavior_checks.calls.library_arguments import library_argument_problems
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
@@ -26,6 +25,8 @@ from composer.field_types import INTEGER
 
 #: Functions of math that do not take numbers only.
 _OF_ITERABLES = frozenset({"math.dist", "math.fsum", "math.prod", "math.sumprod"})
+#: Modules whose functions take arguments of certain types.
+_WITH_TYPES = frozenset({"bisect", "heapq", "numpy", "random", "statistics"})
 
 
 def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -42,7 +43,13 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
     signature = library_signature(name)
     if signature is not None:
         problems = list(call_problems(call, signature, scope))
-        yield from problems or library_argument_problems(call, signature, scope)
+        yield from problems
+        if not problems and name.partition(".")[0] in _WITH_TYPES:
+            from composer.behavior_checks.calls.library_arguments import (  # noqa: PLC0415 (start-up time)
+                library_argument_problems,
+            )
+
+            yield from library_argument_problems(call, signature, scope)
     if name == "time.sleep" or name.startswith("math."):
         takes_numbers = name not in _OF_ITERABLES
         for argument in call.args:

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 from composer.behavior_checks.calls.standard_calls import library_call_problems
 from composer.behavior_checks.fitting import kind_of, shown
-from composer.behavior_checks.operations.array_shapes import product_problem
 from composer.behavior_checks.operations.caught import exception_class, unreachable_handlers
 from composer.behavior_checks.operations.formats import percent_problem
 from composer.behavior_checks.operations.membership import CONVERSIONS, conversion_problems
@@ -99,7 +98,7 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
             problem = problem or percent_problem(left, operator, right, scope)
             if isinstance(operator, ast.MatMult):
-                problem = product_problem(left, right, scope)
+                problem = _product_problem(left, right, scope)
             if problem is not None:
                 about = blamed_name((left, right), scope)
                 yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)
@@ -143,6 +142,14 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 message = f"'{name}' needs the event loop of asyncio, which does not run here"
                 hint = "use self.clock.sleep" if name == "asyncio.sleep" else None
                 yield CodeProblem(Kind.ASYNCIO, message, span_of(function, source), hint)
+
+
+def _product_problem(left: ast.expr, right: ast.expr, scope: FunctionTypes) -> str | None:
+    from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+        product_problem,
+    )
+
+    return product_problem(left, right, scope)
 
 
 def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]:

@@ -114,7 +114,8 @@ def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
         found.name(other.arg if other is not None else None)
     for node in nodes_of(function):
         _bind(node, found)
-        _bind_uses(node, found)
+        if isinstance(node, _WITH_NAMES):
+            _bind_uses(node, found)
     for name, inner in found.inner.items():
         # what the function around it calls the same may be something else
         is_only = len(inner) == 1 and name not in found.names
@@ -137,24 +138,27 @@ def reads_attribute(node: ast.expr | None, receiver: str | None, name: str) -> b
     )
 
 
-def created_attributes(function: Function) -> Iterator[str]:
+def created_attributes(function: Function, found: Bindings | None = None) -> Iterator[str]:
     """Yield the attributes that a method assigns, without those that it only computes again.
 
     ``self.count = self.count + 1`` fails without ``self.count``, unless the method expects that.
     """
-    found = bindings_of(function)
-    expects = any(
+    found = bindings_of(function) if found is None else found
+    updated = {
+        name
+        for name, bindings in found.attributes.items()
+        if all(
+            item.how is not How.ANNOTATION
+            and reads_attribute(item.expression, found.receiver, name)
+            for item in bindings
+        )
+    }
+    expects = bool(updated) and any(
         isinstance(node, ast.ExceptHandler)
         or (isinstance(node, ast.Name) and node.id in {"getattr", "hasattr", "suppress", "vars"})
         for node in nodes_of(function)
     )
-    for name, bindings in found.attributes.items():
-        is_new = (
-            item.how is How.ANNOTATION or not reads_attribute(item.expression, found.receiver, name)
-            for item in bindings
-        )
-        if expects or any(is_new):
-            yield name
+    yield from (name for name in found.attributes if expects or name not in updated)
 
 
 #: Decorators that make a context for 'with' of a generator.
@@ -253,6 +257,9 @@ def _of_generators(generators: list[ast.comprehension]) -> dict[str, Binding]:
         )
         for name, items in found.names.items()
     }
+
+
+_WITH_NAMES = (ast.DictComp, ast.GeneratorExp, ast.Lambda, ast.ListComp, ast.SetComp)
 
 
 def _bind_uses(node: ast.AST, found: Bindings) -> None:

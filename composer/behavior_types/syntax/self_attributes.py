@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.api import BEHAVIOR_ATTRIBUTES
-from composer.behavior_types.syntax.bindings import created_attributes, is_static, nodes_of
+from composer.behavior_types.syntax.bindings import is_static, nodes_of
 from composer.behavior_types.syntax.names import own_name
 
 #: The attributes of every object of a class.
@@ -19,14 +19,6 @@ def self_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozense
     """Return the attributes of a behavior whose class is known completely."""
     of_behavior = {*ATTRIBUTES_OF_OBJECTS, *BEHAVIOR_ATTRIBUTES}
     return class_attributes(source, assigned) | of_behavior
-
-
-def created_by(source: BehaviorSource) -> frozenset[str]:
-    """Return the attributes that the methods of a class set, besides computing them again."""
-    methods = (method.node for _, known in source.classes for method in known.methods)
-    return frozenset(
-        name for node in methods if node is not None for name in created_attributes(node)
-    )
 
 
 def class_attributes(source: BehaviorSource, assigned: Iterable[str]) -> frozenset[str]:
