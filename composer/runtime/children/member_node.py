@@ -23,7 +23,7 @@ from composer.runtime.children.outside_node import (
     OutsideNode,
     TransitionRefused,
 )
-from composer.runtime.children.remote_lifecycle import GOALS, PRIMARY_STATES
+from composer.runtime.children.remote_lifecycle import DONE_IN, GOALS, PRIMARY_STATES
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import within
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
@@ -31,15 +31,6 @@ from composer.runtime.ros.manager_protocol import CREATE
 
 #: A report follows a successful response soon; each second there is one in any case.
 _REPORTED_WITHIN_S = 2.0
-#: The states of the node in which a transition has nothing to do: a process that ran before the
-#: coordinating one keeps its nodes as they are.
-_DONE = {
-    "configure": (INACTIVE, ACTIVE),
-    "activate": (ACTIVE,),
-    "deactivate": (INACTIVE, UNCONFIGURED, FINALIZED),
-    "cleanup": (UNCONFIGURED, FINALIZED),
-    "shutdown": (FINALIZED,),
-}
 
 
 class MemberNode(OutsideNode):
@@ -59,6 +50,7 @@ class MemberNode(OutsideNode):
         self._has_failed = False
         self._late_reports: _LateReports | None = None  # while it is awaited to be taken down
         self._is_lost = False  # its process has ended, and its return has not been reported
+        self._given_up: set[str] = set()  # goals of requests that may still arrive after a cut
         process.add(self)
 
     @property
@@ -171,7 +163,7 @@ class MemberNode(OutsideNode):
 
     async def _request(self, transition: str) -> None:
         is_kept = transition == "shutdown" and self._process.pid is None
-        if is_kept or self._process.is_left or self._reported in _DONE[transition]:
+        if is_kept or self._process.is_left or self._reported in DONE_IN[transition]:
             return  # a process that was not started here may be used again
         goal, reported = GOALS[transition], Future[None]()
         self._awaited = goal, reported
@@ -180,11 +172,15 @@ class MemberNode(OutsideNode):
             self._after = ()
             try:
                 await self._finish(result, reported)
+            except ProcessUnavailable:
+                self._given_up.add(goal)
+                raise
             finally:
                 result.cancel()  # nothing waits for it any more
         finally:
             self._awaited = None
         self._reported, self._is_moving = goal, False
+        self._given_up.clear()  # requests arrive in order
 
     async def _finish(self, result: Future[SetParametersResult], reported: Future[None]) -> None:
         """Wait for the end of a transition: a report, or a response, perhaps that of many nodes."""
@@ -276,7 +272,18 @@ class MemberNode(OutsideNode):
             self.on_process_return()
 
     def _follow(self, state: str) -> None:
-        """Report a transition that another tool has requested from the node itself."""
+        """Report a transition that another tool has requested from the node itself.
+
+        If it was requested here before the process was lost, it is given up by now: the node is
+        used again in its state, as after the return of its process.
+        """
+        if state in self._given_up:
+            self._given_up.clear()
+            self._state = state
+            outcome = TransitionOutcome("return", state, success=True, external=False)
+            self._listener.on_transition_end(outcome)
+            self._listener.on_returned()
+            return
         transition = {
             UNCONFIGURED: "cleanup",
             INACTIVE: "deactivate" if self._state == ACTIVE else "configure",

@@ -26,6 +26,15 @@ GOALS = {
     "cleanup": "unconfigured",
     "shutdown": "finalized",
 }
+#: The states of a node in another process of the system in which each transition has nothing to do:
+#: a process that ran before the coordinating one keeps its nodes as they are.
+DONE_IN = {
+    "configure": ("inactive", "active"),
+    "activate": ("active",),
+    "deactivate": ("inactive", "unconfigured", "finalized"),
+    "cleanup": ("unconfigured", "finalized"),
+    "shutdown": ("finalized",),
+}
 PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
 
 

@@ -12,6 +12,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 
+from composer.runtime.children.remote_lifecycle import DONE_IN
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
@@ -137,6 +138,8 @@ class MemberService:
             if problem is not None:
                 return TransitionOutcome(transition, FINALIZED, success=False, reason=problem)
             node = self._callbacks.nodes()[node.full_name]
+        if node.state in DONE_IN.get(transition, ()):  # by a request that was given up, perhaps
+            return TransitionOutcome(transition, node.state, success=True)
         if transition == CREATE:
             return TransitionOutcome(transition, node.state, success=True)
         return await node.lifecycle.change(transition)

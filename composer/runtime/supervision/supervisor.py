@@ -316,13 +316,13 @@ class Supervisor:
         self.reconcile_settled(f"executor '{recovered.loop}' runs again")
 
     def _on_returned(self, name: str) -> None:
-        """Bring an external node up again that had disappeared, and what depends on it."""
+        """Bring a node up again that was not there, or not as expected, and what depends on it."""
         was_absent = name in self._absent
         self._absent.discard(name)
         if was_absent or name in self.desired.down:
             self.shared.update(partial(DesiredState.release, node=name))
-            full_name = self._node_set.nodes[name].full_name
-            self.reconcile_settled(f"{full_name} is there again")
+        full_name = self._node_set.nodes[name].full_name
+        self.reconcile_settled(f"{full_name} is there again")
 
     def _is_outdated(self, fault: Fault) -> bool:
         """Return whether the node has left the state in which it failed."""

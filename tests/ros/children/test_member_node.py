@@ -18,6 +18,7 @@ from composer.runtime.children.member_report import MemberState
 from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.futures import Future
 from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.outcome import TransitionOutcome
 from tests.ros.children.split_robot import DETECTOR, TEXT
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
@@ -52,11 +53,17 @@ class Process:
 class Listener:
     """Ignores what the node reports."""
 
-    def on_ended(self, *_: object, **__: object) -> None:
-        pass
+    def __init__(self) -> None:
+        self.events: list[str] = []
 
-    def on_transition_end(self, *_: object) -> None:
-        pass
+    def on_ended(self, *_: object, **__: object) -> None:
+        self.events.append("ended")
+
+    def on_transition_end(self, outcome: TransitionOutcome) -> None:
+        self.events.append(f"{outcome.transition} {outcome.state}")
+
+    def on_returned(self) -> None:
+        self.events.append("returned")
 
 
 def failed_node(on: Bench, process: Any, folder: Path) -> MemberNode:
@@ -108,3 +115,33 @@ def test_a_node_that_is_taken_down_late_does_not_hang(
         wait_until(restart.done, "the end of the restart")
         assert not process.killed
         assert restart.result().success
+
+
+class CutOff(Process):
+    """A process that is lost with the first request, and receives it later."""
+
+    is_absent = False
+
+    def request(self, *_: object) -> Future[SetParametersResult]:
+        lost: Future[SetParametersResult] = Future()
+        lost.set_exception(ProcessUnavailable("process 'sensing' has not reported for 5 s"))
+        return lost
+
+
+def test_a_request_that_arrives_after_a_cut_is_not_that_of_a_user(tmp_path: Path) -> None:
+    with bench(ExecutorKind.EVENTS) as on:
+        node = failed_node(on, CutOff(), tmp_path)
+        on.loop.run(lambda: node.on_report(MemberState("active", "")))
+        on.loop.run(node.take_over)
+        pause = on.loop.run_task(node.run_step("deactivate", lambda: False))
+        wait_until(pause.done, "the end of the request")
+        on.loop.run(lambda: node.on_report(MemberState("active", "")))
+        on.loop.run(node.take_over)
+        events = node._listener.events  # type: ignore[attr-defined]
+        events.clear()
+        on.loop.run(lambda: node.on_report(MemberState("inactive", "")))
+        assert events == ["return inactive", "returned"]  # and a plan activates it
+        events.clear()
+        on.loop.run(lambda: node.on_report(MemberState("active", "")))
+        on.loop.run(lambda: node.on_report(MemberState("inactive", "")))
+        assert events == ["activate active", "deactivate inactive"]  # now it is one
