@@ -14,9 +14,12 @@ from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.spans import span_of, start_span
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.libraries.numpy_types import ARRAY
+from composer.behavior_types.scalars import is_number
 from composer.behavior_types.values import Pending, Value
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
+from composer.field_types import described
 from composer.interfaces import Field, FieldType, Message
 from composer.source import Span
 
@@ -88,6 +91,8 @@ class ValueChecker:
                 yield first
                 return
         problem = value_problem(node, found, expected, self.scope.owner.interfaces)
+        if problem is None and isinstance(expected, FieldType) and found == ARRAY:
+            problem = _dimensions(node, expected, self.scope)
         if problem is None and isinstance(expected, FieldType):
             size = size_problem(node, expected, self.scope)
             problem = (size, None) if size is not None else None
@@ -96,3 +101,21 @@ class ValueChecker:
 
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)
+
+
+def _dimensions(
+    node: ast.expr, expected: FieldType, scope: FunctionTypes
+) -> tuple[str, str | None] | None:
+    """Return why an array of numpy does not fit a field, which takes one dimension only."""
+    is_sequence = expected.is_array and expected.array_size is None
+    if not is_sequence or not is_number(expected.element):
+        return None
+    from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+        rank_of,
+    )
+
+    rank = rank_of(node, scope)
+    if rank is None or rank <= 1:
+        return None
+    hint = "write .tobytes()" if expected.name == "uint8" else "write .ravel()"
+    return f"an array of {rank} dimensions where {described(expected)} is expected", hint

@@ -10,7 +10,7 @@ from composer.behavior_types.scalars import is_number
 from composer.behavior_types.syntax.bindings import How
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.names import constant_named
-from composer.behavior_types.values import ModuleFunction
+from composer.behavior_types.values import ModuleFunction, OwnMethod
 from composer.field_types import ANYTHING
 
 Shape = tuple[int, ...]
@@ -43,6 +43,32 @@ def shape_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> Sha
             return _of_display(node, scope)
         case _:
             return None
+
+
+def rank_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> int | None:
+    """Return how many dimensions an array has, None if that is not known."""
+    shape = shape_of(node, scope, depth)
+    if shape is not None or depth == 0:
+        return None if shape is None else len(shape)
+    match node:
+        case ast.Name(id=name):
+            bindings = scope.bindings.names.get(name, [])
+            only = bindings[0] if len(bindings) == 1 else None
+            if only is None or only.how is not How.VALUE or only.positions:
+                return None
+            return None if only.expression is None else rank_of(only.expression, scope, depth - 1)
+        case ast.Call(func=function, args=[ast.Tuple(elts=sizes), *_]):
+            is_filled = scope.called_name(function) in _FILLED
+            is_known = is_filled and not any(isinstance(item, ast.Starred) for item in sizes)
+            return len(sizes) if is_known else None
+        case ast.Call(func=function):
+            match scope.type_of(function):
+                case OwnMethod(method=method, home=home) if method.node is not None:
+                    values = list(returned_values(method.node))
+                    inside = scope.owner.scope(method, home)
+                    if len(values) == 1 and inside is not None:
+                        return rank_of(values[0], inside, depth - 1)
+    return None
 
 
 def product_problem(left: ast.expr, right: ast.expr, scope: FunctionTypes) -> str | None:

@@ -29,7 +29,7 @@ from composer.behavior_types.expressions.operators import (
 from composer.behavior_types.functions import is_function
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.standard_types import ITERATORS
-from composer.behavior_types.scalars import is_float, is_scalar, is_text
+from composer.behavior_types.scalars import is_float, is_number, is_scalar, is_text
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
@@ -94,14 +94,8 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
     """Yield the problems of an operation or a statement."""
     source = scope.home.source
     match node:
-        case ast.BinOp(left=left, op=operator, right=right):
-            problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
-            problem = problem or percent_problem(left, operator, right, scope)
-            if isinstance(operator, ast.MatMult):
-                problem = _product_problem(left, right, scope)
-            if problem is not None:
-                about = blamed_name((left, right), scope)
-                yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)
+        case ast.BinOp():
+            yield from _calculation(node, scope)
         case ast.UnaryOp(op=operator, operand=operand):
             problem = unary_problem(operator, scope.type_of(operand))
             if problem is not None:
@@ -150,6 +144,53 @@ def _product_problem(left: ast.expr, right: ast.expr, scope: FunctionTypes) -> s
     )
 
     return product_problem(left, right, scope)
+
+
+def _calculation(node: ast.BinOp, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield why an arithmetic operation fails."""
+    left, operator, right = node.left, node.op, node.right
+    source = scope.home.source
+    problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
+    problem = problem or percent_problem(left, operator, right, scope)
+    problem = problem or _problem_of_array(left, operator, right, scope)
+    if isinstance(operator, ast.MatMult):
+        problem = _product_problem(left, right, scope)
+    if problem is not None:
+        about = blamed_name((left, right), scope)
+        yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)
+
+
+def _problem_of_array(
+    left: ast.expr, operator: ast.operator, right: ast.expr, scope: FunctionTypes
+) -> str | None:
+    """Return why an array in a message, which is none of numpy, is not calculated with a number."""
+    for array, number in ((left, right), (right, left)):
+        if not isinstance(array, ast.Attribute) or not _is_plain_number(number, scope):
+            continue
+        found, value = scope.type_of(array), scope.type_of(number)
+        is_repeated = isinstance(operator, ast.Mult) and not is_float(value)
+        if isinstance(operator, ast.MatMult) or is_repeated or not isinstance(found, FieldType):
+            continue
+        # a field of a fixed size is an array of numpy; all others are arrays of Python
+        is_plain = found.is_array and found.array_size is None and is_number(found.element)
+        if is_plain and isinstance(scope.type_of(array.value), Message):
+            return f"{described(found)} is a list: it cannot be calculated with as a whole"
+    return None
+
+
+def _is_plain_number(node: ast.expr, scope: FunctionTypes) -> bool:
+    """Return whether a value is a number of Python: one of numpy calculates with lists."""
+    match node:
+        case ast.UnaryOp(operand=operand):
+            return _is_plain_number(operand, scope)
+        case ast.Constant(value=int() | float()):
+            return True
+        case ast.Attribute(value=owner):
+            return isinstance(scope.type_of(owner), Parameters) and is_number(scope.type_of(node))
+        case ast.Call(func=function):
+            return scope.called_name(function) in {"float", "int", "len"}
+        case _:
+            return False
 
 
 def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]:

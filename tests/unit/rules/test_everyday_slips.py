@@ -14,8 +14,9 @@ CODE = """\
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
 from geometry_msgs.msg import Point
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import CameraInfo, Image, LaserScan
 from std_msgs.msg import String
 
 
@@ -44,6 +45,11 @@ class Code:
     def on_tick(self):
         {statement}
 
+    def pixels(self) -> np.ndarray:
+        pixels = np.zeros((self.count, self.count, 3), dtype=np.uint8)
+        pixels[0:2, 0] = 5
+        return pixels
+
     def value(self) -> float:
         return 1.0
 """
@@ -69,6 +75,10 @@ MISTAKES = [
     ("for task in self.tasks.sort():\n    pass", "self.tasks.sort()"),
     ("row = self.row.append(1.0)", "self.row.append(1.0)"),
     ("self.row.sort()[0]", "self.row.sort()"),
+    # arrays
+    ("self.scan.ranges / 2.0", "self.scan.ranges / 2.0"),
+    ("1 - self.scan.ranges", "1 - self.scan.ranges"),
+    ("Image(data=self.pixels())", "self.pixels()"),
     # conversions
     ("float(self.point)", "self.point"),
     ("int(self.row)", "self.row"),
@@ -108,6 +118,9 @@ RIGHT = [
     "isinstance(self.point, (int, float)), isinstance(self.count, int | float)",
     "self.name.startswith(('a', 'b')), self.name.split(None), self.name.replace('a', 'b', 1)",
     "values = {None}\nvalue = values.pop()\nfor line in iter(self.value, 0.0):\n    line + 1",
+    "Image(data=self.pixels().tobytes()), Image(data=self.pixels().ravel())",
+    "self.scan.ranges * 2, CameraInfo().k / 2.0, np.array(self.scan.ranges) / 2.0",
+    "LaserScan(ranges=np.zeros(3)), LaserScan(ranges=np.zeros((3,)))",
     "{(1, 2): 3}, {'a', 'b'}, {Mode.FAST: 1}, {Task: 1}",
     "self.mode in (Mode.FAST, None), 'a' in self.name, 1 in self.row, 'a' in self.by_name",
     "self.mode.value in ('fast', 'slow'), self.count in range(5), self.mode in Mode",
