@@ -9,8 +9,10 @@ from composer.analysis.python.hosted_classes import ClassOfNode
 from composer.behavior_source import BehaviorSource, Module, top_package
 from composer.behavior_source.method_body import argument, dotted
 from composer.behavior_source.spans import span_of
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.syntax.names import full_name, interface_name
+from composer.behavior_types.syntax.self_attributes import escapes
 from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.resolve.parameters import rclpy_type
@@ -70,6 +72,31 @@ def created_ports(found: ClassOfNode) -> Iterator[CreatedPort]:
         if interface and not rest and isinstance(name, ast.Constant):
             where: Span = span_of(call, module.source)
             yield CreatedPort(kind, str(name.value), Located(interface, where))
+
+
+def all_created_ports(found: ClassOfNode) -> list[tuple[PortKind, str]] | None:
+    """Return the kinds and names of all ports that a class creates by methods of Node.
+
+    None: it may create others, since a name is computed, or since other code gets the node.
+    """
+    source = found.source
+    if not source.complete or escapes(source, lambda full: full.startswith("rclpy.")):
+        return None
+    ports: list[tuple[PortKind, str]] = []
+    calls = list(_calls(source))
+    for _, call in calls:
+        creator = CREATORS.get(call.func.attr) if isinstance(call.func, ast.Attribute) else None
+        if creator is not None:
+            name = argument(call, 1, creator[1][1])
+            if not isinstance(name, ast.Constant):
+                return None
+            ports.append((creator[0], str(name.value)))
+    mentioned = sum(
+        isinstance(node, ast.Attribute) and node.attr in CREATORS
+        for module in source.own_modules
+        for node in walk(module.tree.body)
+    )
+    return ports if mentioned == len(ports) else None
 
 
 def _calls(source: BehaviorSource) -> Iterator[tuple[Module, ast.Call]]:
