@@ -72,6 +72,8 @@ from composer.source import Span
 if TYPE_CHECKING:
     from composer.behavior_checks.calls.blame import Blame
 
+#: Nodes of which only what is around them is checked; most nodes are of these.
+_UNCHECKED = (ast.Constant, ast.Name, ast.arg, ast.arguments, ast.keyword)
 #: Attributes of awaitables that code may use instead of awaiting them.
 _OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exception", "send"})
 
@@ -179,11 +181,15 @@ class _FunctionChecker:
             yield missing_await(pending, self.function, self.scope)
         calls = CallChecker(self.scope, self._values)
         for node in nodes_of(self.function):
+            if isinstance(node, _UNCHECKED):
+                continue
             match node:
                 case ast.Attribute():
                     yield from self._attribute(node)
                     if not isinstance(node.ctx, ast.Load):
                         yield from fixed_problems(node, self.scope)
+                    yield from lookup_problems(node, self.scope)
+                    continue  # nothing else is checked of it
                 case ast.Subscript():
                     yield from self._index(node)
                     yield from key_problems_of(node, self.function, self.scope)

@@ -96,6 +96,7 @@ class Bindings:
             self.names.setdefault(name, []).append(Binding())
 
 
+@lru_cache(maxsize=512)
 def bindings_of(function: Function, *, is_method: bool = True) -> Bindings:
     """Return the bindings in ``function`` and in the functions within it.
 
