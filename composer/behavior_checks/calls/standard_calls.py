@@ -19,6 +19,7 @@ from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.expressions.objects import fields_expected
 from composer.behavior_types.expressions.operators import operation_problem, order_problem
 from composer.behavior_types.scalars import is_float
+from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.own_classes import is_dataclass
 from composer.behavior_types.values import OwnObject
 from composer.field_types import INTEGER
@@ -40,6 +41,8 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
     if name == "dataclasses.replace":
         yield from _replaced(call, scope)
         return
+    if name in {"dataclasses.asdict", "dataclasses.astuple"}:
+        yield from _converted(call, scope)
     signature = library_signature(name)
     if signature is not None:
         problems = list(call_problems(call, signature, scope))
@@ -110,6 +113,15 @@ def _replaced(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
     signature = fields_signature(found.of, "replace", first=True)
     if signature is not None:
         yield from call_problems(call, signature, scope, fields_expected(scope, found.of))
+
+
+def _converted(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check what ``dataclasses.asdict`` and ``astuple`` convert."""
+    found = scope.type_of(call.args[0]) if call.args else None
+    is_right = isinstance(found, OwnObject) and any(map(is_dataclass, lineage(found.of).classes))
+    if found is not None and not is_right and kind_of(found) is not None:
+        span = span_of(call.args[0], scope.home.source)
+        yield CodeProblem(Kind.VALUE, f"{shown(found)} where a dataclass is expected", span)
 
 
 def _partial(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:

@@ -112,10 +112,18 @@ def _nothing(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
 
 
 def _member(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProblem]:
-    """Yield the name that an enumeration lacks, as in ``Mode["FASTT"]``."""
+    """Yield the name that an enumeration lacks, or a number: ``Mode["FASTT"]``, ``Mode[1]``."""
     own = scope.type_of(node.value)
+    if not isinstance(own, OwnClass) or not is_enumeration(own):
+        return
+    if is_number(scope.type_of(node.slice)):
+        class_name = own.definition.name
+        message = f"'{class_name}' has its members by name, not by number"
+        span = span_of(node.slice, scope.home.source)
+        yield CodeProblem(Kind.VALUE, message, span, f"by value: {class_name}(...)")
+        return
     name = node.slice.value if isinstance(node.slice, ast.Constant) else None
-    if not isinstance(own, OwnClass) or not isinstance(name, str) or not is_enumeration(own):
+    if not isinstance(name, str):
         return
     known = known_attributes(own)
     if known is not None and name not in known:

@@ -21,6 +21,7 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.annotations import annotated
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.expressions.operators import (
+    binary,
     equality_problem,
     operation_problem,
     order_problem,
@@ -29,7 +30,7 @@ from composer.behavior_types.expressions.operators import (
 from composer.behavior_types.functions import is_function
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.standard_types import ITERATORS
-from composer.behavior_types.scalars import is_float, is_number, is_scalar, is_text
+from composer.behavior_types.scalars import is_float, is_integer, is_number, is_scalar, is_text
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
@@ -201,6 +202,11 @@ def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]
         changed = before if is_scalar(before) or isinstance(before, Message) else ANYTHING
     problem = operation_problem(changed, node.op, scope.type_of(node.value))
     is_array = isinstance(changed, FieldType) and changed.is_array
+    if problem is None and isinstance(node.target, ast.Attribute):
+        owner = scope.type_of(node.target.value)
+        result = binary(changed, node.op, scope.type_of(node.value))
+        if isinstance(owner, Message) and is_integer(changed) and is_float(result):
+            problem = f"a float where {shown(changed)} is expected"
     if problem is not None and not is_array and not isinstance(changed, Collection):
         yield CodeProblem(Kind.VALUE, problem, span_of(node.value, scope.home.source))
 

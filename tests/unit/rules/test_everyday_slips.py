@@ -11,7 +11,7 @@ from tests.unit.support.checking import diagnostics_in, quoted
 
 SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
 CODE = """\
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
 
 import numpy as np
@@ -71,6 +71,13 @@ MISTAKES = [
     ("self.tasks.pop('a')", "'a'"),
     ("Mode['FASTT']", "'FASTT'"),
     ("Mode('FAST')", "'FAST'"),
+    ("Mode[self.count]", "self.count"),
+    # what is not a dataclass
+    ("asdict(self.point)", "self.point"),
+    ("asdict(self.mode)", "self.mode"),
+    # integers in messages
+    ("self.scan.header.stamp.sec += 0.5", "0.5"),
+    ("self.scan.header.stamp.sec /= 2", "2"),
     # what returns nothing
     ("for task in self.tasks.sort():\n    pass", "self.tasks.sort()"),
     ("row = self.row.append(1.0)", "self.row.append(1.0)"),
@@ -127,6 +134,8 @@ RIGHT = [
     "self.tasks.extend([Task('a')])\nself.tasks += [Task('b')]\nself.row.extend(range(3))",
     "self.label = self.name or 'b'\nself.other = self.name == 'a' or 'b'",
     "if self.name == 'a' or self.name == 'b' or self.count is None:\n    pass",
+    "asdict(Task('a'))\nself.scan.header.stamp.sec += 2\nself.scan.header.stamp.sec //= 2",
+    "self.scan.range_max += 1\nself.count += 0.5",
     "[].append(1), [1, 'a'].index('a'), 'a' in [1, 'a']",
 ]
 
