@@ -207,6 +207,7 @@ def running_dashboard(
             yield process, address
         finally:
             process.terminate()  # killed, it would stay in the graph for 20 s
+            process.send_signal(signal.SIGCONT)  # if it is stopped, it ends only then
 
 
 def _connected(address: re.Match[bytes]) -> connect:
