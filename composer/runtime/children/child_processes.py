@@ -69,6 +69,16 @@ class Child:
         has_started = self.started.done() and self.started.exception() is None
         return self.started.result() if has_started else None
 
+    @property
+    def how_ended(self) -> str:
+        """How it has ended, in words; empty while it runs, and if it never started."""
+        if not self.ended.done() or self.ended.cancelled():
+            return ""
+        status = self.ended.result()
+        if status >= 0:
+            return f"exited with status {status}"
+        return f"was ended by {signal_name(-status)}"
+
 
 class ChildProcesses:
     """Starts children and reports their output and their end, on a thread of its own.

@@ -17,7 +17,7 @@ from typing import Any
 
 from composer.model import Executable, ExecutableKind, LifecycleKind, Node
 from composer.runtime.callbacks.log import severity
-from composer.runtime.children.child_processes import Child, Command, StartFailed, signal_name
+from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
 from composer.runtime.children.output import parse_line
 from composer.runtime.children.outside_node import (
@@ -264,12 +264,7 @@ def _ended(child: Child) -> str:
     """Return how a process has ended, in words; empty while it runs."""
     if not child.ended.done():
         return ""
-    status = _status(child)
-    if status is None:
-        return "its process has not started"
-    if status >= 0:
-        return f"its process exited with status {status}"
-    return f"its process was ended by {signal_name(-status)}"
+    return f"its process {child.how_ended or 'has not started'}"
 
 
 def _seconds(executable: Executable) -> str:

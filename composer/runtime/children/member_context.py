@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from rclpy.node import Node as RosNode
 
-from composer.model import LogLevel
-from composer.runtime.children.child_processes import ChildProcesses
+from composer.model import LogLevel, Process
+from composer.runtime.children.child_processes import ChildProcesses, Command
 from composer.runtime.children.kept_goals import KeptGoals
 from composer.runtime.children.member_report import MemberState
 from composer.runtime.executors.loop import Loop
+from composer.runtime.process.environment import CONSOLE_FORMAT
+from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
+
+#: The path of the enclave of a process: see :mod:`composer.export.sros2`.
+_ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 
 
 class ProcessUnavailable(Exception):
@@ -56,3 +62,17 @@ class MemberContext:
     command: Sequence[str]
     goals: KeptGoals
     write_log: Callable[[LogLevel, str, str], None]
+
+    def full_name(self, process: Process) -> str:
+        """Return the full name of a process, which is the namespace of its manager."""
+        return f"{self.namespace}/{process.name.value}"
+
+    def command_of(self, process: Process, started_by: str) -> Command:
+        """Return the command that starts a process, with ``started_by`` in all of its reports."""
+        words = (*self.command, "--process", process.name.value)
+        # Its lines are parsed, whatever format those of this process have.
+        usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
+        if os.environ.get(_ENCLAVE_VARIABLE):  # this process has its own, as in the policy
+            usual[_ENCLAVE_VARIABLE] = self.full_name(process)
+        environment = {name.value: value for name, value in process.environment}
+        return Command(words, {**usual, **environment, STARTED_BY_VARIABLE: started_by})

@@ -10,7 +10,6 @@ here is used as it is, and from then on only awaited: what has started it may st
 from __future__ import annotations
 
 import math
-import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -24,7 +23,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import LogLevel, Process
-from composer.runtime.children.child_processes import Child, Command, StartFailed, signal_name
+from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.member_context import Member, MemberContext, ProcessUnavailable
 from composer.runtime.children.member_report import (
     MemberReport,
@@ -41,14 +40,11 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.diagnostics import from_text
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.outcome import FINALIZED
-from composer.runtime.process.environment import CONSOLE_FORMAT
-from composer.runtime.process.instance_lock import ALREADY_RUNS, STARTED_BY_VARIABLE, is_held
+from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
 from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
 STARTS_WITHIN_S = 30.0
-#: The path of the enclave of a process: see :mod:`composer.export.sros2`.
-_ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 _POLL_S = 0.01
 #: How often to look whether another process holds the instance lock.
 _LOCK_POLL_S = 0.1
@@ -92,7 +88,7 @@ class MemberProcess:
     def __init__(self, process: Process, context: MemberContext) -> None:
         self._process = process
         self._context = context
-        self._name = f"{context.namespace}/{process.name.value}"
+        self._name = context.full_name(process)
         self._members: dict[str, Member] = {}
         self._figures: defaultdict[str, NodeFigures] = defaultdict(NodeFigures)
         #: When, by ``time.monotonic()``, it last reported that a node has moved.
@@ -257,7 +253,7 @@ class MemberProcess:
         while self._life is None or not self._life.is_up:
             if child is not None and child.ended.done():
                 if self._may_start and child.ended.result() != ALREADY_RUNS:
-                    raise ProcessUnavailable(f"{self} {_how(child)}")
+                    raise ProcessUnavailable(f"{self} {child.how_ended}")
                 child = None
             if self._life is None and self._may_start and not is_held(self._name):
                 child = await self._start_child()
@@ -266,17 +262,10 @@ class MemberProcess:
             await sleep(self._context.loop, _LOCK_POLL_S if self._life is None else _POLL_S)
 
     async def _start_child(self) -> Child:
-        environment = {name.value: value for name, value in self._process.environment}
-        words = (*self._context.command, "--process", self._process.name.value)
-        # Its lines are parsed, whatever format those of this process have.
-        usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
         life = _Life(started_by=uuid4().hex)
-        own = {STARTED_BY_VARIABLE: life.started_by}
-        if os.environ.get(_ENCLAVE_VARIABLE):  # this process has its own, as in the policy
-            usual[_ENCLAVE_VARIABLE] = self._name
+        command = self._context.command_of(self._process, life.started_by)
         self._is_ending = False
         try:
-            command = Command(words, {**usual, **environment, **own})
             life.child = child = self._context.children.start(command, self._log)
             await child.started
         except (OSError, StartFailed) as error:
@@ -303,7 +292,7 @@ class MemberProcess:
         for figures in self._figures.values():
             figures.end_life()
         if life.child is not None:
-            self._fail(f"{self} {_how(life.child)}", is_expected=self._is_ending)
+            self._fail(f"{self} {life.child.how_ended}", is_expected=self._is_ending)
 
     # --- reports
 
@@ -404,11 +393,3 @@ class MemberProcess:
     def _log(self, text: str, is_error: bool) -> None:
         level, logger, message = parse_line(text, is_error=is_error)
         self._context.write_log(level, logger or self._process.name.value, printable(message))
-
-
-def _how(child: Child) -> str:
-    """Return how a process has ended, in words; empty while it runs."""
-    if not child.ended.done() or child.ended.cancelled():
-        return ""
-    status = child.ended.result()
-    return f"exited with status {status}" if status >= 0 else f"was ended by {signal_name(-status)}"
