@@ -23,8 +23,8 @@ def endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]]
 
 
 def _endpoints_by_node(graph: RosGraph) -> _Ends:
-    ends: _Ends = {name: [] for name in node_names(graph)}
-    replaced = graph.replaced()
+    nodes, replaced = graph.nodes_and_replaced()
+    ends: _Ends = {join_node_name(namespace, name): [] for name, namespace in nodes}
     for topic, types in visible_topics(graph).items():
         info = graph.topic(topic, types)
         for kind, found in (

@@ -125,22 +125,17 @@ class RosGraph:
 
         A killed process counts until DDS notices its end, unless its nodes run again.
         """
+        return self.nodes_and_replaced()[0]
+
+    def nodes_and_replaced(self) -> tuple[list[NodeName], frozenset[bytes]]:
+        """Return the nodes, and the participants that have ended and whose nodes run again."""
         found = self._all_nodes()
-        replaced = self._replaced(found)
+        replaced = self._ended() if len(found) > len(set(found)) else frozenset()
         if not replaced:
-            return found
+            return found, replaced
         ends = {(end.node_name, end.node_namespace, participant(end)) for end in self._all_ends()}
         gone = Counter((name, namespace) for name, namespace, prefix in ends if prefix in replaced)
-        return list((Counter(found) - gone).elements())
-
-    def replaced(self) -> frozenset[bytes]:
-        """Return the participants that have ended, if nodes with the names of theirs run again."""
-        return self._replaced(self._all_nodes())
-
-    def _replaced(self, found: list[NodeName]) -> frozenset[bytes]:
-        if len(found) == len(set(found)):
-            return frozenset()
-        return self._ended()
+        return list((Counter(found) - gone).elements()), replaced
 
     def _ended(self, others: Set[bytes] = frozenset()) -> frozenset[bytes]:
         """Return which participants have ended; ``others`` have announced only a part."""
