@@ -62,12 +62,7 @@ def parameter_types(found: ClassOfNode) -> dict[str, Located[str]]:
 
 def created_ports(found: ClassOfNode) -> Iterator[CreatedPort]:
     """Yield the ports that a class creates with a constant type and name."""
-    for module, call in _calls(found.source):
-        creator = CREATORS.get(call.func.attr) if isinstance(call.func, ast.Attribute) else None
-        if creator is None:
-            continue
-        kind, (of_type, of_name, *_) = creator
-        type_, name = argument(call, 0, of_type), argument(call, 1, of_name)
+    for module, call, kind, type_, name in _creations(found.source):
         interface, rest = interface_name(full_name(dotted(type_), module)) if type_ else ("", "")
         if interface and not rest and isinstance(name, ast.Constant):
             where: Span = span_of(call, module.source)
@@ -83,20 +78,27 @@ def all_created_ports(found: ClassOfNode) -> list[tuple[PortKind, str]] | None:
     if not source.complete or escapes(source, lambda full: full.startswith("rclpy.")):
         return None
     ports: list[tuple[PortKind, str]] = []
-    calls = list(_calls(source))
-    for _, call in calls:
-        creator = CREATORS.get(call.func.attr) if isinstance(call.func, ast.Attribute) else None
-        if creator is not None:
-            name = argument(call, 1, creator[1][1])
-            if not isinstance(name, ast.Constant):
-                return None
-            ports.append((creator[0], str(name.value)))
+    for _, _, kind, _, name in _creations(source):
+        if not isinstance(name, ast.Constant):
+            return None
+        ports.append((kind, str(name.value)))
     mentioned = sum(
         isinstance(node, ast.Attribute) and node.attr in CREATORS
         for module in source.own_modules
         for node in walk(module.tree.body)
     )
     return ports if mentioned == len(ports) else None
+
+
+def _creations(
+    source: BehaviorSource,
+) -> Iterator[tuple[Module, ast.Call, PortKind, ast.expr | None, ast.expr | None]]:
+    """Yield the calls that create ports: their kind, and the arguments for its type and name."""
+    for module, call in _calls(source):
+        creator = CREATORS.get(call.func.attr) if isinstance(call.func, ast.Attribute) else None
+        if creator is not None:
+            kind, (of_type, of_name, *_) = creator
+            yield module, call, kind, argument(call, 0, of_type), argument(call, 1, of_name)
 
 
 def _calls(source: BehaviorSource) -> Iterator[tuple[Module, ast.Call]]:
