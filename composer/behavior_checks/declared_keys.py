@@ -14,8 +14,8 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.syntax.bindings import Binding, bindings_of, nodes_of
-from composer.behavior_types.syntax.lineage import lineage
-from composer.behavior_types.syntax.names import constant_named
+from composer.behavior_types.syntax.lineage import RECORDS, lineage
+from composer.behavior_types.syntax.names import value_named
 from composer.behavior_types.syntax.own_classes import fields_of_class, updated_targets
 from composer.behavior_types.values import OwnModule, OwnObject, Self
 from composer.diagnostics import suggestion
@@ -23,7 +23,6 @@ from composer.field_types import ANYTHING
 
 _READING = frozenset({"copy", "get", "items", "keys", "values"})
 _TAKING = frozenset({"dict", "enumerate", "iter", "len", "list", "max", "min", "set", "sorted"})
-_RECORDS = frozenset({"typing.TypedDict", "typing_extensions.TypedDict"})
 _CAUGHT = frozenset({"BaseException", "Exception", "KeyError", "LookupError"})
 
 
@@ -66,7 +65,9 @@ def member_key_problems_of(
         return
     if not all(isinstance(key, ast.Attribute) for key in written.keys):
         return
-    from composer.behavior_checks.member_keys import member_key_problems  # noqa: PLC0415
+    from composer.behavior_checks.member_keys import (  # noqa: PLC0415 (start-up time)
+        member_key_problems,
+    )
 
     yield from member_key_problems(node, written, constant[1:], function, scope)
 
@@ -77,7 +78,7 @@ def _of_record(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int
     if not isinstance(found, OwnObject) or not isinstance(node.ctx, ast.Load):
         return None
     family = lineage(found.of)
-    if not family.others or not family.others <= _RECORDS:
+    if not family.others or not family.others <= RECORDS:
         return None
     fields = (field.name for own in family.classes for field in fields_of_class(own))
     return frozenset(fields).union(*map(_all_stored, scope.owner.source.own_modules))
@@ -145,8 +146,7 @@ def constant_read(node: ast.expr, scope: FunctionTypes) -> tuple[ast.expr, str, 
             name, found = node.attr, helper_named(node.attr, module.module)
     if found is None or not found.name or name != found.name:
         return None
-    constant = constant_named(found.name, found.module)
-    written = constant.value if isinstance(constant, ast.AnnAssign) else constant
+    written = value_named(found.name, found.module)
     return (written, name, found.module) if written is not None else None
 
 

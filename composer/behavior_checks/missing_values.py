@@ -38,9 +38,8 @@ def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodePro
         return
     reasons = {
         name: reason
-        for name, bindings in scope.bindings.names.items()
-        if len(bindings) == 1 and bindings[0].how is How.VALUE and not bindings[0].positions
-        if (reason := _reason(bindings[0].expression, scope)) is not None
+        for name in scope.bindings.names
+        if (reason := _reason(scope.bindings.value_of(name), scope)) is not None
     }
     if not reasons and not any(map(_has_direct_use, nodes)):
         return
@@ -57,7 +56,7 @@ def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodePro
                 name = ast.unparse(used) if reason is not None else ""
             if reason is None or name in seen:
                 continue
-            value = scope.bindings.names[name][0].expression if isinstance(used, ast.Name) else used
+            value = scope.bindings.value_of(name) if isinstance(used, ast.Name) else used
             if _is_certain(node, value, scope):
                 seen.add(name)
                 span = span_of(used, scope.home.source)

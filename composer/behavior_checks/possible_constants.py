@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from composer.behavior_checks.parts import possible_values
 from composer.behavior_source import Function, helper_named
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import How, is_static, nodes_of
-from composer.behavior_types.syntax.names import constant_named
+from composer.behavior_types.syntax.bindings import Binding, How, is_static, nodes_of
+from composer.behavior_types.syntax.names import value_named
 from composer.behavior_types.values import ModuleFunction, OwnMethod
 
 #: How many calls the constants of an argument are looked for in.
@@ -18,21 +18,29 @@ _MOST = 50
 
 def possible_constants(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
     """Yield the constants and other expressions that an expression may have the value of."""
-    for item in possible_values(node, scope):
-        if not isinstance(item, ast.Name):
-            yield item
-            continue
-        bindings = scope.bindings.of_name(item.id)
-        only = scope.bindings.uses.get(id(item)) or (bindings[0] if len(bindings) == 1 else None)
-        is_plain = only is not None and not only.positions
-        if only is not None and is_plain and only.how is How.ELEMENT and only.expression:
-            yield from _elements(only.expression, scope) or [item]
-            continue
+    for item in _written(node, scope):
         yield item
-        is_argument = only is not None and only.how is How.ANNOTATION
-        function = scope.function if is_argument else None
-        if function is not None and not _compares(function, item.id):
-            yield from _passed(function, item.id, scope)
+        if isinstance(item, ast.Name):
+            yield from _passed(item, scope)
+
+
+def _written(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
+    """Yield the same without calls: for the name of a loop, what it iterates over."""
+    for item in possible_values(node, scope):
+        binding = _only_binding(item, scope)
+        is_element = binding is not None and binding.how is How.ELEMENT and not binding.positions
+        if is_element and binding is not None and binding.expression is not None:
+            yield from _elements(binding.expression, scope) or [item]
+        else:
+            yield item
+
+
+def _only_binding(node: ast.expr, scope: FunctionTypes) -> Binding | None:
+    """Return the binding of a name that has only one, None for others and other expressions."""
+    if not isinstance(node, ast.Name):
+        return None
+    bindings = scope.bindings.of_name(node.id)
+    return scope.bindings.uses.get(id(node)) or (bindings[0] if len(bindings) == 1 else None)
 
 
 def _elements(node: ast.expr, scope: FunctionTypes) -> list[ast.expr]:
@@ -41,8 +49,7 @@ def _elements(node: ast.expr, scope: FunctionTypes) -> list[ast.expr]:
         found = helper_named(node.id, scope.home)
         if found is None or not found.name:
             return []
-        constant = constant_named(found.name, found.module)
-        written = constant.value if isinstance(constant, ast.AnnAssign) else constant
+        written = value_named(found.name, found.module)
         return written.elts if isinstance(written, ast.Tuple) else []
     return node.elts if isinstance(node, ast.List | ast.Tuple) else []
 
@@ -57,8 +64,13 @@ def _compares(function: Function, name: str) -> bool:
     )
 
 
-def _passed(function: Function, name: str, scope: FunctionTypes) -> Iterator[ast.expr]:
-    """Yield the constants that calls of a function pass as an argument."""
+def _passed(node: ast.Name, scope: FunctionTypes) -> Iterator[ast.expr]:
+    """Yield what calls of a function pass for an argument, not what they get from further calls."""
+    binding, function, name = _only_binding(node, scope), scope.function, node.id
+    if binding is None or binding.how is not How.ANNOTATION:
+        return
+    if function is None or _compares(function, name):
+        return
     from composer.behavior_types.call_sites import (  # noqa: PLC0415 (start-up time)
         references_in,
         scope_of,
@@ -84,16 +96,3 @@ def _passed(function: Function, name: str, scope: FunctionTypes) -> Iterator[ast
             given.update({item.arg: item.value for item in call.keywords if item.arg})
             if name in given and not any(isinstance(item, ast.Starred) for item in call.args):
                 yield from _written(given[name], outside)
-
-
-def _written(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
-    """Yield the constants that an argument may be, not those of further calls."""
-    for item in possible_values(node, scope):
-        if not isinstance(item, ast.Name):
-            yield item
-            continue
-        bindings = scope.bindings.of_name(item.id)
-        only = scope.bindings.uses.get(id(item)) or (bindings[0] if len(bindings) == 1 else None)
-        is_element = only is not None and only.how is How.ELEMENT and not only.positions
-        if only is not None and only.expression is not None and is_element:
-            yield from _elements(only.expression, scope)

@@ -36,13 +36,20 @@ def returned_values(function: Function) -> Iterator[ast.expr]:
             yield node.value
 
 
+def yields(function: Function) -> Iterator[ast.Yield | ast.YieldFrom]:
+    """Yield the ``yield`` expressions of ``function`` itself, which make it a generator."""
+    for node in _own_nodes(function.body):
+        if isinstance(node, ast.Yield | ast.YieldFrom):
+            yield node
+
+
 def reaches_end(function: Function) -> bool:
     """Return whether ``function`` may reach the end of its body, and so return None.
 
     A generator is never said to. What calls do is not known: a method that always raises counts as
     one that returns.
     """
-    if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in _own_nodes(function.body)):
+    if any(yields(function)):
         return False
     return _continues(function.body)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from composer.behavior_source import Function
 from composer.behavior_types.values import (
     ApiMethod,
     BuiltinMethod,
@@ -26,6 +27,17 @@ def is_function(value: Value) -> bool:
             return not is_numpy and callable(getattr(python, name, None))
         case _:
             return False
+
+
+def definition_of(value: Value) -> Function | None:
+    """Return the definition of a function or a method in the files of a behavior, or None."""
+    match value:
+        case OwnMethod(method=method):
+            return method.node
+        case ModuleFunction(node=node):
+            return node
+        case _:
+            return None
 
 
 def function_name(value: Value) -> str:

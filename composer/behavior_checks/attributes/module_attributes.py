@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from types import BuiltinFunctionType, FunctionType
 
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -24,22 +24,10 @@ def module_attributes(module: Module) -> Iterator[CodeProblem]:
         if not imported.name and "." not in bound and _is_known(imported.module)
     }
     yield from _attributes_of_names(module)
-    if not aliases:
-        return
-    uses: list[tuple[str, ast.Attribute]] = []
-    parts: list[tuple[str, str, ast.Attribute]] = []
-    for node in walk(module.tree.body):
-        match node:
-            case ast.Attribute(value=ast.Name(id=name)) if name in aliases:
-                uses.append((name, node))
-            case ast.Attribute(value=ast.Attribute(value=ast.Name(id=name), attr=part)):
-                if name in aliases and f"{aliases[name]}.{part}" in NUMPY_NAMES:
-                    parts.append((name, f"{aliases[name]}.{part}", node))
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
-                aliases.pop(name, None)  # means something else, at least somewhere
-    parts += [(name, aliases.get(name, ""), node) for name, node in uses]
-    for name, full, node in parts:
-        names = _known_names(full) if name in aliases else None
+    for written, node in _uses(module, aliases):
+        first, dot, part = written.partition(".")
+        full = aliases[first] + dot + part
+        names = _known_names(full) if not dot or full in NUMPY_NAMES else None
         if names is None or node.attr in names or node.attr.startswith("__"):
             continue
         close = nearest(node.attr, names)
@@ -48,6 +36,26 @@ def module_attributes(module: Module) -> Iterator[CodeProblem]:
         message = f"module '{full}' has no '{node.attr}'"
         hint = suggestion(node.attr, names) if close else None
         yield CodeProblem(Kind.IMPORT, message, attribute_span(node, module.source), hint)
+
+
+def _uses(module: Module, names: Collection[str]) -> list[tuple[str, ast.Attribute]]:
+    """Return the attributes of what begins with one of the names, and what that is.
+
+    Names that mean something else somewhere in the file are left out.
+    """
+    if not names:
+        return []
+    found: list[tuple[str, ast.Attribute]] = []
+    others: set[str] = set()
+    for node in walk(module.tree.body):
+        match node:
+            case ast.Attribute(value=ast.Name(id=name)) if name in names:
+                found.append((name, node))
+            case ast.Attribute(value=ast.Attribute(value=ast.Name(id=name), attr=part)):
+                found += [(f"{name}.{part}", node)] if name in names else []
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+                others.add(name)
+    return [(written, node) for written, node in found if written.partition(".")[0] not in others]
 
 
 #: Modules whose functions and classes are looked at: they import little, and change nothing.
@@ -66,22 +74,15 @@ def _attributes_of_names(module: Module) -> Iterator[CodeProblem]:
         for bound, imported in module.imports.items()
         if imported.name and imported.module in _LOOKED_AT and not imported.level
     }
-    if not names:
-        return
-    uses: list[tuple[str, ast.Attribute]] = []
-    for node in walk(module.tree.body):
-        match node:
-            case ast.Attribute(value=ast.Name(id=name)) if name in names:
-                uses.append((name, node))
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
-                names.pop(name, None)  # means something else, at least somewhere
-    for bound, node in uses:
-        imported = names.get(bound)
-        home = importlib.import_module(imported.module) if imported is not None else None
-        found = getattr(home, imported.name or "", None) if imported is not None else None
+    for bound, node in _uses(module, names):
+        if "." in bound:
+            continue
+        imported = names[bound]
+        home = importlib.import_module(imported.module)
+        found = getattr(home, imported.name or "", None)
         if not isinstance(found, FunctionType | BuiltinFunctionType | type):
             continue
-        if hasattr(found, node.attr) or node.attr.startswith("__") or imported is None:
+        if hasattr(found, node.attr) or node.attr.startswith("__"):
             continue
         message = f"'{imported.module}.{imported.name}' has no attribute '{node.attr}'"
         hint = suggestion(node.attr, dir(found))

@@ -100,19 +100,16 @@ def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Length:
 
 
 def _of_name(name: str, scope: FunctionTypes, depth: int) -> Length:
-    bindings = scope.bindings.names.get(name)
-    if bindings is None:
-        constant = constant_named(name, scope.home)
-        is_fixed = isinstance(constant, ast.Tuple) and not scope.is_local(name)
-        return length_of(constant, scope, depth) if is_fixed else _UNKNOWN  # type: ignore[arg-type]
-    only = bindings[0]
-    is_plain = len(bindings) == 1 and only.how is How.VALUE and not only.positions
-    if not is_plain or only.expression is None or scope.function is None:
+    if name not in scope.bindings.names:
+        constant = None if scope.is_local(name) else constant_named(name, scope.home)
+        return length_of(constant, scope, depth) if isinstance(constant, ast.Tuple) else _UNKNOWN
+    value = scope.bindings.value_of(name)
+    if value is None or scope.function is None:
         return _UNKNOWN
     fillings = fillings_of(scope.function, scope.home)
     is_changed = name in fillings.found or name in fillings.passed_on
     is_changed = is_changed or name in scope.bindings.name_changes
-    return _UNKNOWN if is_changed else length_of(only.expression, scope, depth)
+    return _UNKNOWN if is_changed else length_of(value, scope, depth)
 
 
 def _of_attribute(name: str, scope: FunctionTypes, depth: int) -> Length:

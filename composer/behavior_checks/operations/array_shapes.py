@@ -7,9 +7,8 @@ import ast
 from composer.behavior_source.flow import returned_values
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.scalars import is_number
-from composer.behavior_types.syntax.bindings import How
 from composer.behavior_types.syntax.literals import integer_constant
-from composer.behavior_types.syntax.names import constant_named
+from composer.behavior_types.syntax.names import value_named
 from composer.behavior_types.values import ModuleFunction, OwnMethod
 from composer.field_types import ANYTHING
 
@@ -52,11 +51,8 @@ def rank_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> int 
         return None if shape is None else len(shape)
     match node:
         case ast.Name(id=name):
-            bindings = scope.bindings.names.get(name, [])
-            only = bindings[0] if len(bindings) == 1 else None
-            if only is None or only.how is not How.VALUE or only.positions:
-                return None
-            return None if only.expression is None else rank_of(only.expression, scope, depth - 1)
+            value = scope.bindings.value_of(name)
+            return None if value is None else rank_of(value, scope, depth - 1)
         case ast.Call(func=function, args=[ast.Tuple(elts=sizes), *_]):
             is_filled = scope.called_name(function) in _FILLED
             is_known = is_filled and not any(isinstance(item, ast.Starred) for item in sizes)
@@ -88,17 +84,13 @@ def _shown(shape: Shape) -> str:
 def _of_name(name: str, scope: FunctionTypes, depth: int) -> Shape | None:
     """Return the shape of what a name is assigned, if that is done once."""
     if not scope.is_local(name):
-        constant = constant_named(name, scope.home)
-        written = constant.value if isinstance(constant, ast.AnnAssign) else constant
+        written = value_named(name, scope.home)
         at_module = scope.owner.at_module(scope.home)
         return shape_of(written, at_module, depth - 1) if written is not None else None
-    bindings = scope.bindings.names.get(name, [])
-    only = bindings[0] if len(bindings) == 1 else None
-    if only is None or only.how is not How.VALUE or only.positions or only.expression is None:
+    value = scope.bindings.value_of(name)
+    if value is None or name in scope.bindings.name_changes:
         return None
-    if name in scope.bindings.name_changes:
-        return None
-    return shape_of(only.expression, scope, depth - 1)
+    return shape_of(value, scope, depth - 1)
 
 
 def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Shape | None:

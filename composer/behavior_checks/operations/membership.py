@@ -27,8 +27,8 @@ from composer.diagnostics import suggestion
 from composer.field_types import ANYTHING
 from composer.interfaces import FieldType, Message
 
-#: The nodes that are checked here.
-LOOKUPS = (ast.Assign, ast.Attribute, ast.Compare, ast.Dict, ast.For, ast.Set, ast.Subscript)
+#: The nodes that are checked here, besides attributes.
+LOOKUPS = (ast.Assign, ast.Compare, ast.Dict, ast.For, ast.Set, ast.Subscript)
 _SEVERAL = (list, dict, set)
 
 

@@ -9,11 +9,10 @@ from types import GeneratorType
 
 from composer.behavior_checks.fitting import shown
 from composer.behavior_checks.problems import CodeProblem, Kind
-from composer.behavior_source import Function
-from composer.behavior_source.flow import is_stub
+from composer.behavior_source.flow import is_stub, yields
 from composer.behavior_source.spans import span_of
-from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.functions import definition_of, function_name
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
 from composer.behavior_types.libraries.standard_types import is_asynchronous
 from composer.behavior_types.scalars import is_scalar, is_text
@@ -36,7 +35,6 @@ from composer.behavior_types.values import (
 )
 from composer.interfaces import FieldType, Message
 
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 #: The nodes that are checked here.
 CHECKED = (ast.AsyncFor, ast.Await, ast.Expr, ast.Subscript, ast.With)
 _OF_ITEMS: Mapping[type[ast.expr_context], str] = {
@@ -60,8 +58,8 @@ def protocol_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProbl
                 span = span_of(iterated, scope.home.source)
                 yield CodeProblem(Kind.VALUE, f"{kind} is not asynchronous", span, "write 'for'")
         case ast.Expr(value=ast.Call(func=function) as call):
-            called = _node_of(scope.type_of(function))
-            if called is not None and not called.decorator_list and _yields(called):
+            called = definition_of(scope.type_of(function))
+            if called is not None and not called.decorator_list and any(yields(called)):
                 message = f"'{called.name}' is a generator: nothing happens without a loop over it"
                 yield CodeProblem(Kind.UNUSED, message, span_of(call, scope.home.source))
         case ast.Subscript():
@@ -91,7 +89,7 @@ def _plain_function(function: Value, result: Value, scope: FunctionTypes) -> str
     """Return the name of a function that returns nothing awaitable, "" if it may."""
     if isinstance(function, ApiMethod):
         return "" if function.member.is_async else function.member.name
-    called = _node_of(function)
+    called = definition_of(function)
     if called is None or isinstance(called, ast.AsyncFunctionDef) or called.decorator_list:
         return ""
     is_other = isinstance(function, ModuleFunction) and function.is_bound and function.of is None
@@ -108,7 +106,7 @@ def _entered(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
         message = f"the function '{name}' is not a context manager"
         yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
         return
-    called = _node_of(scope.type_of(node.func)) if isinstance(node, ast.Call) else None
+    called = definition_of(scope.type_of(node.func)) if isinstance(node, ast.Call) else None
     if called is not None and called.decorator_list:
         return
     kind = _kind(found, "__enter__", scope)
@@ -142,33 +140,12 @@ def _subscripted(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProb
     yield CodeProblem(Kind.VALUE, f"{kind} {problem}", span, hint)
 
 
-def _yields(function: Function) -> bool:
-    inside = walk(function.body, closed=(*_FUNCTIONS, ast.ClassDef))
-    return any(isinstance(node, ast.Yield | ast.YieldFrom) for node in inside)
-
-
 def _function_name(found: Value) -> str:
-    match found:
-        case OwnMethod(method=method):
-            return method.name
-        case ModuleFunction(node=function, is_bound=True):
-            return function.name
-        case ModuleFunction(node=function) if not function.decorator_list:
-            return function.name
-        case ApiMethod(member=member):
-            return member.name
-        case _:
-            return ""
-
-
-def _node_of(function: Value) -> Function | None:
-    match function:
-        case OwnMethod(method=method):
-            return method.node
-        case ModuleFunction(node=node):
-            return node
-        case _:
-            return None
+    """Return the name of a function of the project or the API, "" if a decorator may change it."""
+    if isinstance(found, ModuleFunction) and not found.is_bound and found.node.decorator_list:
+        return ""
+    is_known = isinstance(found, ApiMethod | ModuleFunction | OwnMethod)
+    return function_name(found) if is_known else ""
 
 
 def _kind(found: Value, method: str, scope: FunctionTypes) -> str | None:

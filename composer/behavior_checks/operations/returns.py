@@ -14,10 +14,10 @@ from composer.behavior_source.flow import (
     may_raise_at_end,
     reaches_end,
     returned_values,
+    yields,
 )
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.syntax import name_span
-from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.annotations import allows_none, annotated
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.handlers import Handler
@@ -26,8 +26,6 @@ from composer.behavior_types.scalars import is_float, is_integer
 from composer.behavior_types.values import NONE, Collection, OwnObject, Pending, Value
 from composer.field_types import ANYTHING, BOOL
 from composer.interfaces import FieldType, Message
-
-_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
 def return_problems(
@@ -113,7 +111,7 @@ def _wrong_elements(
     """Yield the values that a generator yields although its annotation names others."""
     if not isinstance(expected, Collection):
         return
-    for node in walk(function.body, closed=_SCOPES):
+    for node in yields(function):
         if isinstance(node, ast.Yield) and node.value is not None:
             found = scope.type_of(node.value)
             problem = argument_problem(node.value, found, expected.element, scope.type_of)

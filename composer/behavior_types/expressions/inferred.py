@@ -7,15 +7,13 @@ from types import GeneratorType
 from typing import TYPE_CHECKING
 
 from composer.behavior_source import Function
-from composer.behavior_source.flow import returned_values
-from composer.behavior_source.traversal import walk
+from composer.behavior_source.flow import returned_values, yields
 from composer.behavior_types.values import Collection, Value, join_all
 from composer.field_types import ANYTHING
 
 if TYPE_CHECKING:
     from composer.behavior_types.expressions.function_types import FunctionTypes
 
-_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 #: How many functions that call each other are followed.
 _DEEPEST = 8
 
@@ -40,14 +38,10 @@ def inferred_result(inside: FunctionTypes, function: Function) -> Value:
 
 
 def _returned(inside: FunctionTypes, function: Function) -> Value:
-    yields = [
-        node
-        for node in walk(function.body, closed=_SCOPES)
-        if isinstance(node, ast.Yield | ast.YieldFrom)
-    ]
-    if yields:
-        given = [getattr(node, "value", None) for node in yields if isinstance(node, ast.Yield)]
-        is_known = len(given) == len(yields) and None not in given
+    yielded = list(yields(function))
+    if yielded:
+        given = [node.value for node in yielded if isinstance(node, ast.Yield)]
+        is_known = len(given) == len(yielded) and None not in given
         types = [inside.type_of(value) for value in given if value is not None]
         return Collection(GeneratorType, _common(types) if is_known else ANYTHING)
     return _common([inside.type_of(value) for value in returned_values(function)])

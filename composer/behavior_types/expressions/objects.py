@@ -21,7 +21,7 @@ from composer.behavior_types.syntax.bindings import (
     nodes_of,
     reads_attribute,
 )
-from composer.behavior_types.syntax.lineage import lineage
+from composer.behavior_types.syntax.lineage import RECORDS, lineage
 from composer.behavior_types.syntax.literals import constant_type
 from composer.behavior_types.syntax.own_classes import (
     all_fields,
@@ -45,7 +45,6 @@ from composer.field_types import ANYTHING, STRING
 if TYPE_CHECKING:
     from composer.behavior_types.expressions.function_types import FunctionTypes
 
-_RECORDS = frozenset({"typing.TypedDict", "typing_extensions.TypedDict"})
 _PROPERTIES = frozenset({"property", "cached_property", "functools.cached_property"})
 #: Decorators of methods that change neither their arguments nor what they return.
 _OF_METHODS = frozenset(
@@ -112,7 +111,7 @@ def fields_expected(scope: FunctionTypes, own: OwnClass) -> Mapping[str, Value]:
 def value_in_record(scope: FunctionTypes, owner: OwnObject, key: object) -> Value:
     """Return the type of the value of a key of a TypedDict, ANYTHING for other objects."""
     family = lineage(owner.of)
-    if not family.others & _RECORDS:
+    if not family.others & RECORDS:
         return ANYTHING
     for own in family.classes:
         for field in fields_of_class(own):

@@ -64,6 +64,14 @@ class Bindings:
         found = self.names.get(name, [])
         return [item for item in found if not item.is_inner] or found
 
+    def value_of(self, name: str) -> ast.expr | None:
+        """Return the value of a name that is bound once, and to a whole value; None for others."""
+        bindings = self.names.get(name, [])
+        only = bindings[0] if len(bindings) == 1 else None
+        if only is None or only.how is not How.VALUE or only.positions:
+            return None
+        return only.expression
+
     def bind(
         self,
         target: ast.AST,

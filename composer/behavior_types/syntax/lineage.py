@@ -13,6 +13,7 @@ from composer.behavior_types.values import OwnClass
 from composer.fast_dataclass import dataclass
 
 NAMED_TUPLE = "typing.NamedTuple"
+RECORDS = frozenset({"typing.TypedDict", "typing_extensions.TypedDict"})
 #: Classes of Python that give no attributes and no constructor.
 PLAIN_BASES = frozenset({"abc.ABC", "object", "typing.Generic"})
 #: The enumerations of Python.

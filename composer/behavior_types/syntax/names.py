@@ -69,6 +69,12 @@ def constant_named(name: str, module: Module) -> ast.expr | ast.AnnAssign | None
     return _constants(module).get(name)
 
 
+def value_named(name: str, module: Module) -> ast.expr | None:
+    """Return the value of such a constant, with an annotation or without."""
+    constant = constant_named(name, module)
+    return constant.value if isinstance(constant, ast.AnnAssign) else constant
+
+
 def alias_named(name: str, module: Module) -> ast.expr | None:
     """Return the type that a module names at its top level, as in ``Box = tuple[int, int]``."""
     found = [
