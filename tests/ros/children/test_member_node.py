@@ -51,7 +51,7 @@ class Process:
 
 
 class Listener:
-    """Ignores what the node reports."""
+    """Keeps what the node reports."""
 
     def __init__(self) -> None:
         self.events: list[str] = []
@@ -66,11 +66,10 @@ class Listener:
         self.events.append("returned")
 
 
-def failed_node(on: Bench, process: Any, folder: Path) -> MemberNode:
+def failed_node(on: Bench, process: Any, folder: Path, listener: Any) -> MemberNode:
     """Return a node that has failed, and that its process has not taken down yet."""
     model = next(n for n in system_of(TEXT, folder, detector=DETECTOR).nodes if n.process)
     nothing: Any = None
-    listener: Any = Listener()
     context = OutsideContext(on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO)
     node = MemberNode(model, process, context)
     report(on, node, "active")
@@ -89,7 +88,7 @@ def restart_of_failed_node(
     monkeypatch.setattr(member_node, "_REPORTED_WITHIN_S", 0.0)
     with bench(ExecutorKind.EVENTS) as on:
         process = Process()
-        node = failed_node(on, process, folder)
+        node = failed_node(on, process, folder, Listener())
         yield on, node, process, on.loop.run_task(node.run_step("configure", lambda: False))
 
 
@@ -130,14 +129,15 @@ class CutOff(Process):
 
 def test_a_request_that_arrives_after_a_cut_is_not_that_of_a_user(tmp_path: Path) -> None:
     with bench(ExecutorKind.EVENTS) as on:
-        node = failed_node(on, CutOff(), tmp_path)
+        listener = Listener()
+        node = failed_node(on, CutOff(), tmp_path, listener)
         on.loop.run(lambda: node.on_report(MemberState("active", "")))
         on.loop.run(node.take_over)
         pause = on.loop.run_task(node.run_step("deactivate", lambda: False))
         wait_until(pause.done, "the end of the request")
         on.loop.run(lambda: node.on_report(MemberState("active", "")))
         on.loop.run(node.take_over)
-        events = node._listener.events  # type: ignore[attr-defined]
+        events = listener.events
         events.clear()
         on.loop.run(lambda: node.on_report(MemberState("inactive", "")))
         assert events == ["return inactive", "returned"]  # and a plan activates it

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from tests.unit.support.behavior_code import found
-from tests.unit.support.checking import quoted
+from tests.unit.support.checking import diagnostics_in, quoted
+
+SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
 
 
 @pytest.mark.parametrize(
@@ -101,3 +103,31 @@ def test_a_transformed_message_has_the_type_of_the_message(
     statement = f"self.transforms.transform(PoseStamped(), 'map').{field}"
     rules = {diagnostic.rule.name for diagnostic in found("odometry", statement, tmp_path)}
     assert ("unknown-field" not in rules) is is_known
+
+
+@pytest.mark.parametrize(
+    ("code", "line"),
+    [
+        # one attribute of a wrong type
+        (
+            "class Code:\n    def on_configure(self):\n        self.open = 5\n\n"
+            "    def on_tick(self):\n        print(len(self.open))\n        self.show()\n\n"
+            "    def show(self):\n        print(self.open[0], [item for item in self.open])\n",
+            6,
+        ),
+        # a member that a class needs when the file is imported, and a method later
+        (
+            "from dataclasses import dataclass\nfrom enum import Enum\n\n\n"
+            "class State(Enum):\n    IDLE = 1\n\n\n@dataclass\nclass Task:\n"
+            "    state: State = State.QUEUED\n\n\nclass Code:\n"
+            "    def on_tick(self):\n        print(Task().state is State.QUEUED)\n",
+            11,
+        ),
+    ],
+)
+def test_one_cause_in_several_functions_is_reported_where_it_fails_first(
+    code: str, line: int, tmp_path: Path
+) -> None:
+    (tmp_path / "code.py").write_text(code, encoding="utf-8")
+    [diagnostic] = diagnostics_in(SYSTEM, tmp_path)
+    assert diagnostic.primary.line == line

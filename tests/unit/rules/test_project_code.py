@@ -331,34 +331,6 @@ def test_a_mistake_in_a_helper_is_reported_once(
     assert (diagnostic.rule.name, quoted(diagnostic)) == (rule, text)
 
 
-@pytest.mark.parametrize(
-    ("code", "line"),
-    [
-        # one attribute of a wrong type
-        (
-            "class Code:\n    def on_configure(self):\n        self.open = 5\n\n"
-            "    def on_tick(self):\n        print(len(self.open))\n        self.show()\n\n"
-            "    def show(self):\n        print(self.open[0], [item for item in self.open])\n",
-            6,
-        ),
-        # a member that a class needs when the file is imported, and a method later
-        (
-            "from dataclasses import dataclass\nfrom enum import Enum\n\n\n"
-            "class State(Enum):\n    IDLE = 1\n\n\n@dataclass\nclass Task:\n"
-            "    state: State = State.QUEUED\n\n\nclass Code:\n"
-            "    def on_tick(self):\n        print(Task().state is State.QUEUED)\n",
-            11,
-        ),
-    ],
-)
-def test_one_cause_in_several_functions_is_reported_where_it_fails_first(
-    code: str, line: int, tmp_path: Path
-) -> None:
-    (tmp_path / "code.py").write_text(code, encoding="utf-8")
-    [diagnostic] = diagnostics_in(SYSTEM, tmp_path)
-    assert diagnostic.primary.line == line
-
-
 def test_a_changed_helper_is_read_again(tmp_path: Path) -> None:
     statement = "print(self.square.tint)"
     assert [item.rule.name for item in _found(tmp_path, statement)] == ["unknown-attribute"]
