@@ -42,7 +42,7 @@ _PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-sta
 _FRAMES = "disabled-by-default-devtools.timeline.frame"
 #: The state of a frame with what the scripts of the page have changed.
 _COMPLETE = "STATE_PRESENTED_ALL"
-#: No signal says that discovery is over: it must not overlap the measurement.
+#: No signal says that discovery is over, or Chromium at rest: they must not overlap a measurement.
 _SETTLE_S = 2.0
 ALL_SHOWN = f"() => document.querySelectorAll('.world [data-kind=node]').length >= {NODES}"
 #: Drags the diagram for two seconds, by a step in each frame.
