@@ -1,4 +1,4 @@
-"""What does not follow from a mistake is reported beside it."""
+"""Mistakes that do not follow from another one are all reported."""
 
 from __future__ import annotations
 
