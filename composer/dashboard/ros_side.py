@@ -69,8 +69,11 @@ class RosSide:
         self.state, self.message = "left", ""
 
     def prepare(self) -> None:
-        """Import what joining takes, so that the first browser does not wait for that."""
-        threading.Thread(target=_import, name="imports", daemon=True).start()
+        """Import what joining takes, so that the first browser does not wait for that.
+
+        Systems on this computer are asked for their endpoints: they keep the answer.
+        """
+        threading.Thread(target=_logged, args=(_prepare,), name="prepare", daemon=True).start()
 
     def enter(self) -> None:
         """Count one more browser; the first one makes the dashboard join the ROS graph."""
@@ -175,15 +178,17 @@ class RosSide:
         return RosGraphSide(session, observed, self._forms, self._work)
 
 
-def _import() -> None:
-    import composer.dashboard.observing.observed
+def _prepare() -> None:
     import composer.dashboard.pictures  # for the first diagram
     import composer.remote.shared_session
     import composer.runtime.process.dds_announcements  # noqa: F401
+    from composer.dashboard.observing.observed import first_topology
+
+    first_topology()
 
 
 def _logged(function: Callable[[], None]) -> None:
     try:
         function()
     except Exception:
-        logging.getLogger(__name__).exception("a background request failed")
+        logging.getLogger(__name__).exception("background work failed")

@@ -14,6 +14,7 @@ from composer.runtime.process.query_socket import KINDS, GraphView
 from composer.runtime.ros.action_info import action_info
 from composer.runtime.ros.endpoints_by_node import endpoints, node_names
 from composer.runtime.ros.graph import SETTLE_S, RosGraph
+from composer.runtime.ros.graph_changes import PolledGraphChanges
 from composer.runtime.ros.node_info import node_info
 
 #: How long to wait for a process that has just started; commands wait longer than that.
@@ -40,6 +41,10 @@ class GraphObserver:
         self._domain_id = node.context.get_domain_id()
         self._recent: frozenset[bytes] = frozenset()
         self._settled: frozenset[bytes] = frozenset()
+        self._changes = PolledGraphChanges(node)
+        #: The last answer about all endpoints, and the change of the graph before it.
+        self._endpoints: dict[str, Any] | None = None
+        self._change = -1
 
     def note_participants(self) -> None:
         """Note which participants are known. Call it every second."""
@@ -75,8 +80,7 @@ class GraphObserver:
         while True:
             graph = RosGraph(self._node)
             names = [name for name, _ in graph.names("node")]
-            local = self._count_local(graph.participants())
-            if local >= count_participants(self._domain_id) and graph.are_nodes_known():
+            if self._has_all_participants(graph) and graph.are_nodes_known():
                 return names
             if time.monotonic() > end_s:
                 return None
@@ -103,8 +107,16 @@ class GraphObserver:
     def endpoints(self) -> dict[str, Any] | None:
         """Return the endpoints of all nodes, and the names of all nodes; None as for `nodes`.
 
-        Some of the endpoints of a process that has just started may be missing.
+        Some of the endpoints of a process that has just started may be missing. The answer takes
+        most of a second in a large system on a busy computer, so it is kept until the next change.
         """
+        change = self._changes.number()
+        is_known = self._endpoints is not None and change == self._change
+        if not is_known or not self._has_all_participants(RosGraph(self._node)):
+            self._endpoints, self._change = self._new_endpoints(), change
+        return self._endpoints
+
+    def _new_endpoints(self) -> dict[str, Any] | None:
         if self.nodes() is None:
             return None
         graph = RosGraph(self._node)
@@ -120,6 +132,10 @@ class GraphObserver:
         """Say whether every process on this computer is known, and no ended one is."""
         local = self._count_local(known)
         return local == count_participants(self._domain_id) and graph.are_nodes_known()
+
+    def _has_all_participants(self, graph: RosGraph) -> bool:
+        """Say whether every process on this computer is known; an ended one may be, too."""
+        return self._count_local(graph.participants()) >= count_participants(self._domain_id)
 
     def _count_local(self, known: frozenset[bytes]) -> int:
         """Return how many of the participants are on this computer."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.waitable import NumberOfEntities, Waitable
 
@@ -59,10 +60,7 @@ class GraphChanges(Waitable):
         """Wait for the next change."""
         self._index = None
         if not self._has_changed:
-            index = ctypes.c_size_t()
-            condition = _guard_condition_of(self._node.handle.pointer)
-            if _add_guard_condition(wait_set.pointer, condition, ctypes.byref(index)) == 0:
-                self._index = index.value
+            self._index = _add_to(wait_set, self._node)
 
     def is_ready(self, wait_set: Any) -> bool:
         """Return whether there was a change."""
@@ -75,3 +73,33 @@ class GraphChanges(Waitable):
 
     async def execute(self, _: Any) -> None:
         """Do nothing more."""
+
+
+class PolledGraphChanges:
+    """Counts the changes of the ROS graph without an executor, for rare queries of one thread.
+
+    A context can have only one of these: each call resets its guard condition.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 0, 0, node.context.handle)
+        self._number = 0
+
+    def number(self) -> int:
+        """Return another number than the last time if the graph may have changed since then."""
+        self._wait_set.clear_entities()
+        with self._node.handle:
+            index = _add_to(self._wait_set, self._node)
+            self._wait_set.wait(0)
+        if index is None or self._wait_set.is_ready("guard_condition", index):
+            self._number += 1
+        return self._number
+
+
+def _add_to(wait_set: Any, node: Node) -> int | None:
+    """Add the guard condition of the graph to a wait set; return its index, None if refused."""
+    index = ctypes.c_size_t()
+    condition = _guard_condition_of(node.handle.pointer)
+    is_added = _add_guard_condition(wait_set.pointer, condition, ctypes.byref(index)) == 0
+    return index.value if is_added else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from std_msgs.msg import String
 
 from composer.remote.session import Session
 from composer.remote.systems.local_endpoints import local_endpoints
@@ -54,3 +55,21 @@ def test_endpoints_are_those_that_another_process_discovers() -> None:
             return known is not None and known[0] == discovered
 
         wait_until(is_equal, "equal endpoints")
+
+
+def test_endpoints_follow_the_changes_of_other_processes() -> None:
+    def topics() -> set[str]:
+        known = local_endpoints()
+        ends = {} if known is None else known[0]
+        return {end.name for of_node in ends.values() for end in of_node}
+
+    with Session() as session:
+        session.node.create_subscription(String, "/first", print, 1)
+        wait_until(lambda: "/first" in topics(), "the first endpoint")
+        assert "/second" not in topics()  # the answer that the manager keeps
+        second = session.node.create_subscription(String, "/second", print, 1)
+        wait_until(lambda: "/second" in topics(), "the second endpoint")
+        session.node.destroy_subscription(second)
+        wait_until(lambda: not {"/second"} & topics() and topics(), "the end of the endpoint")
+        assert "/first" in topics()
+    wait_until(lambda: not {"/first"} & topics() and topics(), "the end of the process")
