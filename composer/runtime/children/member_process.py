@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import partial
 from time import monotonic
 from typing import Any
@@ -25,9 +24,10 @@ from rcl_interfaces.msg import SetParametersResult
 from composer.model import LogLevel, Process
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.member_context import Member, MemberContext, ProcessUnavailable
+from composer.runtime.children.member_life import MemberLife
 from composer.runtime.children.member_report import (
+    REPORTS_WITHIN_S,
     MemberReport,
-    MemberState,
     NodeFigures,
     parse_report,
 )
@@ -49,37 +49,8 @@ _POLL_S = 0.01
 #: How often to look whether another process holds the instance lock.
 _LOCK_POLL_S = 0.1
 _CHECK_PERIOD_S = 0.5
-#: Managers report every second.
-_REPORTS_WITHIN_S = 5.0
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
-
-
-@dataclass(slots=True)
-class _Life:
-    """One life of the process, as a child or started elsewhere, and its last report.
-
-    ``started_by`` is in all reports of that child. ``lost`` is why its nodes have failed, although
-    it may still run. ``holds_lock`` is whether it holds the instance lock on this computer.
-    ``answered`` are the numbers of the last reports before the responses to requests, by node.
-    """
-
-    child: Child | None = None
-    started_by: str = ""
-    last: MemberReport | None = None
-    reports: int = 0
-    reported_s: float = 0.0
-    lost: str = ""
-    holds_lock: bool = False
-    answered: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def states(self) -> Mapping[str, MemberState]:
-        return {} if self.last is None else self.last.nodes
-
-    @property
-    def is_up(self) -> bool:
-        return self.last is not None and not self.lost
 
 
 class MemberProcess:
@@ -93,7 +64,7 @@ class MemberProcess:
         self._figures: defaultdict[str, NodeFigures] = defaultdict(NodeFigures)
         #: When, by ``time.monotonic()``, it last reported that a node has moved.
         self.moved_s = 0.0
-        self._life: _Life | None = None  # from the start, or the first report, to the end
+        self._life: MemberLife | None = None  # from the start, or the first report, to the end
         self._may_start = bool(context.command)
         self._refused_s = -math.inf  # when another process last reported, not the child
         self._starting: Future[None] | None = None
@@ -101,7 +72,9 @@ class MemberProcess:
         self._belongs_to_another = False
         manager = f"{self._name}/{NAME}"
         service = f"{manager}/{CHANGE_STATES}"
-        self.requests = MemberRequests(context.manager, context.loop, service, self._on_figures)
+        self.requests = MemberRequests(
+            context.manager, context.loop, service, self._on_figures, self._warn
+        )
         #: The timings of its callbacks and chains, once it was asked for them.
         self.callbacks: tuple[CallbackFigures, ...] = ()
         self.chains: tuple[ChainFigures, ...] = ()
@@ -258,11 +231,17 @@ class MemberProcess:
             if self._life is None and self._may_start and not is_held(self._name):
                 child = await self._start_child()
             elif monotonic() > end_s:
-                raise ProcessUnavailable(f"{self} has not reported within {STARTS_WITHIN_S:g} s")
+                raise ProcessUnavailable(self._not_reported())
             await sleep(self._context.loop, _LOCK_POLL_S if self._life is None else _POLL_S)
 
+    def _not_reported(self) -> str:
+        """Return that the process has not reported in time, and as much of the reason as known."""
+        is_found = self._context.manager.count_publishers(self._reports.topic_name)
+        reason = "its reports do not arrive" if is_found else "it is not in the ROS graph"
+        return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
+
     async def _start_child(self) -> Child:
-        life = _Life(started_by=uuid4().hex)
+        life = MemberLife(started_by=uuid4().hex)
         command = self._context.command_of(self._process, life.started_by)
         self._is_ending = False
         try:
@@ -276,18 +255,18 @@ class MemberProcess:
         )
         return child
 
-    async def _kill_child(self, life: _Life, child: Child) -> None:
+    async def _kill_child(self, life: MemberLife, child: Child) -> None:
         self._context.children.end(child, 0.0, 0.0)
         while not child.ended.done():
             await sleep(self._context.loop, _POLL_S)
         self._on_end(life)
 
-    def _on_end(self, life: _Life) -> None:
+    def _on_end(self, life: MemberLife) -> None:
         """Handle the end of a child."""
         if self._life is not life:
             return
         self._life = None
-        if monotonic() - self._refused_s < _REPORTS_WITHIN_S:
+        if monotonic() - self._refused_s < REPORTS_WITHIN_S:
             self._may_start = False
         for figures in self._figures.values():
             figures.end_life()
@@ -315,7 +294,7 @@ class MemberProcess:
             return
         life.lost = ""
         goals = self._context.goals.on_report(report.goals)
-        self.requests.on_report(report.participant, goals)
+        self.requests.on_report(report, goals)
         for name, reported in report.nodes.items():
             member = self._members.get(name)
             if member is not None and report.number > life.answered.get(name, -1):
@@ -323,7 +302,7 @@ class MemberProcess:
                 if has_returned:
                     member.on_process_return()
 
-    def _on_response(self, life: _Life, node: str, done: Future[SetParametersResult]) -> None:
+    def _on_response(self, life: MemberLife, node: str, done: Future[SetParametersResult]) -> None:
         """Ignore the reports of a node from before the end of its transition."""
         if done.cancelled():
             return
@@ -337,7 +316,7 @@ class MemberProcess:
             callbacks, self.chains = from_text(text)
             self.callbacks = tuple(item for item in callbacks if item.node in self._members)
 
-    def _life_of(self, report: MemberReport) -> _Life | None:
+    def _life_of(self, report: MemberReport) -> MemberLife | None:
         """Return the life that a report belongs to; None if it is to be ignored."""
         life = self._life
         if report.started_by:  # another such child is about to end, with its coordinator
@@ -354,11 +333,11 @@ class MemberProcess:
         self._lose(life, "has ended")
         return self._use(report)
 
-    def _use(self, report: MemberReport) -> _Life:
+    def _use(self, report: MemberReport) -> MemberLife:
         """Use a process that was started elsewhere, and start none from now on."""
         for figures in self._figures.values():
             figures.end_life()
-        self._life = life = _Life(holds_lock=is_held(self._name))
+        self._life = life = MemberLife(holds_lock=is_held(self._name))
         self._may_start = False
         text = f"{self} was not started here; it is used: host {report.host}, process {report.pid}"
         self._context.write_log(LogLevel.INFO, "composer", text)
@@ -375,10 +354,10 @@ class MemberProcess:
         life.reported_s += max(0.0, late_s)
         if life.holds_lock and not is_held(self._name):
             self._lose(life, "has ended")
-        elif now_s - life.reported_s >= _REPORTS_WITHIN_S:
-            self._lose(life, f"has not reported for {_REPORTS_WITHIN_S:g} s")
+        elif now_s - life.reported_s >= REPORTS_WITHIN_S:
+            self._lose(life, f"has not reported for {REPORTS_WITHIN_S:g} s")
 
-    def _lose(self, life: _Life, reason: str) -> None:
+    def _lose(self, life: MemberLife, reason: str) -> None:
         """Report the failure of all nodes of a process, which may return."""
         if not life.lost:
             life.lost = reason
@@ -389,6 +368,9 @@ class MemberProcess:
         if not is_expected:
             for member in tuple(self._members.values()):
                 member.on_process_end(reason)
+
+    def _warn(self, text: str) -> None:
+        self._context.write_log(LogLevel.WARN, "composer", f"{self} {text}")
 
     def _log(self, text: str, is_error: bool) -> None:
         level, logger, message = parse_line(text, is_error=is_error)

@@ -14,6 +14,8 @@ from typing import Any
 from composer.runtime.metrics.numbers import finite
 from composer.runtime.ros.diagnostic_arrays import read_array
 
+#: Processes report every second. One that has not reported for this time is lost.
+REPORTS_WITHIN_S = 5.0
 _RATES = ("sent_hz", "received_hz", "busy")
 _COUNTS = ("errors", "overruns", "queue_drops", "calls", "skipped")
 _COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
@@ -36,7 +38,8 @@ class MemberState:
 class MemberReport:
     """One report. ``started_by`` identifies the start by a coordinating process, or is empty.
 
-    ``number`` counts the reports of the process. ``goals`` are those of the whole system that it
+    ``number`` counts the reports of the process. ``last_step`` identifies the last step that was
+    received: see :meth:`received`. ``goals`` are those of the whole system that it
     keeps. ``host``, ``pid`` and ``started_s`` (seconds since 1970) are those of the process, and
     ``participant`` is the prefix of the ids of its endpoints, in hexadecimal digits.
     """
@@ -49,6 +52,7 @@ class MemberReport:
     number: int
     goals: str
     participant: str
+    last_step: str
     nodes: Mapping[str, MemberState]
 
     @property
@@ -60,6 +64,11 @@ class MemberReport:
     def is_stopping(self) -> bool:
         """Whether it takes its nodes down because the process ends."""
         return self.activity in ("stopping", "stopped")
+
+    def received(self, sender: str) -> int:
+        """Return the number of the last step that was received if it is from ``sender``, else 0."""
+        last_sender, _, number = self.last_step.partition(" ")
+        return int(number) if last_sender == sender and number.isdecimal() else 0
 
     @property
     def identity(self) -> tuple[str, str, float]:
@@ -86,6 +95,7 @@ def parse_report(content: bytes) -> MemberReport | None:
         number=number,
         goals=values.get("goals", ""),
         participant=values.get("participant", ""),
+        last_step=values.get("last_step", ""),
         nodes={status.name.partition(": ")[2]: _node(status.values, host) for status in nodes},
     )
 

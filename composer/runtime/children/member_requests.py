@@ -5,24 +5,38 @@ most of them would be lost: a service keeps the last 10 that it has not taken ye
 
 A process that was killed is known for 20 s more, with its service. If that counted as ready, a
 request might be sent before the service of the next process is discovered, and be lost.
+
+Steps without a result are requested again: see :mod:`.requested_steps`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import partial
+from itertools import count
 from time import monotonic
 from typing import Any
+from uuid import uuid4
 
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node as RosNode
 
+from composer.runtime.children.member_report import MemberReport
+from composer.runtime.children.requested_steps import AGAIN_AFTER_S, MemberRequest, RequestedStep
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.ros.graph import participant, servers_of
-from composer.runtime.ros.manager_protocol import FIGURES, GOALS, LAST_STEPS, PARTICIPANT, STEPS
+from composer.runtime.ros.manager_protocol import (
+    FIGURES,
+    GOALS,
+    LAST_STEPS,
+    NUMBERS,
+    PARTICIPANT,
+    SEEN_REPORT,
+    SENDER,
+    STEPS,
+)
 
 _MAX_STEPS = 500  # per request; a service takes up to 1000
 _MAX_REQUESTS = 8
@@ -33,49 +47,53 @@ _ANSWERED_WITHIN_S = 5.0
 #: How long to wait for the service of a process that has reported. With other middleware, ids may
 #: differ between processes.
 _DISCOVERED_WITHIN_S = 3.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Wanted:
-    step: str
-    result: Future[SetParametersResult] = field(default_factory=Future)
-
-
-@dataclass(frozen=True, slots=True)
-class _Sent:
-    """A request on its way: steps, or goals of the system and whether it asks for figures."""
-
-    batch: Sequence[_Wanted]
-    goals: str = ""
-    figures: bool = False
-
-    @property
-    def is_awaited(self) -> bool:
-        """Whether a result of a step is still waited for."""
-        return any(not wanted.result.done() for wanted in self.batch)
+#: After this time, it is reported that the service of a process cannot be used.
+_READY_WITHIN_S = 3.0
+_TYPES = {
+    "bool_value": ParameterType.PARAMETER_BOOL,
+    "integer_value": ParameterType.PARAMETER_INTEGER,
+    "string_value": ParameterType.PARAMETER_STRING,
+    "integer_array_value": ParameterType.PARAMETER_INTEGER_ARRAY,
+    "string_array_value": ParameterType.PARAMETER_STRING_ARRAY,
+}
 
 
 class MemberRequests:
     """The client of the service ``change_states`` of a process. Use it on ``loop``."""
 
     def __init__(
-        self, ros: RosNode, loop: Loop, service: str, on_figures: Callable[[str], None]
+        self,
+        ros: RosNode,
+        loop: Loop,
+        service: str,
+        on_figures: Callable[[str], None],
+        on_problem: Callable[[str], None],
     ) -> None:
-        """``on_figures(text)`` receives the timings that were requested."""
+        """``on_figures(text)`` receives the timings that were requested.
+
+        ``on_problem(text)`` receives why the process does not get requests, once for each process.
+        """
         self._ros = ros
         self._loop = loop
         self._service = service
         self._client = ros.create_client(SetParameters, service)
+        self._sender = uuid4().hex
+        self._numbers = count(1)  # of steps
         self._participant = ""  # that of the process, once it has reported
+        self._seen = 0  # the number of its last report
+        self._received = 0  # the number of the last step that it has received
+        self._has_problem = False  # that has been reported
+        self._unready_s = 0.0  # since when the service cannot be used
         self._is_discovered = True  # the service of this participant
         self._awaited_until_s = 0.0
         self._is_polling = False
         self._on_figures = on_figures
+        self._on_problem = on_problem
         self._holds = 0
-        self._unsent: list[_Wanted] = []
+        self._unsent: list[RequestedStep] = []
         self._unsent_goals = ""
         self._wants_figures = False
-        self._sent: dict[Any, _Sent] = {}
+        self._sent: dict[Any, MemberRequest] = {}
         #: Whether the process ends after the next requests.
         self.are_last = False
         loop.add_client(self._client)
@@ -87,19 +105,20 @@ class MemberRequests:
 
         It begins after the transitions of the nodes ``after`` that were requested before.
         """
-        wanted = _Wanted(" ".join((transition, node, *after)))
-        wanted.result.add_done_callback(self._on_result)
-        self._unsent.append(wanted)
+        step = RequestedStep(next(self._numbers), " ".join((transition, node, *after)))
+        step.result.add_done_callback(self._on_result)
+        self._unsent.append(step)
         if len(self._unsent) == 1:  # otherwise, sending is due already
             self._loop.call_soon(self._send)
-        return wanted.result
+        return step.result
 
-    def on_report(self, participant_of_process: str, goals: str | None) -> None:
-        """Receive which participant has reported, and the goals that it has to keep, if any."""
-        if self._participant != participant_of_process:
-            self._participant = participant_of_process
-            self._is_discovered = False
+    def on_report(self, report: MemberReport, goals: str | None) -> None:
+        """Receive a report of the process, and the goals that it has to keep, if any."""
+        if self._participant != report.participant:
+            self._participant = report.participant
+            self._is_discovered = self._has_problem = False
             self._awaited_until_s = monotonic() + _DISCOVERED_WITHIN_S
+        self._seen, self._received = report.number, report.received(self._sender)
         if goals is not None:
             self.keep(goals)
 
@@ -134,14 +153,14 @@ class MemberRequests:
 
     def fail(self, error: Exception) -> None:
         """End all requests with an exception: the process has ended."""
-        open_ = [*self._unsent, *(wanted for sent in self._sent.values() for wanted in sent.batch)]
+        open_ = [*self._unsent, *(step for sent in self._sent.values() for step in sent.steps)]
         for pending in self._sent:
             self._client.remove_pending_request(pending)
         self._unsent.clear()
         self._sent.clear()
         self._unsent_goals, self._wants_figures = "", False
-        for wanted in open_:
-            wanted.result.set_exception(error)
+        for step in open_:
+            step.result.set_exception(error)
 
     def close(self) -> None:
         """Destroy the client."""
@@ -159,20 +178,49 @@ class MemberRequests:
             and len(self._sent) < _MAX_REQUESTS
         ):
             if not self._is_ready():
-                if not self._is_polling:
-                    self._is_polling = True
-                    self._loop.call_later(_POLL_S, self._poll)
+                self._wait_for_service()
                 return
-            sent = self._next()
-            pending = self._client.call_async(self._message(sent))
-            self._sent[pending] = sent
-            pending.add_done_callback(self._on_response)
-            if not sent.batch:
-                self._loop.call_later(_ANSWERED_WITHIN_S, partial(self._forget, pending))
+            self._unready_s = 0.0
+            self._send_request(self._next())
+
+    def _send_request(self, request: MemberRequest) -> None:
+        pending = self._client.call_async(self._message(request))
+        self._sent[pending] = request
+        pending.add_done_callback(self._on_response)
+        if request.steps:
+            self._loop.call_later(request.again_after_s, partial(self._send_again, pending))
+        else:
+            self._loop.call_later(_ANSWERED_WITHIN_S, partial(self._forget, pending))
+
+    def _send_again(self, pending: Any) -> None:
+        """Send a request again whose steps have no results yet; the process knows their numbers."""
+        request = self._sent.get(pending)
+        if request is None or not request.is_awaited:
+            return
+        del self._sent[pending]
+        self._client.remove_pending_request(pending)
+        again = request.again(self._seen)
+        if request.is_lost(self._received, self._seen):
+            self._report_problem(f"has not received '{again.steps[0].text}'; it is requested again")
+        self._send_request(again)
+
+    def _wait_for_service(self) -> None:
+        now_s = monotonic()
+        self._unready_s = self._unready_s or now_s
+        if now_s - self._unready_s >= _READY_WITHIN_S:
+            self._report_problem("reports, but its service is not discovered; requests wait")
+        if not self._is_polling:
+            self._is_polling = True
+            self._loop.call_later(_POLL_S, self._poll)
 
     def _poll(self) -> None:
         self._is_polling = False
         self._send()
+
+    def _report_problem(self, text: str) -> None:
+        if not self._has_problem:
+            self._has_problem = True
+            self._on_problem(text)
 
     def _is_ready(self) -> bool:
         """Return whether the service is there, and is that of the process that has reported."""
@@ -184,14 +232,14 @@ class MemberRequests:
             self._is_discovered = is_found or monotonic() >= self._awaited_until_s
         return self._is_discovered
 
-    def _next(self) -> _Sent:
+    def _next(self) -> MemberRequest:
         """Return the next request: a message, which is answered at once, or steps."""
         if self._unsent_goals or self._wants_figures:
-            sent = _Sent((), self._unsent_goals, self._wants_figures)
+            message = MemberRequest(goals=self._unsent_goals, figures=self._wants_figures)
             self._unsent_goals, self._wants_figures = "", False
-            return sent
-        batch, self._unsent = self._unsent[:_MAX_STEPS], self._unsent[_MAX_STEPS:]
-        return _Sent(batch)
+            return message
+        steps, self._unsent = self._unsent[:_MAX_STEPS], self._unsent[_MAX_STEPS:]
+        return MemberRequest(steps, again_after_s=AGAIN_AFTER_S, seen=self._seen)
 
     def _forget(self, pending: Any) -> None:
         """Wait no longer for the response to a request."""
@@ -205,25 +253,26 @@ class MemberRequests:
 
     def _forget_canceled(self) -> None:
         """Forget steps that nothing waits for any more: their responses may have been lost."""
-        self._unsent = [wanted for wanted in self._unsent if not wanted.result.done()]
+        self._unsent = [step for step in self._unsent if not step.result.done()]
         for pending, sent in tuple(self._sent.items()):
-            if sent.batch and not sent.is_awaited:
+            if sent.steps and not sent.is_awaited:
                 self._forget(pending)
 
-    def _message(self, sent: _Sent) -> SetParameters.Request:
-        value = ParameterValue(
-            type=ParameterType.PARAMETER_STRING_ARRAY,
-            string_array_value=[wanted.step for wanted in sent.batch],
-        )
+    def _message(self, request: MemberRequest) -> SetParameters.Request:
         name = LAST_STEPS if self.are_last else STEPS
-        parameters = [Parameter(name=name, value=value)]
-        for key, text in ((PARTICIPANT, self._participant), (GOALS, sent.goals)):
+        parameters = [_parameter(name, string_array_value=[step.text for step in request.steps])]
+        for key, text in ((PARTICIPANT, self._participant), (GOALS, request.goals)):
             if text:
-                string = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=text)
-                parameters.append(Parameter(name=key, value=string))
-        if sent.figures:
-            yes = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True)
-            parameters.append(Parameter(name=FIGURES, value=yes))
+                parameters.append(_parameter(key, string_value=text))
+        if request.steps:
+            numbers = [step.number for step in request.steps]
+            parameters += [
+                _parameter(SENDER, string_value=self._sender),
+                _parameter(NUMBERS, integer_array_value=numbers),
+                _parameter(SEEN_REPORT, integer_value=self._seen),
+            ]
+        if request.figures:
+            parameters.append(_parameter(FIGURES, bool_value=True))
         return SetParameters.Request(parameters=parameters)
 
     def _on_response(self, pending: Any) -> None:
@@ -231,10 +280,16 @@ class MemberRequests:
         if sent is None:
             return
         results = pending.result().results
-        for wanted, result in zip(sent.batch, results, strict=False):
-            wanted.result.set_result(result)
-        for wanted in sent.batch:  # without a result, the request was refused as a whole
-            wanted.result.set_result(SetParametersResult(successful=False, reason="refused"))
+        for step, result in zip(sent.steps, results, strict=False):
+            step.result.set_result(result)
+        for step in sent.steps:  # without a result, the request was refused as a whole
+            step.result.set_result(SetParametersResult(successful=False, reason="refused"))
         if sent.figures and results:
             self._on_figures(results[-1].reason)
         self._send()
+
+
+def _parameter(name: str, **value: Any) -> Parameter:
+    """Return a parameter; ``value`` is the one field of its value."""
+    (kind,) = value
+    return Parameter(name=name, value=ParameterValue(type=_TYPES[kind], **value))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from itertools import zip_longest
+from time import monotonic
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -17,6 +18,7 @@ from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.manager.proxy_services import Nodes
+from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
@@ -26,7 +28,10 @@ from composer.runtime.ros.manager_protocol import (
     FIGURES,
     GOALS,
     LAST_STEPS,
+    NUMBERS,
     PARTICIPANT,
+    SEEN_REPORT,
+    SENDER,
 )
 
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
@@ -54,70 +59,106 @@ class MemberCallbacks:
     figures: Callable[[], str]
 
 
+@dataclass(slots=True)
+class _Step:
+    """A step that runs, or has ended with ``result``."""
+
+    change: Future[TransitionOutcome]
+    result: SetParametersResult | None = None
+
+
 class MemberService:
     """The service ``change_states``."""
 
     def __init__(
-        self, node: Node, loop: EventLoop, callbacks: MemberCallbacks, participant: str
+        self,
+        node: Node,
+        loop: EventLoop,
+        callbacks: MemberCallbacks,
+        participant: str,
+        log: Callable[[str], None],
     ) -> None:
         """``participant`` is that of the process, as it reports it."""
         self._loop = loop
         self._callbacks = callbacks
         self._participant = participant
-        self._running: dict[str, Future[TransitionOutcome]] = {}  # by node, the last one requested
+        self._log = log
+        self._received = ReceivedSteps[_Step]()
+        self._reports = ReportTimes()
         service = node.create_service(limited(SetParameters), f"~/{CHANGE_STATES}", unused_callback)
         loop.add_service(service, self._on_request)
+
+    @property
+    def reported(self) -> Mapping[str, str]:
+        """What reports say for the coordinating process."""
+        return {"participant": self._participant, "last_step": self._received.last_text}
+
+    def on_report(self, number: int) -> None:
+        """Receive that a report is the current one now."""
+        self._reports.note(number, monotonic())
 
     def _on_request(self, request: Any, reply: Reply) -> None:
         if isinstance(request, TooLarge):
             reply(SetParameters.Response())
-        elif self._is_meant(request):
-            self._loop.run_task(self._change_states(request, reply))
+            return
+        values = {item.name: item.value for item in request.parameters}
+        if PARTICIPANT in values and values[PARTICIPANT].string_value != self._participant:
+            return  # for another process of the same name
+        if GOALS in values:
+            self._callbacks.keep_goals(values[GOALS].string_value)
+        if self._is_outdated(values):
+            self._log("a request that is no longer waited for has arrived late, and is ignored")
+            return
+        if LAST_STEPS in values:
+            self._callbacks.expect_end()
+        self._loop.run_task(self._change_states(values, reply))
 
-    def _is_meant(self, request: Any) -> bool:
-        """Return whether a request is not for another process of the same name."""
-        meant = [item.value.string_value for item in request.parameters if item.name == PARTICIPANT]
-        return meant in ([], [self._participant])
+    def _is_outdated(self, values: Mapping[str, Any]) -> bool:
+        seen = values.get(SEEN_REPORT)
+        return seen is not None and self._reports.is_outdated(seen.integer_value, monotonic())
 
-    async def _change_states(self, request: Any, reply: Reply) -> None:
+    async def _change_states(self, values: Mapping[str, Any], reply: Reply) -> None:
         """Run all steps of a request, at the same time unless they wait for each other."""
         nodes = self._callbacks.nodes()
-        steps: list[Sequence[str]] = []
-        for parameter in request.parameters:
-            if parameter.name == GOALS:
-                self._callbacks.keep_goals(parameter.value.string_value)
-            steps += [text.split() for text in parameter.value.string_array_value]
-            if parameter.name == LAST_STEPS:
-                self._callbacks.expect_end()
-        changes = [self._start(step, nodes) for step in steps]
+        texts = [text.split() for value in values.values() for text in value.string_array_value]
+        steps = [
+            self._start(text, step, nodes)
+            for text, step in zip_longest(texts, _ids(values), fillvalue=None)
+            if text is not None
+        ]
         response = SetParameters.Response()
         try:
-            for change in changes:
-                outcome = None if change is None else await change
-                response.results.append(self._result(outcome))
-            if any(parameter.name == FIGURES for parameter in request.parameters):
+            for step in steps:
+                response.results.append(await self._result(step))
+            if FIGURES in values:
                 text = self._callbacks.figures()
                 response.results.append(SetParametersResult(successful=True, reason=text))
         finally:
             reply(response)
-        if any(step[:1] == [_SHUTDOWN] for step in steps):
+        if any(text[:1] == [_SHUTDOWN] for text in texts):
             self._callbacks.publish_states()
 
     def _start(
-        self, step: Sequence[str], nodes: Mapping[str, ManagedNode]
-    ) -> Future[TransitionOutcome] | None:
-        transition, name, *after = step if len(step) > 1 else ("", "")
+        self, text: Sequence[str], step: StepId | None, nodes: Mapping[str, ManagedNode]
+    ) -> _Step | str:
+        """Start a step unless it was received before; return it, or why it is not started."""
+        transition, name, *after = text if len(text) > 1 else ("", "")
         node = nodes.get(name)
         if node is None:
-            return None
-        earlier = [self._running[other] for other in after if other in self._running]
+            return "the process has no such node"
+        known = self._received.find(name, step)
+        if known is not None:
+            return known
+        if self._received.is_replaced(name, step):
+            return "a later request was received before"
+        earlier = [other.change for other in self._received.of(after) if not other.change.done()]
         if earlier:
             change = self._loop.run_task(self._change_after(earlier, node, transition))
         else:
             change = node.loop.run_task(self._change(node, transition))
-        self._running[name] = change
-        change.add_done_callback(partial(self._forget, name))
-        return change
+        new = _Step(change)
+        self._received.add(name, step, new)
+        return new
 
     async def _change_after(
         self, earlier: Sequence[Future[TransitionOutcome]], node: ManagedNode, transition: str
@@ -144,12 +185,21 @@ class MemberService:
             return TransitionOutcome(transition, node.state, success=True)
         return await node.lifecycle.change(transition)
 
-    def _forget(self, name: str, change: Future[TransitionOutcome]) -> None:
-        if self._running.get(name) is change:
-            self._running.pop(name, None)
+    async def _result(self, step: _Step | str) -> SetParametersResult:
+        """Return the result of a step, which is the same if it is requested again."""
+        if isinstance(step, str):
+            return SetParametersResult(successful=False, reason=step)
+        outcome = await step.change
+        if step.result is None:
+            number = str(self._callbacks.report_number())
+            reason = number if outcome.success else outcome.reason
+            step.result = SetParametersResult(successful=outcome.success, reason=reason)
+        return step.result
 
-    def _result(self, outcome: TransitionOutcome | None) -> SetParametersResult:
-        if outcome is None:
-            return SetParametersResult(successful=False, reason="the process has no such node")
-        reason = str(self._callbacks.report_number()) if outcome.success else outcome.reason
-        return SetParametersResult(successful=outcome.success, reason=reason)
+
+def _ids(values: Mapping[str, Any]) -> list[StepId]:
+    """Return what identifies the steps of a request; nothing if it is of another version."""
+    if SENDER not in values or NUMBERS not in values:
+        return []
+    sender = values[SENDER].string_value
+    return [StepId(sender, number) for number in values[NUMBERS].integer_array_value]

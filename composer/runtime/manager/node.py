@@ -176,7 +176,7 @@ class ManagerNode:
             on_permanent=self._warn_of_instance,
         )
         own_participant = self._instances.participant
-        self._reported_participant = own_participant.hex() if is_member else ""
+        self._member: MemberService | None = None
         if is_member:
             callbacks = MemberCallbacks(
                 host.nodes,
@@ -187,7 +187,9 @@ class ManagerNode:
                 status.keep_goals,
                 self._figures_text,
             )
-            MemberService(self._node, self._loop, callbacks, self._reported_participant)
+            self._member = MemberService(
+                self._node, self._loop, callbacks, own_participant.hex(), self._log.info
+            )
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
         self._graph = GraphObserver(self._node, own_participant)
@@ -278,6 +280,8 @@ class ManagerNode:
         self._graph.note_participants()
         if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
             self._publish()
+        elif self._member is not None:
+            self._member.on_report(self._number)
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
 
@@ -356,13 +360,16 @@ class ManagerNode:
     def _status_message(self) -> list[Diagnostic]:
         chains = self._host.chains()
         status, uptime_s = self._status.snapshot(), self._uptime_s
-        return status_message(status, uptime_s, chains, self._number, self._reported_participant)
+        process = None if self._member is None else self._member.reported
+        return status_message(status, uptime_s, chains, self._number, process)
 
     def _publish_now(self) -> None:
         start_s = time.monotonic()
         self._number += 1
         statuses, now_ns = self._status_message(), self._now_ns
         self._state.publish(write_array(now_ns, statuses))
+        if self._member is not None:
+            self._member.on_report(self._number)
         if self._diagnostics.get_subscription_count():
             statuses += to_statuses(self._status.without_nodes.system, self._host.callbacks())
             self._diagnostics.publish(write_array(now_ns, statuses))

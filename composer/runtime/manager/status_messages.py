@@ -16,15 +16,15 @@ def status_message(
     uptime_s: float,
     chains: Iterable[ChainFigures],
     number: int,
-    participant: str = "",
+    process: Mapping[str, str] | None = None,
 ) -> list[Status]:
     """Return the status of a system, followed by those of its nodes.
 
     ``number`` is that of the last message on the topic ``state``, this one included.
-    ``participant`` is the prefix of the ids of its endpoints, if another process needs it.
+    ``process`` is what only the coordinating process needs to know of another one.
     """
     nodes = (_of_node(status.system, node) for node in status.nodes)
-    return [_of_system(status, uptime_s, chains, number, participant), *nodes]
+    return [_of_system(status, uptime_s, chains, number, process or {}), *nodes]
 
 
 def _of_system(
@@ -32,7 +32,7 @@ def _of_system(
     uptime_s: float,
     chains: Iterable[ChainFigures],
     number: int,
-    participant: str,
+    process: Mapping[str, str],
 ) -> Status:
     level = Level.OK
     if status.failed:
@@ -49,9 +49,8 @@ def _of_system(
         "uptime": f"{uptime_s:.3f}",
         "number": str(number),
         "started_by": status.started_by,
+        **process,
     }
-    if participant:
-        values["participant"] = participant
     values |= {f"chain {chain.chain}": chain.text for chain in chains}
     goals = {"goals": status.goals} if status.goals else {}  # not cut either
     name = status.system

@@ -22,7 +22,9 @@ CHANGE_STATE = "change_state"
 #: With the parameter ``figures``, a last result has the timings of callbacks and chains as its
 #: reason, as JSON: see ``metrics/diagnostics.py``. The parameter ``participant`` has the one that
 #: is meant, as it reports itself: another process of the same name, on another computer for
-#: example, receives the request as well, but neither follows nor answers it.
+#: example, receives the request as well, but neither follows nor answers it. The parameters
+#: ``sender`` and ``numbers`` identify the steps, and ``seen_report`` is the number of the last
+#: report that the sender has received: see ``manager/received_steps.py``.
 CHANGE_STATES = "change_states"
 STEPS = "steps"
 CREATE = "create"
@@ -30,6 +32,9 @@ LAST_STEPS = "last_steps"
 GOALS = "goals"
 FIGURES = "figures"
 PARTICIPANT = "participant"
+SENDER = "sender"
+NUMBERS = "numbers"
+SEEN_REPORT = "seen_report"
 #: rcl_interfaces/srv/SetParametersAtomically, with the full names of nodes in the parameter
 #: ``nodes``: the only standard service that takes names and returns a reason.
 RESTART = "restart"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 
@@ -15,12 +17,22 @@ from composer.runtime.children import member_process, member_requests
 from composer.runtime.children.child_processes import Child, ChildProcesses
 from composer.runtime.children.kept_goals import KeptGoals
 from composer.runtime.children.member_context import MemberContext, ProcessUnavailable
+from composer.runtime.children.member_life import MemberLife
 from composer.runtime.children.member_process import MemberProcess
+from composer.runtime.children.member_report import MemberReport
 from composer.runtime.children.member_requests import MemberRequests
 from composer.runtime.executors.loop import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.ros.graph import participant, servers_of
-from composer.runtime.ros.manager_protocol import CHANGE_STATES, FIGURES, GOALS
+from composer.runtime.ros.manager_protocol import (
+    CHANGE_STATES,
+    FIGURES,
+    GOALS,
+    NUMBERS,
+    SEEN_REPORT,
+    SENDER,
+    STATE_QOS,
+)
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
 
@@ -33,6 +45,8 @@ class Process:
     def __init__(self, bench: Bench) -> None:
         self.answers = False
         self.steps: list[str] = []
+        self.ids: list[tuple[str, int]] = []
+        self.seen: list[int] = []
         self.goals: list[str] = []
         self.asked = 0
         bench.serve(SetParameters, SERVICE, self._on_request)
@@ -40,7 +54,12 @@ class Process:
     def _on_request(self, request: SetParameters.Request, reply: Reply) -> None:
         names = [parameter.name for parameter in request.parameters]
         steps = request.parameters[0].value.string_array_value
+        values = {parameter.name: parameter.value for parameter in request.parameters}
         self.steps += steps
+        if steps:
+            sender = values[SENDER].string_value
+            self.ids += [(sender, number) for number in values[NUMBERS].integer_array_value]
+            self.seen.append(values[SEEN_REPORT].integer_value)
         self.asked += FIGURES in names
         self.goals += [item.value.string_value for item in request.parameters if item.name == GOALS]
         if self.answers:
@@ -49,8 +68,15 @@ class Process:
             reply(SetParameters.Response(results=results))
 
 
-def client(on: Bench, figures: list[str]) -> MemberRequests:
-    requests = MemberRequests(on.node, on.loop, SERVICE, figures.append)
+def report_of(participant: str, number: int = 1, last_step: str = "") -> MemberReport:
+    return MemberReport("running", "vm", "7", 1.0, "", number, "", participant, last_step, {})
+
+
+def client(
+    on: Bench, figures: list[str], problems: list[str] | None = None, service: str = SERVICE
+) -> MemberRequests:
+    on_problem = ([] if problems is None else problems).append
+    requests = MemberRequests(on.node, on.loop, service, figures.append, on_problem)
     wait_until(requests._client.service_is_ready, "the service")
     return requests
 
@@ -82,6 +108,71 @@ def test_a_canceled_request_is_not_sent_later() -> None:
         requests.release()
         wait_until(result.done, "the response")
         assert process.steps == ["activate /arm"]
+
+
+@pytest.fixture
+def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(member_requests, "AGAIN_AFTER_S", 0.05)
+
+
+@pytest.mark.usefixtures("impatience")
+def test_steps_whose_responses_are_lost_are_requested_again() -> None:
+    with bench(ExecutorKind.EVENTS) as on:
+        process, problems = Process(on), list[str]()
+        requests = client(on, [], problems)
+        own = participant(servers_of(on.node, SERVICE)[0]).hex()
+        on.loop.run(lambda: requests.on_report(report_of(own, 4), None))
+        requests.hold()
+        results = [on.loop.run(partial(requests.request, f"/node{n}", "activate")) for n in (1, 2)]
+        requests.release()
+        wait_until(lambda: len(process.steps) == 2, "the first request")
+        (sender, first), (_, second) = process.ids
+        text = f"{sender} {second}"  # received: only the responses are lost
+        on.loop.run(lambda: requests.on_report(report_of(own, 9, text), None))
+        results[0].cancel()  # its node has given up
+        wait_until(lambda: len(process.steps) >= 4, "two more requests")
+        assert process.steps[:4] == ["activate /node1", *["activate /node2"] * 3]
+        assert process.ids[:4] == [(sender, first), *[(sender, second)] * 3]
+        assert process.seen[-1] == 9
+        process.answers = True
+        wait_until(results[1].done, "the response")
+        assert results[1].result().successful
+        assert not problems
+        assert not requests._sent
+
+
+@pytest.mark.usefixtures("impatience")
+def test_a_request_that_is_lost_is_reported_once_for_each_process() -> None:
+    with bench(ExecutorKind.EVENTS) as on:
+        process, problems = Process(on), list[str]()
+        requests = client(on, [], problems)
+        own = participant(servers_of(on.node, SERVICE)[0]).hex()
+        reports = count(1)
+
+        def is_requested_again() -> bool:
+            """Report as a process that has received nothing."""
+            on.loop.run(lambda: requests.on_report(report_of(own, next(reports)), None))
+            return process.steps.count("activate /arm") > 3
+
+        result = on.loop.run(lambda: requests.request("/arm", "activate"))
+        wait_until(is_requested_again, "the requests")
+        assert problems == ["has not received 'activate /arm'; it is requested again"]
+        result.cancel()
+
+
+def test_a_process_whose_service_is_not_discovered_is_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(member_requests, "_READY_WITHIN_S", 0.0)
+    with bench(ExecutorKind.EVENTS) as on:
+        problems = list[str]()
+        nothing: Any = None
+        requests = MemberRequests(on.node, on.loop, SERVICE, nothing, problems.append)
+        result = on.loop.run(lambda: requests.request("/arm", "activate"))
+        wait_until(lambda: problems, "the report")
+        Process(on).answers = True
+        wait_until(result.done, "the response")
+        assert problems == ["reports, but its service is not discovered; requests wait"]
 
 
 def test_lost_goals_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,12 +215,12 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
 
     with bench(ExecutorKind.EVENTS) as on:
         callbacks = MemberCallbacks(dict, *[nothing] * 6)
-        MemberService(on.node, on.loop, callbacks, MEANT)
+        MemberService(on.node, on.loop, callbacks, MEANT, nothing).on_report(1)
         service = on.node.resolve_service_name(f"~/{CHANGE_STATES}")
-        requests = MemberRequests(on.node, on.loop, service, nothing)
-        on.loop.run(lambda: requests.on_report(KILLED, "goals"))
+        requests = client(on, [], service=service)
+        on.loop.run(lambda: requests.on_report(report_of(KILLED), "goals"))
         others = on.loop.run(lambda: requests.request("/camera", "activate"))
-        on.loop.run(lambda: requests.on_report(MEANT, None))
+        on.loop.run(lambda: requests.on_report(report_of(MEANT), None))
         own = on.loop.run(lambda: requests.request("/camera", "activate"))
         wait_until(own.done, "the response")
         assert own.result().reason == "the process has no such node"
@@ -138,22 +229,43 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
         others.cancel()
 
 
+def silent_process(on: Bench, folder: Path, *command: str) -> MemberProcess:
+    text = "{system: robot, processes: {acting: {nodes: [arm]}}, nodes: {arm: {}, leg: {}}}"
+    system = system_of(text, folder)
+    context = MemberContext(
+        loop=on.loop,
+        manager=on.node,
+        children=ChildProcesses(),
+        namespace="/robot",
+        command=command,
+        goals=KeptGoals(system),
+        write_log=lambda *_: None,
+    )
+    return MemberProcess(system.processes[0], context)
+
+
+@pytest.mark.parametrize("is_in_the_graph", [True, False])
+def test_the_error_says_why_a_process_has_not_reported(
+    is_in_the_graph: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(member_process, "STARTS_WITHIN_S", 0.0)
+    with bench(ExecutorKind.EVENTS) as on:
+        process = silent_process(on, tmp_path)
+        if is_in_the_graph:
+            on.node.create_publisher(DiagnosticArray, "/robot/acting/manager/state", STATE_QOS)
+        start = on.loop.run_task(process.ensure())
+        wait_until(start.done, "the error")
+        reason = "its reports do not arrive" if is_in_the_graph else "it is not in the ROS graph"
+        expected = f"process 'acting' has not reported within 0 s: {reason}"
+        assert str(start.exception()) == expected
+        process.close()
+
+
 def test_a_process_that_has_not_reported_is_asked_for_nothing(tmp_path: Path) -> None:
     """Another one, of another computer, would follow the request."""
-    text = "{system: robot, processes: {acting: {nodes: [arm]}}, nodes: {arm: {}, leg: {}}}"
-    system = system_of(text, tmp_path)
     with bench(ExecutorKind.EVENTS) as on:
-        context = MemberContext(
-            loop=on.loop,
-            manager=on.node,
-            children=ChildProcesses(),
-            namespace="/robot",
-            command=("unused",),
-            goals=KeptGoals(system),
-            write_log=lambda *_: None,
-        )
-        process = MemberProcess(system.processes[0], context)
-        process._life = member_process._Life(child=Child(1))
+        process = silent_process(on, tmp_path, "unused")
+        process._life = MemberLife(child=Child(1))
         with pytest.raises(ProcessUnavailable, match="has not reported yet"):
             process.request("/arm", "shutdown")
         process.close()
@@ -172,13 +284,14 @@ def test_a_request_waits_for_the_service_of_the_process_that_has_reported(
         process = Process(on)
         process.answers = True
         requests = client(on, [])
-        on.loop.run(lambda: requests.on_report(KILLED, None))
+        on.loop.run(lambda: requests.on_report(report_of(KILLED), None))
         result = on.loop.run(lambda: requests.request("/arm", "activate"))
         assert not on.loop.run(requests._is_ready)
         assert not requests._sent
         if is_discovered:
             (server,) = servers_of(on.node, SERVICE)
-            on.loop.run(lambda: requests.on_report(participant(server).hex(), "1 running active"))
+            report = report_of(participant(server).hex())
+            on.loop.run(lambda: requests.on_report(report, "1 running active"))
         else:
             requests._awaited_until_s = 0.0
         wait_until(result.done, "the response")

@@ -16,6 +16,7 @@ SYSTEM = {
     "started": "12.5",
     "started_by": "ab",
     "participant": "010f",
+    "last_step": "cafe 7",
 }
 NODE = {
     "state": "active",
@@ -70,6 +71,16 @@ def test_a_report_of_another_version_has_no_figures() -> None:
     assert parse_report(message()) is None
     assert parse_report(b"") is None
     assert parse_report(message(("robot", {**SYSTEM, "started": "nan"}))) is None
+
+
+def test_a_report_says_which_step_was_received_last() -> None:
+    report = parse_report(message(("robot", SYSTEM)))
+    assert report is not None
+    assert [report.received(sender) for sender in ("cafe", "other", "")] == [7, 0, 0]
+    for text in ("", "cafe", "cafe x", " "):
+        report = parse_report(message(("robot", {**SYSTEM, "last_step": text})))
+        assert report is not None
+        assert report.received("cafe") == 0
 
 
 def counted(errors: int, sent: int) -> dict[str, Any]:
