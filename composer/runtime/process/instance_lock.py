@@ -11,7 +11,6 @@ import json
 import os
 import socket
 import stat
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -26,6 +25,10 @@ STARTED_BY_VARIABLE = "COMPOSE_STARTED_BY"
 ALREADY_RUNS = 75  # EX_TEMPFAIL of sysexits.h
 #: The name of the folder of the lock files.
 FOLDER_NAME = f"ros2-composer-{os.geteuid()}"
+#: Services, cron jobs and shells of the same user have this folder in common.
+_COMMON = "/tmp"  # noqa: S108 - the folder in it belongs to the user, or is refused
+#: The folders of login sessions. Services do not have one, and it ends with the last session.
+_SESSIONS = "/run/user/"
 _DEFAULT_DOMAIN = "0"
 _SUFFIX = ".lock"
 #: A process that only looks whether a system runs holds its lock for some microseconds.
@@ -62,7 +65,7 @@ def hold_instance_lock(name: str, discovery: Mapping[str, str] | None = None) ->
     if lock is None:
         yield
         return
-    with lock:
+    with lock, _kept_folder():
         end_s = time.monotonic() + _LOOKED_AT_WITHIN_S
         while not _is_locked(lock, fcntl.LOCK_EX):
             if time.monotonic() > end_s:
@@ -212,8 +215,18 @@ def _domain() -> str:
 
 
 def _folder() -> Path:
-    parent = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
+    chosen = os.environ.get("XDG_RUNTIME_DIR", "")
+    parent = _COMMON if chosen.startswith(_SESSIONS) else chosen or _COMMON
     return Path(parent, FOLDER_NAME)
+
+
+@contextmanager
+def _kept_folder() -> Iterator[None]:
+    """Keep the folder of the lock files: systemd-tmpfiles removes old files unless it is locked."""
+    with _open_folder() as folder:
+        with suppress(OSError):  # not on every file system
+            fcntl.flock(folder, fcntl.LOCK_SH)
+        yield
 
 
 @contextmanager

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import pytest
+
 from tests.ros.support.commands import PATIENCE_S, compose
 from tests.ros.support.in_process import wait_until
 
@@ -30,7 +32,10 @@ nodes:
 
 
 class Service:
-    """A service: its process, and what it reports to its service manager."""
+    """A service: its process, and what it reports to its service manager.
+
+    It has the variables of its unit, and those that systemd sets; not those of a shell.
+    """
 
     def __init__(self, unit: Path, folder: Path) -> None:
         lines = unit.read_text().splitlines()
@@ -41,7 +46,8 @@ class Service:
         self.messages = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.messages.bind(str(address))
         self.messages.settimeout(PATIENCE_S)
-        environment = {**os.environ, **dict(variable.split("=", 1) for variable in variables)}
+        environment = dict(variable.split("=", 1) for variable in variables)
+        environment |= {name: os.environ[name] for name in ("PATH", "HOME")}
         environment["NOTIFY_SOCKET"] = str(address)
         self.process = subprocess.Popen(
             shlex.split(command), env=environment, stderr=subprocess.PIPE, text=True
@@ -76,11 +82,35 @@ def wait_until_ready(system: str) -> None:
     wait_until(lambda: is_ready(system), f"{system} to be ready")
 
 
-def test_services_become_ready_and_stop_in_order(tmp_path: Path) -> None:
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the exported system; commands run as in a shell of a login session."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", f"/run/user/{os.geteuid()}")
     file = tmp_path / "robot.yaml"
     file.write_text(SYSTEM)
     done = compose("export", "systemd", file, "-o", tmp_path / "units")
     assert done.returncode == 0, done.stderr
+    return file
+
+
+def test_commands_of_a_shell_reach_services(file: Path, tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        units = (tmp_path / "units" / f"{name}.service" for name in ("robot-ears", "robot"))
+        ears, robot = (stack.enter_context(started(unit, tmp_path)) for unit in units)
+        wait_until_ready("/fleet/robot")
+        assert compose("ps").stdout.count("/fleet/listener") == 1
+        for options, name in (((), "/fleet/robot"), (("--process", "ears"), "/fleet/robot/ears")):
+            second = compose("run", file, *options)
+            assert second.returncode == 1
+            assert f"system '{name}' already runs in ROS domain" in second.stderr
+            assert "shutting down" not in second.stderr  # it has not started anything
+        assert is_ready("/fleet/robot")
+        assert compose("down", "/fleet/robot").returncode == 0
+        assert robot.process.wait(PATIENCE_S) == 0
+        assert ears.stop() == 0
+
+
+def test_services_become_ready_and_stop_in_order(file: Path, tmp_path: Path) -> None:
     with ExitStack() as stack:
         unit = tmp_path / "units" / "robot-ears.service"
         ears = stack.enter_context(started(unit, tmp_path))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
-from composer.runtime.process import StartRefused
+from composer.runtime.process import StartRefused, instance_lock
 from composer.runtime.process.instance_lock import (
     LocalSystems,
     hold_instance_lock,
@@ -57,6 +59,34 @@ def test_an_observer_follows_systems_whose_lock_files_existed_before(folder: Pat
             assert observer.current() == {NAME: pid, "/lab/robot": pid}
             assert observer.current() == {NAME: pid, "/lab/robot": pid}
         assert observer.current() == {}
+
+
+@pytest.mark.parametrize("session", ["/run/user/1000", ""])
+def test_a_login_session_and_a_service_share_the_folder(
+    session: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(instance_lock, "_COMMON", str(folder.parent))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", session)
+    with hold_instance_lock(NAME):
+        monkeypatch.delenv("XDG_RUNTIME_DIR")
+        assert local_systems() == {NAME: str(os.getpid())}
+        assert (folder / "7.robot.lock").exists()
+
+
+@pytest.mark.skipif(shutil.which("systemd-tmpfiles") is None, reason="needs systemd-tmpfiles")
+def test_old_lock_files_stay_while_a_system_runs(folder: Path, tmp_path: Path) -> None:
+    configuration = tmp_path.with_suffix(".conf")
+    configuration.write_text(f'q "{tmp_path}" - - - mM:10d\n')
+    clean = ("systemd-tmpfiles", "--clean", str(configuration))
+    with hold_instance_lock(NAME):
+        for path in (*folder.iterdir(), folder):
+            os.utime(path, (0.0, 0.0))
+        subprocess.run(clean, check=True, capture_output=True)
+        assert is_held(NAME)
+    for path in (*folder.iterdir(), folder):
+        os.utime(path, (0.0, 0.0))
+    subprocess.run(clean, check=True, capture_output=True)
+    assert not folder.exists()
 
 
 def test_an_observer_opens_no_files_of_ended_systems_again(
