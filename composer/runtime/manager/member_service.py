@@ -34,6 +34,7 @@ from composer.runtime.ros.manager_protocol import (
     SENDER,
 )
 
+_MAX_LISTED = 3
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
 
@@ -107,7 +108,8 @@ class MemberService:
         if GOALS in values:
             self._callbacks.keep_goals(values[GOALS].string_value)
         if self._is_outdated(values):
-            self._log("a request that is no longer waited for has arrived late, and is ignored")
+            late = ", ".join(_steps(values)[:_MAX_LISTED])
+            self._log(f"ignored a request that has arrived too late: {late}")
             return
         if LAST_STEPS in values:
             self._callbacks.expect_end()
@@ -120,7 +122,7 @@ class MemberService:
     async def _change_states(self, values: Mapping[str, Any], reply: Reply) -> None:
         """Run all steps of a request, at the same time unless they wait for each other."""
         nodes = self._callbacks.nodes()
-        texts = [text.split() for value in values.values() for text in value.string_array_value]
+        texts = [text.split() for text in _steps(values)]
         steps = [
             self._start(text, step, nodes)
             for text, step in zip_longest(texts, _ids(values), fillvalue=None)
@@ -195,6 +197,10 @@ class MemberService:
             reason = number if outcome.success else outcome.reason
             step.result = SetParametersResult(successful=outcome.success, reason=reason)
         return step.result
+
+
+def _steps(values: Mapping[str, Any]) -> list[str]:
+    return [text for value in values.values() for text in value.string_array_value]
 
 
 def _ids(values: Mapping[str, Any]) -> list[StepId]:

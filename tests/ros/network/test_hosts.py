@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ros.network.namespaces import PERFECT, Quality, network
+from tests.ros.network.namespaces import PERFECT, Computer, Quality, network
 from tests.ros.network.split_system import WORKSPACE, SplitSystem, wait_until
 from tests.ros.network.ssh_servers import SshKeys
 from tests.ros.support.commands import code_of_end
@@ -126,15 +126,30 @@ def test_a_cut_of_five_seconds_restarts_nothing(tmp_path: Path, others: tuple[st
     with split(tmp_path, *others) as (system, _), system.up() as up:
         up.wait_for("] found picture")
         members = system.members()
-        system.others[0].cut()
-        cut_until_s = time.monotonic() + 5.0
-        while time.monotonic() < cut_until_s:
-            time.sleep(0.1)  # the length of the cut is what is tested
-        system.others[0].join()
+        with cut(system.others[0], 5.0):
+            pass
         up.wait_for("] found picture", len(up.lines) + 1)
         wait_until(lambda: states(system) == {"active"}, "the states do not converge")
         assert system.members() == members
         assert "connection lost" not in "\n".join(up.lines)
+        assert up.stop() == code_of_end(up.output)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+def test_a_request_that_arrives_after_a_cut_moves_nothing(tmp_path: Path) -> None:
+    with split(tmp_path, "robot", "arm") as (system, _), system.up() as up:
+        robot, arm = system.others
+        seen = up.wait_for("] found picture")
+        (killed,) = (pid for name, pid in system.members() if name == robot.name)
+        with cut(arm, 9.0):  # longer than a process may be silent
+            robot.check("kill", "-KILL", str(killed))
+            up.wait_for("/logger inactive", seen)  # and then the detector, but that is cut off
+            up.wait_for("has not reported for 5 s", seen)
+        up.wait_for("ignored a request that has arrived too late: deactivate /detector", seen)
+        wait_until(lambda: states(system) == {"active"}, "the states do not converge")
+        up.wait_for("] found picture", len(up.lines) + 1)
+        assert up.output.count("] looking") == 1  # the detector was active all the time
         assert up.stop() == code_of_end(up.output)
 
 
@@ -186,6 +201,17 @@ def test_processes_end_when_the_link_stays_cut(tmp_path: Path) -> None:
         assert time.monotonic() - cut_s > 25.0
         code = up.stop()
         assert code in (0, 1)
+
+
+@contextmanager
+def cut(computer: Computer, least_s: float) -> Iterator[None]:
+    """Cut the link of a computer for the block, and for a time at least."""
+    computer.cut()
+    until_s = time.monotonic() + least_s
+    yield
+    while time.monotonic() < until_s:
+        time.sleep(0.1)  # the length of the cut is what is tested
+    computer.join()
 
 
 def states(system: SplitSystem) -> set[str]:
