@@ -69,19 +69,14 @@ def check(graph: Graph, parsed: dict[str, Any]) -> None:
     assert {cluster.label for cluster in graph.clusters if cluster.key in drawn} <= titles
 
 
-def test_every_example_system_in_every_view() -> None:
-    graphs = []
+def test_example_systems_and_thirty_nodes_in_every_view() -> None:
+    scenes = []
     for path in SYSTEMS:
         loading = load(path)
         assert loading.system is not None
-        scene = scene_of([loading.system], loading.diagnostics)
-        graphs += [build_graph(scene, view) for view in View]
-    for graph, parsed in zip(graphs, read(graphs), strict=True):
-        check(graph, parsed)
-
-
-def test_thirty_nodes() -> None:
-    graphs = [fleet_graph(30, view) for view in View]
+        scenes.append(scene_of([loading.system], loading.diagnostics))
+    graphs = [build_graph(scene, view) for scene in scenes for view in View]
+    graphs += [fleet_graph(30, view) for view in View]
     for graph, parsed in zip(graphs, read(graphs), strict=True):
         check(graph, parsed)
 

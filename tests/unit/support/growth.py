@@ -17,9 +17,9 @@ def assert_linear(operation: Callable[[int], object], small: int, large: int) ->
     Work in C cannot be counted, so it is the time of a processor that this thread uses. Both sizes
     are measured one after the other, several times: what is slow by chance is not so every time.
     """
-    operation(small)  # what is loaded and cached once
     ratios: list[float] = []
     for _ in range(_ATTEMPTS):
+        # The first time also loads and caches what is needed once.
         small_s = min(_seconds(operation, small) for _ in range(2))
         ratios.append(_seconds(operation, large) / small_s)
         if ratios[-1] < 3 * large / small:
