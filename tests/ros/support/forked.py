@@ -37,7 +37,7 @@ def _modules() -> list[str]:
 
 
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(_modules())
+_context.set_forkserver_preload([*_modules(), "tests.ros.support.frozen"])
 
 
 class ForkedProcess:
