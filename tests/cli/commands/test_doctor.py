@@ -40,6 +40,17 @@ def test_without_rclpy_everything_else_is_checked() -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_interface_packages_are_those_of_the_project_and_of_the_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not those of the examples, which a project of its own does not need."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCLHOST")  # the ROS graph is not checked
+    monkeypatch.chdir(tmp_path)
+    tmp_path.joinpath("composer.yaml").touch()
+    assert "interfaces   " not in compose("doctor").out
+    assert "interfaces   built: composer_interfaces\n" in compose("doctor", "pipeline").out
+
+
 def test_an_invalid_environment_is_reported_with_a_remedy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

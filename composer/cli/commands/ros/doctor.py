@@ -137,7 +137,7 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
     if os.environ.get("ROS_DISCOVERY_SERVER"):
         reach = "server"  # neither multicast nor interfaces matter
     yield from check_network(reach, shared_memory=SHARED_MEMORY if uses_shared_memory else None)
-    yield from _check_interfaces()
+    yield from _check_interfaces(system)
     if any(result.level is Level.ERROR for result in environment):
         yield note("graph", "not checked: the environment does not let ROS start", _RETRY)
     elif find_spec("rclpy") is None:
@@ -161,17 +161,22 @@ def _started_server(system: System | None) -> AbstractContextManager[None]:
     return discovery_servers(discovery, os.environ, lambda *_: None)
 
 
-def _check_interfaces() -> Iterator[CheckResult]:
+def _check_interfaces(system: System | None) -> Iterator[CheckResult]:
+    """Check the interface packages of the project, and those that the system uses."""
     from composer.doctor.interfaces import check_interfaces
     from composer.interfaces import Interfaces
     from composer.interfaces.sources import find_packages
     from composer.node_types import interface_folders
     from composer.project import Project
 
-    folders = interface_folders(Project.at(Path.cwd()))
-    yield from check_interfaces(
-        find_packages(folders).packages(), Interfaces.load(folders), Interfaces.load()
-    )
+    project = Project.at(Path.cwd())
+    folders = interface_folders(project)  # with those of the examples
+    nodes = () if system is None else system.nodes
+    used = {
+        port.interface.value.partition("/")[0] for node in nodes for port in node.all_ports
+    } & find_packages(folders).packages()
+    own = find_packages(project.interface_folders).packages()
+    yield from check_interfaces(own | used, Interfaces.load(folders), Interfaces.load())
 
 
 def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
