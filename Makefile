@@ -65,7 +65,7 @@ test: $(READY) $(STAMPS)/tf2_msgs $(STAMPS)/dev
 # The inner loop: a quarter of the examples that hypothesis generates otherwise.
 test-fast: $(STAMPS)/composer $(STAMPS)/dev
 	@echo "==> pytest, the fast tests"
-	@$(BIN)/python -m pytest --numprocesses 2 $(XDIST) -m "not ros and not slow" --hypothesis-profile fast \
+	@$(BIN)/python -m pytest --numprocesses 3 $(XDIST) -m "not ros and not slow" --hypothesis-profile fast \
 	  tests/unit tests/golden tests/properties tests/cli
 
 # Problems that appear only after hundreds of starts, shutdowns and transitions.

@@ -22,6 +22,7 @@ def scale(layout: Layout, page: Size) -> float:
     return min(page.width / layout.size.width, page.height / layout.size.height)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 @pytest.mark.parametrize("view", [View.NODES, View.CONNECTIONS])
 def test_a_large_graph_fills_the_page(view: View, page: Size) -> None:

@@ -119,6 +119,7 @@ def test_spans_of_rules_in_a_comment_are_exact() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_many_comments_take_linear_time() -> None:
     def read(count: int) -> None:
         text = "system: a\n" + "# compose: ignore[qos-implicit]\n" * count + "nodes: {}\n"
