@@ -62,7 +62,7 @@ test: $(READY) $(STAMPS)/tf2_msgs $(STAMPS)/dev
 	@echo "==> pytest"
 	@$(BIN)/python -m pytest --numprocesses 6 $(XDIST)
 
-# The inner loop: a quarter of the examples that hypothesis generates otherwise.
+# The inner loop: half of the examples that hypothesis generates otherwise.
 test-fast: $(STAMPS)/composer $(STAMPS)/dev
 	@echo "==> pytest, the fast tests"
 	@$(BIN)/python -m pytest --numprocesses 3 $(XDIST) -m "not ros and not slow" --hypothesis-profile fast \

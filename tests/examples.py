@@ -9,7 +9,7 @@ from __future__ import annotations
 from hypothesis import HealthCheck, settings
 
 DEFAULT = "tests"
-_FACTORS = {DEFAULT: 1.0, "fast": 0.25, "thorough": 10.0}
+_FACTORS = {DEFAULT: 0.5, "fast": 0.25, "thorough": 10.0}
 
 
 def register_profiles() -> None:
@@ -21,7 +21,7 @@ def register_profiles() -> None:
 
 
 def examples(count: int) -> settings:
-    """Return the settings for a test that takes ``count`` examples by default."""
+    """Return the settings for a test of which ``count`` examples, times a factor, are checked."""
     return settings(
         max_examples=round(count * _FACTORS.get(settings.get_current_profile_name(), 1.0))
     )
