@@ -8,7 +8,7 @@ from typing import Any
 
 from composer.importing.found import FoundNode, FoundParameter, FoundSystem
 from composer.names import join_node_name, parameter_name_problem
-from composer.resolve.parameters import rclpy_type
+from composer.resolve.declarations.parameters import rclpy_type
 from composer.tree import Plain
 
 _DEFAULT_NAME = "node"

@@ -10,7 +10,7 @@ from composer.importing.found import FoundNode, FoundParameter, FoundPort, Found
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
 from composer.names import parameter_name_problem, split_node_name, topic_name_problem
 from composer.qos import PRESETS, QosProfile
-from composer.resolve.parameters import rclpy_type
+from composer.resolve.declarations.parameters import rclpy_type
 from composer.tree import Plain
 
 _IS_ACTIVE = "/manager/is_active"

@@ -23,7 +23,7 @@ from composer.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.importing.python_values import NotLiteral, Scope
 from composer.model import BehaviorReference, PortKind
 from composer.project import Project
-from composer.resolve.parameters import rclpy_type
+from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
 

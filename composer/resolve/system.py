@@ -16,10 +16,12 @@ from composer.model import (
 )
 from composer.names import join
 from composer.resolve.connections import read_chains, read_connections
-from composer.resolve.declaration import declare
-from composer.resolve.discovery import read_discovery
-from composer.resolve.hosts import read_hosts
-from composer.resolve.node import (
+from composer.resolve.declarations.declaration import declare
+from composer.resolve.declarations.parameters import with_use_sim_time, with_values
+from composer.resolve.deployment.discovery import read_discovery
+from composer.resolve.deployment.hosts import read_hosts
+from composer.resolve.deployment.processes import processes_of_nodes, read_processes
+from composer.resolve.nodes.node import (
     NodeNames,
     SystemContext,
     place_ports,
@@ -27,12 +29,10 @@ from composer.resolve.node import (
     resolve_node,
     state,
 )
-from composer.resolve.node_options import read_introspection, read_supervision
-from composer.resolve.node_type_loader import NodeTypeLoader
+from composer.resolve.nodes.node_options import read_introspection, read_supervision
+from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
-from composer.resolve.parameters import with_use_sim_time, with_values
-from composer.resolve.processes import processes_of_nodes, read_processes
 from composer.resolve.qos import qos_table
 from composer.resolve.source_folders import SourceFolders
 from composer.resolve.tree_values import (

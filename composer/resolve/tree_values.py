@@ -88,3 +88,15 @@ def flag(tree: Tree | None, default: bool) -> bool:
 def key(entry: Entry) -> Located[str]:
     """Return the key of an entry with its location."""
     return Located(entry.name, entry.key.span)
+
+
+def word(tree: Tree) -> str:
+    """Return a scalar as a program sees it in its arguments or environment."""
+    if not isinstance(tree, Scalar) or tree.value is None:
+        return ""
+    return str(tree.value).lower() if isinstance(tree.value, bool) else str(tree.value)
+
+
+def environment(tree: Tree | None) -> tuple[tuple[Located[str], str], ...]:
+    """Return the environment variables of a map."""
+    return tuple((key(item), word(item.value)) for item in entries(tree))

@@ -15,7 +15,7 @@ from composer.behavior_types.syntax.names import full_name, interface_name
 from composer.behavior_types.syntax.self_attributes import escapes
 from composer.fast_dataclass import dataclass
 from composer.model import PortKind
-from composer.resolve.parameters import rclpy_type
+from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, Span
 
 _TOPIC = ("msg_type", "topic", "qos_profile")

@@ -11,7 +11,7 @@ from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, 
 from composer.document import read_document
 from composer.expand import expand, missing_variables
 from composer.fast_dataclass import dataclass
-from composer.resolve.declaration import Declaration, declare
+from composer.resolve.declarations.declaration import Declaration, declare
 from composer.resolve.qos import QosTable
 from composer.resolve.source_folders import SourceFolders
 from composer.resolve.tree_values import entries

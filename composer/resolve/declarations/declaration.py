@@ -13,13 +13,13 @@ from composer.model import (
     Transforms,
     UnknownKey,
 )
-from composer.resolve.implementation import Implementation, read_implementation
-from composer.resolve.parameters import read_parameters
-from composer.resolve.ports import read_ports, read_timers
+from composer.resolve.declarations.implementation import Implementation, read_implementation
+from composer.resolve.declarations.parameters import read_parameters
+from composer.resolve.declarations.ports import read_ports, read_timers
+from composer.resolve.declarations.reactions import NODE_EVENTS, Events, node_reactions
+from composer.resolve.declarations.transforms import merged_transforms, read_transforms
 from composer.resolve.qos import QosTable
-from composer.resolve.reactions import NODE_EVENTS, Events, node_reactions
 from composer.resolve.source_folders import SourceFolders
-from composer.resolve.transforms import merged_transforms, read_transforms
 from composer.resolve.tree_values import entries, key, plain_text
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Tree, plain

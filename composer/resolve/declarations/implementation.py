@@ -15,7 +15,16 @@ from composer.model import (
 )
 from composer.project import Project
 from composer.resolve.source_folders import SourceFolders
-from composer.resolve.tree_values import choice, entries, key, number, text, texts
+from composer.resolve.tree_values import (
+    choice,
+    entries,
+    environment,
+    key,
+    number,
+    text,
+    texts,
+    word,
+)
 from composer.source import Located
 from composer.tree import Entry, Mapping, Scalar, Tree, plain
 
@@ -76,9 +85,7 @@ def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
         name=text(tree.get("name")),
         command=texts(tree.get("command")),
         arguments=_words(tree.get("arguments")),
-        environment=tuple(
-            (key(item), word(item.value)) for item in entries(tree.get("environment"))
-        ),
+        environment=environment(tree.get("environment")),
         working_directory=text(tree.get("working_directory")),
         kind=default.kind if kind is None else kind.value,
         lifecycle=_lifecycle(tree.get("lifecycle")),
@@ -106,10 +113,3 @@ def _milliseconds(tree: Tree | None, default: float) -> float:
 def _words(tree: Tree | None) -> tuple[Located[str], ...]:
     items = getattr(tree, "items", ())
     return tuple(Located(word(item), item.span) for item in items if isinstance(item, Scalar))
-
-
-def word(tree: Tree) -> str:
-    """Return a scalar as a program sees it in its arguments or environment."""
-    if not isinstance(tree, Scalar) or tree.value is None:
-        return ""
-    return str(tree.value).lower() if isinstance(tree.value, bool) else str(tree.value)

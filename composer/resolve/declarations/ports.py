@@ -16,8 +16,15 @@ from composer.model import (
     Timer,
     TimerClock,
 )
+from composer.resolve.declarations.reactions import (
+    RULE,
+    Events,
+    expression,
+    nested,
+    reaction,
+    template,
+)
 from composer.resolve.qos import QosTable, implicit_qos
-from composer.resolve.reactions import RULE, Events, expression, nested, reaction, template
 from composer.resolve.tree_values import (
     choice,
     entries,

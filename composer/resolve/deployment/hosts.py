@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from composer.model import Host
-from composer.resolve.implementation import word
-from composer.resolve.tree_values import entries, integer, key, text, texts
+from composer.resolve.tree_values import entries, environment, integer, key, text, texts
 from composer.tree import Entry, Tree
 from composer.tree import Mapping as MappingTree
 
@@ -27,9 +26,7 @@ def _host(entry: Entry) -> Host:
         workspace=text(tree.get("workspace")),
         python=_plain(tree.get("python")),
         setup=() if setup is None else tuple(item.value for item in texts(setup)),
-        environment=tuple(
-            (key(item), word(item.value)) for item in entries(tree.get("environment"))
-        ),
+        environment=environment(tree.get("environment")),
         identity_file=_plain(tree.get("identity_file")),
         known_hosts=_plain(tree.get("known_hosts")),
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from composer.model import Process
-from composer.resolve.implementation import word
-from composer.resolve.tree_values import entries, integer, key, number, text, texts
+from composer.resolve.tree_values import entries, environment, integer, key, number, text, texts
 from composer.source import Located
 from composer.tree import Entry, Sequence, Tree
 from composer.tree import Mapping as MappingTree
@@ -37,9 +36,7 @@ def _process(entry: Entry) -> Process:
         nodes=texts(tree.get("nodes")) if tree.get("nodes") is not None else (),
         cpus=tuple(number.value for number in numbers if number is not None),
         priority=None if priority is None else priority.value,
-        environment=tuple(
-            (key(item), word(item.value)) for item in entries(tree.get("environment"))
-        ),
+        environment=environment(tree.get("environment")),
         memory_mb=number(tree.get("memory_mb")),
         host=text(tree.get("host")),
     )

@@ -24,13 +24,19 @@ from composer.model import (
 )
 from composer.names import expand_name, join
 from composer.resolve.connections import PortConnection, PortConnections, connection_of
-from composer.resolve.declaration import Declaration, declare, refined, refines, unknown_keys
-from composer.resolve.implementation import Implementation, read_external
-from composer.resolve.node_options import read_introspection, read_supervision
-from composer.resolve.node_type_loader import NodeTypeLoader
+from composer.resolve.declarations.declaration import (
+    Declaration,
+    declare,
+    refined,
+    refines,
+    unknown_keys,
+)
+from composer.resolve.declarations.implementation import Implementation, read_external
+from composer.resolve.declarations.parameters import with_use_sim_time, with_values
+from composer.resolve.nodes.node_options import read_introspection, read_supervision
+from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import ParameterFiles
-from composer.resolve.parameters import with_use_sim_time, with_values
 from composer.resolve.qos import QosTable
 from composer.resolve.source_folders import SourceFolders
 from composer.resolve.tree_values import (

@@ -1,0 +1,1 @@
+"""What a node or a node type declares: its ports, parameters, reactions, transforms and code."""

@@ -1,0 +1,1 @@
+"""Where the nodes of a system run, and how they discover each other."""

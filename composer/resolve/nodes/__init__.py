@@ -1,0 +1,1 @@
+"""The nodes of a system: their node types, and what the system adds to these."""
