@@ -13,7 +13,7 @@ from rclpy.publisher import Publisher
 from composer.model import Port, PortKind
 from composer.qos import Durability
 from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.qos_events import HostedQosEvents, PendingQosEvents
+from composer.runtime.hosting.ports.qos_events import HostedQosEvents, PendingQosEvents
 from composer.runtime.hosting.user_code import UserFunction
 from composer.runtime.intra_process.copying import copy_of
 from composer.runtime.ports.publisher import PublisherPort

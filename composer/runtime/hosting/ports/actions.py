@@ -17,7 +17,7 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.executors.tasks import within
 from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.services import hosted_future
+from composer.runtime.hosting.ports.services import hosted_future
 from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.ports.action_server import CANCEL_LIMIT_S
 

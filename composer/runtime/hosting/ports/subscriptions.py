@@ -13,7 +13,7 @@ from rclpy.subscription import Subscription
 from composer.model import Port, PortKind
 from composer.runtime.executors.loop import Taken
 from composer.runtime.hosting.instance import Instance, is_reentrant
-from composer.runtime.hosting.qos_events import HostedQosEvents, PendingQosEvents
+from composer.runtime.hosting.ports.qos_events import HostedQosEvents, PendingQosEvents
 from composer.runtime.hosting.user_code import UserFunction
 from composer.runtime.ports.mailbox import Mailbox
 from composer.runtime.ports.qos_events import QosEvents

@@ -1,0 +1,1 @@
+"""The publishers, subscriptions, services, clients, actions and timers that a class creates."""
