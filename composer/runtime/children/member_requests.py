@@ -121,6 +121,8 @@ class MemberRequests:
         self._seen, self._received = report.number, report.received(self._sender)
         if goals is not None:
             self.keep(goals)
+        if self._unsent:  # an exception may have ended the wait for the service
+            self._send()
 
     def keep(self, goals: str) -> None:
         """Request that the process keeps the goals of the system.

@@ -175,6 +175,26 @@ def test_a_process_whose_service_is_not_discovered_is_reported(
         assert problems == ["reports, but its service is not discovered; requests wait"]
 
 
+def test_an_error_of_discovery_does_not_keep_requests_from_being_sent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("no graph")
+
+    with bench(ExecutorKind.EVENTS) as on:
+        Process(on).answers = True
+        requests = client(on, [])
+        report = report_of(participant(servers_of(on.node, SERVICE)[0]).hex())
+        on.loop.run(lambda: requests.on_report(report, None))
+        with monkeypatch.context() as patched:
+            patched.setattr(member_requests, "servers_of", fail)
+            result = on.loop.run(lambda: requests.request("/arm", "activate"))
+            wait_until(lambda: on.errors() == [RuntimeError], "the error")
+        on.loop.run(lambda: requests.on_report(report, None))
+        wait_until(result.done, "the response")
+        assert result.result().successful
+
+
 def test_lost_goals_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(member_requests, "_ANSWERED_WITHIN_S", 0.05)
     with bench(ExecutorKind.EVENTS) as on:
