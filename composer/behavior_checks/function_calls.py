@@ -29,6 +29,7 @@ from composer.behavior_types.expressions.protocols import special_method
 from composer.behavior_types.expressions.results import changed_tuple
 from composer.behavior_types.hosted import rclpy_function
 from composer.behavior_types.libraries.api_values import api_parameters
+from composer.behavior_types.libraries.numpy_names import ndarray
 from composer.behavior_types.syntax.own_classes import abstract_methods, constructor_of
 from composer.behavior_types.values import (
     AnyFunction,
@@ -87,7 +88,9 @@ class CallChecker:
                 yield from self._created(node, own)
             case AnyFunction(arguments=tuple() as takes):
                 yield from self._described(node, takes)
-            case BuiltinMethod(python=python, name=name) if python.__module__ == "random":
+            case BuiltinMethod(python=python, name=name) if python is ndarray or (
+                python.__module__ == "random"
+            ):
                 parameters = method_signature(python, name)
                 if parameters is not None:
                     yield from call_problems(node, parameters, self.scope)

@@ -16,6 +16,7 @@ from functools import cache
 from composer import behavior
 from composer.behavior_source import Function, Method
 from composer.behavior_source.method_body import dotted
+from composer.behavior_types.libraries.numpy_names import ndarray
 from composer.behavior_types.syntax.bindings import CONTEXTS, is_class_method, is_static
 from composer.behavior_types.syntax.lineage import PLAIN_BASES, lineage
 from composer.behavior_types.syntax.own_classes import (
@@ -225,6 +226,8 @@ _WITHOUT_ARGUMENTS = frozenset({(deque, "pop"), (deque, "popleft"), (dict, "popi
 @cache
 def method_signature(python: type, name: str) -> Signature | None:
     """Return the parameters of a method of a class of Python; None if they are not known."""
+    if python is ndarray:
+        return _of_array(name)
     if (python, name) in _WITHOUT_ARGUMENTS:
         return Signature(name, (), (), frozenset())
     found = _signature(getattr(python, name, None), name)
@@ -285,9 +288,24 @@ def _of_numpy(full: str, name: str) -> Signature | None:
     if count is not None:  # the next argument is where to store the result
         names = tuple(f"x{at + 1}" for at in range(count))
         return Signature(full, (*names, "out"), (), frozenset(names), takes_keywords=True)
-    if name not in NUMPY_PARAMETERS:
+    return _written(full, NUMPY_PARAMETERS.get(name))
+
+
+def _of_array(name: str) -> Signature | None:
+    from composer.behavior_types.libraries.numpy_signatures import (  # noqa: PLC0415 (start-up time)
+        NUMPY_METHODS,
+    )
+
+    return _written(name, NUMPY_METHODS.get(name))
+
+
+def _written(
+    full: str, parameters: tuple[tuple[str, ...], tuple[str, ...]] | None
+) -> Signature | None:
+    """Return parameters that are written down; '=' follows optional ones."""
+    if parameters is None:
         return None
-    positional, keywords = NUMPY_PARAMETERS[name]
+    positional, keywords = parameters
     required = frozenset(item for item in (*positional, *keywords) if not item.endswith("="))
     return Signature(
         full,

@@ -1,4 +1,4 @@
-"""Functions that are tested as if they were values: they are always true."""
+"""Conditions that are always true, or that fail: functions, and arrays of numpy."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.functions import is_function
+from composer.behavior_types.libraries.numpy_types import ARRAY
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
 from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.values import ModuleFunction, OwnMethod
@@ -18,7 +19,7 @@ from composer.field_types import ANYTHING
 
 #: The nodes that test something.
 TESTING = (
-    *(ast.Assert, ast.Call, ast.Compare, ast.If, ast.IfExp, ast.UnaryOp, ast.While),
+    *(ast.Assert, ast.BoolOp, ast.Call, ast.Compare, ast.If, ast.IfExp, ast.UnaryOp, ast.While),
     ast.comprehension,
 )
 
@@ -28,6 +29,7 @@ def truth_problems(
 ) -> Iterator[CodeProblem]:
     """Yield the methods that a condition tests without a call, as in ``if sensor.is_ready``."""
     yield from constant_problems(node, scope)
+    yield from _arrays(node, scope)
     for test in _tested(node):
         name = _always_true(test, scope)
         # 'if self.hook: self.hook()' expects that there may be none
@@ -35,6 +37,25 @@ def truth_problems(
             message = f"the function '{name}' is not called, so that this is always true"
             span = span_of(test, scope.home.source)
             yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
+
+
+def _arrays(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield the arrays of numpy in conditions: which element counts is not clear."""
+    tested = [*_tested(node)]
+    match node:
+        case ast.BoolOp(values=[*first, _]):
+            tested += first
+        case ast.Compare(left=left, comparators=[*others]) if len(others) > 1:
+            tested += [item for item in (left, *others) if scope.type_of(item) == ARRAY][:1]
+    for test in tested:
+        if scope.type_of(test) == ARRAY:
+            message = "an array of numpy is neither true nor false"
+            hint = "write .any() or .all(), or ask for its .size"
+            if isinstance(node, ast.BoolOp):
+                sign = "&" if isinstance(node.op, ast.And) else "|"
+                hint = f"combine arrays by '{sign}', with each comparison in parentheses"
+            yield CodeProblem(Kind.VALUE, message, span_of(test, scope.home.source), hint)
+            return
 
 
 def constant_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:

@@ -31,6 +31,7 @@ from composer.behavior_types.syntax.names import (
     interface_name,
 )
 from composer.behavior_types.values import (
+    NONE,
     ApiValue,
     Collection,
     InterfaceClass,
@@ -72,9 +73,16 @@ class FunctionTypes:
     function: Function | None = None
     _known: dict[int, Value] = field(default_factory=dict)
     _names: dict[str, Value] = field(default_factory=dict)
+    #: The names that are not of the type that they have at first.
+    _changing: set[str] = field(default_factory=set)
+    _is_started: bool = False
 
     def type_of(self, node: ast.expr) -> Value:
         """Return the type of an expression, ANYTHING if it is unknown."""
+        if not self._is_started:
+            self._is_started = True
+            for name in self.bindings.computed:  # before expressions within their values
+                self.name(name)
         if id(node) not in self._known:
             self._known[id(node)] = ANYTHING
             self._known[id(node)] = self._infer(node)
@@ -103,10 +111,14 @@ class FunctionTypes:
         """Forget all types, since one of them rests on an assumption that is wrong."""
         self._known.clear()
         self._names.clear()
+        self._is_started = False
 
     def reads_attribute(self, node: ast.expr | None, name: str) -> bool:
-        """Return whether an expression reads ``self.<name>``."""
-        return reads_attribute(node, self.bindings.receiver, name)
+        """Return whether an expression reads ``self.<name>``, also by names of the function."""
+        receiver = self.bindings.receiver
+        return any(
+            reads_attribute(item, receiver, name) for item in self.bindings.expressions_of(node)
+        )
 
     def global_name(self, name: str) -> str:
         """Return the full name of a dotted name that starts with an imported one, or ""."""
@@ -215,7 +227,22 @@ class FunctionTypes:
     def before_changes(self, name: str) -> Value:
         """Return the type of a name of the function without what '+=' and the like do to it."""
         bindings = self.bindings.of_name(name)
+        if name in self.bindings.computed and name not in self._changing:
+            return self._computed(name, bindings, self.bindings.computed[name])
         return joined((self.bound(binding), binding.how) for binding in bindings)
+
+    def _computed(self, name: str, bindings: list[Binding], computed: list[Binding]) -> Value:
+        """Return the type of a name that is also computed from its own old value."""
+        plain = [item for item in bindings if item not in computed]
+        first = joined((self.bound(binding), binding.how) for binding in plain)
+        if first is not NONE:
+            self._names[name] = first
+        found = joined((self.bound(binding), binding.how) for binding in bindings)
+        if first in (NONE, found):
+            return found
+        self._changing.add(name)
+        self.owner.forget_expressions()  # they rest on the first type
+        return ANYTHING
 
     def _of_module(self, name: str) -> Value:
         """Return the type of a name that the function does not bind."""

@@ -9,7 +9,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeGuard
 
 from composer.behavior_types.functions import is_function
-from composer.behavior_types.libraries.numpy_types import ARRAY, array_operation
+from composer.behavior_types.libraries.numpy_types import (
+    ARRAY,
+    array_comparison,
+    array_operation,
+)
 from composer.behavior_types.libraries.rclpy_api import (
     is_rclpy,
     is_time,
@@ -101,11 +105,14 @@ def both(operator: ast.boolop, operands: Sequence[Value]) -> Value:
 
 
 def comparison(operators: Sequence[ast.cmpop], operands: Sequence[Value]) -> Value:
-    """Return the type of a comparison: a bool, unless an operand is of an unknown type."""
-    if all(isinstance(item, ast.In | ast.NotIn | ast.Is | ast.IsNot) for item in operators):
+    """Return the type of a comparison: a bool, unless an operand is an array or unknown."""
+    others = (ast.In, ast.NotIn, ast.Is, ast.IsNot)
+    if all(isinstance(item, others) for item in operators):
         return BOOL
-    known = (is_scalar(operand) or operand is NONE for operand in operands)
-    return BOOL if all(known) else ANYTHING
+    if all(is_scalar(operand) or operand is NONE for operand in operands):
+        return BOOL
+    has_other = any(isinstance(item, others) for item in operators)
+    return ANYTHING if has_other else array_comparison(operands)
 
 
 def operation_problem(left: Value, operator: ast.operator, right: Value) -> str | None:

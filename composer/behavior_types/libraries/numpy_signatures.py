@@ -9,7 +9,9 @@ from collections.abc import Mapping
 
 #: The function and its parameters: '=' after an optional one, '*' before those given by name.
 _FUNCTIONS = """
+all a axis= out= keepdims= * where=
 allclose a b rtol= atol= equal_nan=
+any a axis= out= keepdims= * where=
 argmax a axis= out= * keepdims=
 argmin a axis= out= * keepdims=
 argsort a axis= kind= order= * stable=
@@ -48,8 +50,10 @@ linalg.pinv a rcond= hermitian= * rtol=
 linalg.solve a b
 linspace start stop num= endpoint= retstep= dtype= axis= * device=
 logspace start stop num= endpoint= base= dtype= axis=
+max a axis= out= keepdims= initial= where=
 mean a axis= dtype= out= keepdims= * where=
 median a axis= out= overwrite_input= keepdims=
+min a axis= out= keepdims= initial= where=
 nonzero a
 ones shape dtype= order= * device= like=
 ones_like a dtype= order= subok= shape= * device=
@@ -57,12 +61,14 @@ outer a b out=
 percentile a q axis= out= overwrite_input= method= keepdims= * weights= interpolation=
 polyfit x y deg rcond= full= w= cov=
 polyval p x
+prod a axis= dtype= out= keepdims= initial= where=
 repeat a repeats axis=
 roll a shift axis=
 searchsorted a v side= sorter=
 split ary indices_or_sections axis=
 stack arrays axis= out= * dtype= casting=
 std a axis= dtype= out= ddof= keepdims= * where= mean= correction=
+sum a axis= dtype= out= keepdims= initial= where=
 tile A reps
 transpose a axes=
 unwrap p discont= axis= * period=
@@ -71,6 +77,11 @@ vstack tup * dtype= casting=
 zeros shape dtype= order= * device= like=
 zeros_like a dtype= order= subok= shape= * device=
 """
+#: Functions that arrays have as methods, with the same parameters after the array.
+_AS_METHODS = (
+    "all any argmax argmin argsort cumsum dot max mean min nonzero prod repeat searchsorted std "
+    "sum var"
+)
 #: The functions that take one or two arrays, and options that all of them have.
 _OF_ONE = (
     "abs absolute arccos arcsin arctan ceil cos cosh deg2rad degrees exp floor isfinite isinf "
@@ -95,4 +106,15 @@ NUMPY_PARAMETERS = _parsed()
 NUMPY_ARRAYS: Mapping[str, int] = {
     **dict.fromkeys(_OF_ONE.split(), 1),
     **dict.fromkeys(_OF_TWO.split(), 2),
+}
+#: By name, the parameters of methods of arrays, by position and by name.
+NUMPY_METHODS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    name: (NUMPY_PARAMETERS[name][0][1:], NUMPY_PARAMETERS[name][1]) for name in _AS_METHODS.split()
+} | {
+    "astype": (("dtype", "order=", "casting=", "subok=", "copy="), ()),
+    "copy": (("order=",), ()),
+    "flatten": (("order=",), ()),
+    "ravel": (("order=",), ()),
+    "tobytes": (("order=",), ()),
+    "tolist": ((), ()),
 }

@@ -11,18 +11,21 @@ from composer.field_types import ANYTHING, INTEGER
 
 ARRAY = BuiltinObject(ndarray)
 _CREATING = frozenset(
-    {"arange", "array", "asarray", "ascontiguousarray", "column_stack", "concatenate", "diff"}
-    | {"dstack", "empty", "empty_like", "eye", "fft.fft", "fft.fftfreq", "fft.ifft", "fft.irfft"}
-    | {"fft.rfft", "fft.rfftfreq", "frombuffer", "full", "full_like", "hstack", "identity"}
-    | {"linspace", "logspace", "ones", "ones_like", "stack", "tile", "vstack", "zeros"}
+    {"arange", "argwhere", "array", "asarray", "ascontiguousarray", "column_stack", "concatenate"}
+    | {"convolve", "correlate", "cumprod", "cumsum", "diag", "diff", "dstack", "empty"}
+    | {"empty_like", "eye", "fft.fft", "fft.fftfreq", "fft.ifft", "fft.irfft", "fft.rfft"}
+    | {"fft.rfftfreq", "flatnonzero", "flip", "frombuffer", "full", "full_like", "hstack"}
+    | {"identity", "linalg.inv", "linalg.pinv", "linspace", "logspace", "ones", "ones_like"}
+    | {"outer", "repeat", "roll", "sort", "stack", "tile", "unwrap", "vstack", "zeros"}
     | {"zeros_like"}
 )
 #: Functions that give an array for an array, and a number for a number.
 _ELEMENTWISE = frozenset(
-    {"abs", "absolute", "arctan", "arctan2", "ceil", "clip", "cos", "deg2rad", "degrees", "exp"}
-    | {"floor", "hypot", "isfinite", "isnan", "log", "log10", "logical_and", "logical_not"}
-    | {"logical_or", "maximum", "minimum", "power", "rad2deg", "radians", "round", "sign", "sin"}
-    | {"sqrt", "square", "tan"}
+    {"abs", "absolute", "arccos", "arcsin", "arctan", "arctan2", "ceil", "clip", "cos", "deg2rad"}
+    | {"degrees", "exp", "floor", "fmod", "hypot", "interp", "isfinite", "isinf", "isnan", "log"}
+    | {"log10", "log2", "logical_and", "logical_not", "logical_or", "maximum", "minimum", "mod"}
+    | {"nan_to_num", "power", "rad2deg", "radians", "round", "sign", "sin", "sqrt", "square"}
+    | {"tan", "tanh"}
 )
 _METHODS = frozenset(
     {"astype", "clip", "copy", "cumsum", "flatten", "ravel", "reshape", "round", "swapaxes"}
@@ -69,6 +72,13 @@ def numpy_method_result(python: type, name: str, keywords: Mapping[str, Value]) 
     if python is Generator:
         return ARRAY if name in _OF_GENERATORS and "size" in keywords else ANYTHING
     return None
+
+
+def array_comparison(operands: Sequence[Value]) -> Value:
+    """Return the type of a comparison: an array if an operand is one and all are known."""
+    is_known = ARRAY in operands and ANYTHING not in operands
+    is_plain = all(not isinstance(item, BuiltinObject) or item == ARRAY for item in operands)
+    return ARRAY if is_known and is_plain else ANYTHING
 
 
 def array_operation(left: Value, operator: ast.operator, right: Value) -> Value | None:

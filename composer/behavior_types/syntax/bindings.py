@@ -58,6 +58,7 @@ class Bindings:
     inner: dict[str, list[ast.expr | None]] = field(default_factory=dict)
     #: The bindings of names in comprehensions and in lambdas that get elements, by the id of a use.
     uses: dict[int, Binding] = field(default_factory=dict)
+    _computed: dict[str, list[Binding]] | None = None
 
     def of_name(self, name: str) -> list[Binding]:
         """Return the bindings of a name outside comprehensions, or else those in them."""
@@ -71,6 +72,40 @@ class Bindings:
         if only is None or only.how is not How.VALUE or only.positions:
             return None
         return only.expression
+
+    def expressions_of(self, node: ast.expr | None) -> Iterator[ast.expr]:
+        """Yield an expression, and those that the names in it are bound to, and so on."""
+        pending = [node] if node is not None else []
+        seen: set[str] = set()
+        while pending:
+            expression = pending.pop()
+            yield expression
+            names = {item.id for item in ast.walk(expression) if isinstance(item, ast.Name)}
+            for name in names - seen:
+                bound = (item.expression for item in self.names.get(name, ()))
+                pending += [item for item in bound if item is not None]
+            seen |= names
+
+    @property
+    def computed(self) -> dict[str, list[Binding]]:
+        """The names that are set at first and then computed from themselves, by these bindings."""
+        if self._computed is None:
+            self._computed = {}
+            for name in self.names:
+                bindings = self.of_name(name)
+                if len(bindings) > 1:
+                    found = [item for item in bindings if self.reads(item.expression, name)]
+                    if found and len(found) < len(bindings):
+                        self._computed[name] = found
+        return self._computed
+
+    def reads(self, node: ast.expr | None, name: str) -> bool:
+        """Return whether the value of an expression depends on a name of the function."""
+        return any(
+            isinstance(item, ast.Name) and item.id == name
+            for expression in self.expressions_of(node)
+            for item in ast.walk(expression)
+        )
 
     def bind(
         self,

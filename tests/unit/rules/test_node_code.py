@@ -1,0 +1,128 @@
+"""Mistakes in the code of nodes as people write it, with numpy, dataclasses and actions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Diagnostic
+from tests.unit.support.checking import diagnostics_in, quoted
+
+SYSTEM = """\
+system: a
+nodes:
+  n:
+    behavior: code:Code
+    parameters:
+      goal: {type: double_array, default: [1.0, 2.0, 0.5]}
+      gain: {type: double, default: 0.5}
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
+    subscriptions: {ranges: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
+    action_clients:
+      left: {type: composer_interfaces/action/Navigate, external: true}
+      right: {type: composer_interfaces/action/Navigate, external: true}
+"""
+CODE = """\
+import heapq
+import math
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Deque, NamedTuple, Optional
+
+import numpy as np
+from composer_interfaces.action import Navigate
+from geometry_msgs.msg import Point, Pose, PoseStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image, LaserScan, NavSatFix
+from std_msgs.msg import ColorRGBA, Header
+from std_srvs.srv import SetBool
+
+
+class Cluster(NamedTuple):
+    x: float
+    size: int
+
+
+@dataclass
+class Battery:
+    capacity: float
+    level: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.level = self.capacity
+
+
+class Code:
+    def on_configure(self):
+        self.positions = np.zeros(6)
+        self.kernel = np.ones(3) / 3
+        self.times: Deque[float] = deque(maxlen=3)
+        self.queue: list[tuple[int, Point]] = []
+        self.battery = Battery(1.0)
+        self.clusters: list[Cluster] = []
+        self.goal = tuple(self.parameters.goal)
+
+    async def on_ranges(self, message: LaserScan):
+        {statement}
+
+    def move(self, share: float):
+        start = self.positions.copy()
+        self.positions = start + share * (self.kernel - start)
+
+    def filtered(self, message: LaserScan) -> np.ndarray:
+        ranges = np.asarray(message.ranges, dtype=np.float32)
+        valid = np.isfinite(ranges) & (ranges > message.range_min)
+        ranges = np.where(valid, ranges, np.inf)
+        return np.convolve(ranges, self.kernel, mode="same")
+
+    async def drive(self, speed: float) -> float:
+        await self.clock.sleep(1.0)
+        return speed
+"""
+#: The statement and the text that is underlined.
+MISTAKES = [
+    # arrays of numpy in conditions
+    ("if not self.kernel:\n    pass", "self.kernel"),
+    ("if self.kernel == 0.5:\n    pass", "self.kernel == 0.5"),
+    ("np.isfinite(self.kernel) and (self.kernel > 1.0)", "np.isfinite(self.kernel)"),
+    ("0.0 < self.kernel < 1.0", "self.kernel"),
+    # their attributes and methods, also where an array is computed from itself
+    ("ranges = np.asarray(message.ranges)\nranges = np.where(ranges > 1.0, ranges, 1.0)\n"
+     "ranges.average()", "average"),
+    ("self.positions.to_list()", "to_list"),
+    ("self.kernel.mean(axes=1)", "axes"),
+    ("self.kernel.tolist(1)", "1"),
+    ("np.sum(self.kernel, axes=0)", "axes"),
+    ("out = LaserScan()\nout.range_max = self.kernel > 1.0", "self.kernel > 1.0"),
+    ("self.publishers.scan.publish(np.convolve(self.kernel, self.kernel))",
+     "np.convolve(self.kernel, self.kernel)"),
+]  # fmt: skip
+RIGHT = [
+    "if self.kernel.any() or self.kernel.size or self.kernel[0] > 1.0:\n    pass",
+    "if self.kernel is not None and (self.kernel > 0.5).all():\n    pass",
+    "mask = (self.kernel > 0.1) & ~(self.kernel > 0.5)\nself.kernel[mask] = 0.0",
+    "for value in self.kernel[self.kernel > 0.1]:\n    pass",
+    "self.kernel.sum(axis=0, keepdims=True), self.kernel.std(ddof=1), self.kernel.max(initial=0)",
+    "found = None\nfor value in self.kernel:\n    found = value if found is None else found",
+    "low = 0\nlow = low + 0.5\nlow.is_integer()",
+    "text = 'a'\ntext = text.encode()\ntext.decode()",
+]
+
+
+def _found(folder: Path, statement: str) -> list[Diagnostic]:
+    code = CODE.replace("{statement}", statement.replace("\n", "\n        "))
+    (folder / "code.py").write_text(code, encoding="utf-8")
+    return diagnostics_in(SYSTEM, folder)
+
+
+@pytest.mark.parametrize(("statement", "text"), MISTAKES)
+def test_a_mistake_is_reported_once(statement: str, text: str, tmp_path: Path) -> None:
+    [diagnostic] = _found(tmp_path, statement)
+    assert quoted(diagnostic) == text
+
+
+def test_right_code_is_not_reported(tmp_path: Path) -> None:
+    found = _found(tmp_path, "\n".join(RIGHT))
+    assert [(item.message, quoted(item)) for item in found] == []
