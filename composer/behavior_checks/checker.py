@@ -10,18 +10,20 @@ from composer.behavior_checks.attributes.changing_attributes import changing_att
 from composer.behavior_checks.attributes.fixed_attributes import fixed_problems
 from composer.behavior_checks.attributes.misspelled_attributes import misspelled_attributes
 from composer.behavior_checks.attributes.unknown_attributes import attribute_problem
+from composer.behavior_checks.attributes.unset_attributes import unset_attributes
 from composer.behavior_checks.calls.collection_calls import (
     key_problems,
     stored_problems,
 )
 from composer.behavior_checks.calls.rclpy_calls import transition_problems
+from composer.behavior_checks.calls.wrong_definitions import at_definitions
 from composer.behavior_checks.classes import class_problems
 from composer.behavior_checks.declared_keys import key_problems_of, member_key_problems_of
-from composer.behavior_checks.fitting import argument_problem
+from composer.behavior_checks.fitting import argument_problem, value_problem
 from composer.behavior_checks.function_calls import CallChecker
 from composer.behavior_checks.messages.elements import element_problems
 from composer.behavior_checks.messages.message_values import ValueChecker
-from composer.behavior_checks.missing_values import missing_values, unset_attributes
+from composer.behavior_checks.missing_values import missing_values
 from composer.behavior_checks.node_classes import missing_constructors, undeclared_parameters
 from composer.behavior_checks.operations.awaiting import (
     missing_await,
@@ -54,6 +56,7 @@ from composer.behavior_types.hosted import HostedTypes
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.handlers import Handler
 from composer.behavior_types.syntax.bindings import assigned_pairs, nodes_of
+from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.values import (
     Collection,
     OwnClass,
@@ -88,6 +91,11 @@ def behavior_problems(
     is_hosted = node.hosted_class is not None
     types = (HostedTypes if is_hosted else BehaviorTypes)(node, source, interfaces)
     types.infer()
+    yield from at_definitions(_all_problems(types, source), source)
+
+
+def _all_problems(types: BehaviorTypes, source: BehaviorSource) -> Iterator[CodeProblem]:
+    is_hosted = isinstance(types, HostedTypes)
     if isinstance(types, HostedTypes):
         yield from missing_constructors(types)
         yield from undeclared_parameters(types)
@@ -259,9 +267,9 @@ class _FunctionChecker:
         if isinstance(target, ast.Subscript):
             yield from stored_problems(target, value, self.scope)
             return
+        if isinstance(target, ast.Tuple):
+            yield from self._unpacked(target, value)
         if not isinstance(target, ast.Attribute):
-            if isinstance(target, ast.Tuple) and isinstance(self.scope.type_of(value), Pending):
-                yield from pending_value(value, self.function, self.scope)
             return
         owner = self.scope.type_of(target.value)
         if isinstance(owner, Self | OwnObject):
@@ -279,6 +287,32 @@ class _FunctionChecker:
         field = message.field(target.attr) if message is not None else None
         if field is not None:
             yield from self._values.field(value, field)
+
+    def _unpacked(self, target: ast.Tuple, value: ast.expr) -> Iterator[CodeProblem]:
+        """Check what is unpacked into fields of messages, as in ``point.x, point.y = START``."""
+        found = self.scope.type_of(value)
+        if isinstance(found, Pending):
+            yield from pending_value(value, self.function, self.scope)
+        items = found.items if isinstance(found, Collection) and found.items is not None else ()
+        for item, type_ in zip(target.elts, items, strict=False):
+            if not isinstance(item, ast.Attribute):
+                continue
+            owner = self.scope.type_of(item.value)
+            field = owner.field(item.attr) if isinstance(owner, Message) else None
+            if field is not None:
+                wrong = value_problem(value, type_, field.type, self.types.interfaces)
+                if wrong is not None:
+                    message = f"'{ast.unparse(item)}': {wrong[0]}"
+                    span = self._span(self._item(value, target.elts.index(item)))
+                    yield CodeProblem(Kind.VALUE, message, span, wrong[1])
+                    return
+
+    def _item(self, value: ast.expr, position: int) -> ast.expr:
+        """Return the item of a constant of the file that a name means, or else the name."""
+        constant = None
+        if isinstance(value, ast.Name) and not self.scope.is_local(value.id):
+            constant = constant_named(value.id, self.scope.home)
+        return constant.elts[position] if isinstance(constant, ast.Tuple) else value
 
     def _annotated(self, annotation: ast.expr, value: ast.expr) -> Iterator[CodeProblem]:
         expected = self.scope.annotated(annotation, self.scope.home)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from composer.behavior_checks.calls.arguments import (
     Signature,
@@ -141,7 +142,8 @@ class CallChecker:
         signature = signature_of(function, is_bound=is_bound)
         if signature is not None:
             expected = annotations_by_name(function, home, self.scope.owner)
-            yield from call_problems(node, signature, self.scope, expected)
+            for problem in call_problems(node, signature, self.scope, expected):
+                yield replace(problem, called=(function, home))
 
     def _may_be_derived(self, called: ast.expr, own: OwnClass) -> bool:
         """Return whether a class method creates what may be of another class: by 'cls(...)'."""

@@ -56,8 +56,8 @@ class _Missing:
 
 def import_problems(
     module: Module, folder: Path, interfaces: Interfaces
-) -> Iterator[tuple[CodeProblem, str | None]]:
-    """Yield the problems of the imports in a file, each with the name that is probably meant."""
+) -> Iterator[tuple[CodeProblem, frozenset[str]]]:
+    """Yield the problems of the imports in a file, each with the names that may be meant."""
     projects = {home: Project.at(home) for home in (module.path.parent, folder)}
     checker = _Imports(module, folder, interfaces, projects)
     for node in _unguarded(module.tree.body):
@@ -65,11 +65,12 @@ def import_problems(
             for alias in node.names:
                 found = checker.missing_module(alias.name)
                 if found is not None:
-                    meant = found.meant if alias.asname is None else None
+                    is_known = found.meant is not None and alias.asname is None
+                    meant = frozenset({found.meant} if found.meant and is_known else ())
                     yield _problem(found, alias.name, alias, module), meant
         elif isinstance(node, ast.ImportFrom):
             yield from checker.imported_from(node)
-    yield from ((problem, None) for problem in module_attributes(module))
+    yield from ((problem, frozenset()) for problem in module_attributes(module))
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class _Imports:
     _unreadable: dict[str, str] = field(default_factory=dict)
     _known: dict[str, frozenset[str] | None] = field(default_factory=dict)
 
-    def imported_from(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
+    def imported_from(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, frozenset[str]]]:
         """Check a ``from`` import."""
         if node.level:
             yield from self._relative(node)
@@ -91,21 +92,47 @@ class _Imports:
         name = node.module or ""
         found = self.missing_module(name)
         if found is not None:
-            yield _problem(found, name, node, self.module, offset=len("from ")), None
+            yield _problem(found, name, node, self.module, offset=len("from ")), frozenset()
             return
-        for alias in node.names:
-            if alias.name == "*" or self._is_interface(name, alias.name):
-                continue
-            if name not in self._known:
-                self._known[name] = self._names(name)
-            names = self._known[name]
-            if names is None or self._has(name, names, alias.name):
-                continue
-            missing = _Missing(
+        missing = [alias for alias in node.names if self._lacks(name, alias.name)]
+        listed = [alias.name for alias in missing]
+        home = self._home_of(name, listed) if missing else None
+        if home is not None or (len(missing) > 1 and len(missing) == len(node.names)):
+            shown = " and ".join(f"'{item}'" for item in listed)  # the module is wrong
+            hint = f"import {'it' if len(listed) == 1 else 'them'} from '{home}'" if home else None
+            problem = _Missing(f"module '{name}' has no {shown}", hint)
+            yield _problem(problem, listed[0], missing[0], self.module), frozenset(listed)
+            return
+        for alias in missing:
+            names = self._known[name] or frozenset()
+            problem = _Missing(
                 f"module '{name}' has no '{alias.name}'", suggestion(alias.name, names)
             )
-            close = nearest(alias.name, names)
-            yield _problem(missing, alias.name, alias, self.module), close
+            close = frozenset(item for item in names if nearest(alias.name, [item]) is not None)
+            yield _problem(problem, alias.name, alias, self.module), close
+
+    def _lacks(self, module: str, name: str) -> bool:
+        """Return whether a module has no such name."""
+        if name == "*" or self._is_interface(module, name):
+            return False
+        if module not in self._known:
+            self._known[module] = self._names(module)
+        names = self._known[module]
+        if names is None:  # a package of interfaces
+            return self._home_of(module, [name]) is not None
+        return not self._has(module, names, name)
+
+    def _home_of(self, module: str, names: list[str]) -> str | None:
+        """Return the only module that has all these interfaces: in the same package, or any."""
+        package, _, folder = module.partition(".")
+        if package not in self.interfaces.packages() or folder not in ("", *_FOLDERS):
+            return None
+        own = [f"{package}.{part}" for part in _FOLDERS]
+        found = [item for item in own if all(self._is_interface(item, name) for name in names)]
+        if not found and folder:
+            others = (f"{other}.{folder}" for other in self.interfaces.packages())
+            found = [item for item in others if all(self._is_interface(item, n) for n in names)]
+        return found[0] if len(found) == 1 else None
 
     def missing_module(self, name: str) -> _Missing | None:
         """Return why a module cannot be imported, or should not be."""
@@ -220,12 +247,12 @@ class _Imports:
             return name.startswith("_") or name.partition("_")[0] in names
         return self._local(f"{module}.{name}") is not None
 
-    def _relative(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, str | None]]:
+    def _relative(self, node: ast.ImportFrom) -> Iterator[tuple[CodeProblem, frozenset[str]]]:
         path = relative_module_file(node.module or "", node.level, self.module.path)
         name = "." * node.level + (node.module or "")
         if path is None and node.module:
             missing = _Missing(f"no module named '{name}'")
-            yield _problem(missing, name, node, self.module, offset=len("from ")), None
+            yield _problem(missing, name, node, self.module, offset=len("from ")), frozenset()
 
 
 def _of_composer(name: str) -> _Missing | None:

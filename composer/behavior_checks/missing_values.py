@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from composer.behavior_checks.needed_values import direct_names, needed_values, passed_values
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
-from composer.behavior_source.flow import always_executed, empty_returns, returned_values
+from composer.behavior_source.flow import empty_returns, returned_values
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.syntax.bindings import How, bindings_of, nodes_of
 from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.values import (
@@ -22,13 +21,11 @@ from composer.behavior_types.values import (
     CollectionMethod,
     ModuleFunction,
     OwnMethod,
-    Self,
 )
 
 _MATCHING = frozenset({"fullmatch", "match", "search"})
 _CAUGHT = frozenset({"AttributeError", "BaseException", "Exception", "TypeError"})
 _LONGEST = 200
-_FIRST = ("__init__", "on_configure", "on_activate")
 
 
 def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -247,79 +244,4 @@ def _tested_names(function: Function, scope: FunctionTypes) -> set[str]:
             case ast.Call(args=arguments):  # another function may ask
                 names = (item for item in arguments if isinstance(item, ast.Name))
                 found.update(item.id for item in names if id(item) not in passed)
-    return found
-
-
-def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
-    """Yield the attributes that a handler uses, although another one may not have set them yet."""
-    if not types.source.complete or types.self_escapes:
-        return
-    methods = {
-        method.name: method.node
-        for _, known in reversed(types.source.classes)
-        for method in known.methods
-        if method.node is not None
-    }
-    none, values = _stored(methods)
-    first = _reached(_FIRST, methods)
-    unset = {
-        name: setters
-        for name, setters in values.items()
-        if none.get(name, set()) & set(_FIRST) and not setters & first
-    }
-    for handler in types.handlers:
-        function = methods.get(handler)
-        scope = types.scopes.get(id(function))
-        if function is None or scope is None or handler.startswith("accept_") or not unset:
-            continue
-        reached = _reached((handler,), methods)
-        lines = always_executed(function)
-        for node in nodes_of(function):
-            match node:
-                case (
-                    ast.Attribute(value=ast.Attribute(attr=name) as owner)
-                    | ast.Subscript(value=ast.Attribute(attr=name) as owner)
-                ) if name in unset and owner.lineno in lines:
-                    setters = unset[name]
-                    is_accepted = any(item.startswith("accept_") for item in setters)
-                    is_own = isinstance(scope.type_of(owner.value), Self)
-                    if is_own and not is_accepted and not setters & reached:
-                        del unset[name]
-                        setter = min(setters)
-                        message = f"this may be None: '{setter}' sets it, perhaps later"
-                        span = span_of(owner, scope.home.source)
-                        hint = f"check it first, as in 'if self.{name} is not None'"
-                        yield CodeProblem(Kind.NONE, message, span, hint)
-
-
-def _stored(
-    methods: dict[str, Function],
-) -> tuple[dict[str, set[str]], dict[str, set[str]]]:
-    """Return the methods that set an attribute of the object to None, and to other values."""
-    none: dict[str, set[str]] = {}
-    values: dict[str, set[str]] = {}
-    for method, function in methods.items():
-        to_none: set[int] = set()
-        for node in nodes_of(function):
-            match node:
-                case ast.Assign(targets=targets, value=value) if _is_none(value):
-                    to_none.update(map(id, targets))
-                case ast.AnnAssign(target=target, value=value) if value is None or _is_none(value):
-                    to_none.add(id(target))
-                case ast.Attribute(attr=name, ctx=ast.Store()):
-                    found = none if id(node) in to_none else values
-                    found.setdefault(name, set()).add(method)
-    return none, values
-
-
-def _reached(names: tuple[str, ...], methods: dict[str, Function]) -> set[str]:
-    """Return the methods that these methods name, and these themselves."""
-    found: set[str] = set()
-    pending = list(names)
-    while pending:
-        name = pending.pop()
-        if name not in found and name in methods:
-            found.add(name)
-            inside = nodes_of(methods[name])
-            pending += [node.attr for node in inside if isinstance(node, ast.Attribute)]
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from enum import Enum
 
+from composer.behavior_source import Function, Module
 from composer.fast_dataclass import dataclass
 from composer.source import Span
 
@@ -40,6 +41,7 @@ class CodeProblem:
 
     ``about`` is the name of what has the wrong value, by default the text at its location.
     ``lines`` are the first and last line of a function that lacks names because of the problem.
+    ``called`` is the function of the project that a call does not fit, with its file.
     """
 
     kind: Kind
@@ -48,6 +50,7 @@ class CodeProblem:
     hint: str | None = None
     about: str = ""
     lines: tuple[int, int] | None = None
+    called: tuple[Function, Module] | None = None
 
     @property
     def attribute(self) -> str:

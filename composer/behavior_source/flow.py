@@ -15,6 +15,8 @@ _WAITS = (ast.Await, ast.AsyncFor, ast.AsyncWith, ast.Yield, ast.YieldFrom)
 _EXITS = frozenset({"exit", "quit", "_exit", "abort"})
 #: Calls that wait, or would if they were awaited.
 _WAITING_CALLS = frozenset({"sleep", "call", "send_goal", "result", "wait", "get", "join"})
+#: Methods of collections and of ports that return.
+_RETURNING = frozenset({"append", "appendleft", "clear", "extend", "insert", "publish"})
 _ENDS_OR_WAITS = _EXITS | _WAITING_CALLS
 
 
@@ -54,10 +56,12 @@ def reaches_end(function: Function) -> bool:
     return _continues(function.body)
 
 
-def may_raise_at_end(function: Function) -> bool:
+def may_raise_at_end(
+    function: Function, returns: Callable[[ast.Call], bool] = lambda _: False
+) -> bool:
     """Return whether ``function`` may never reach its end, because of a loop or a call there.
 
-    What other functions do is not known; the log is known to return.
+    ``returns`` says which other calls are known to return.
     """
     pending = [function.body[-1]]
     while pending:
@@ -66,7 +70,8 @@ def may_raise_at_end(function: Function) -> bool:
                 if any(isinstance(node, ast.Return) for node in _own_nodes(body)):
                     return True
             case ast.Expr(value=ast.Call() as call):
-                if not dotted(call.func).startswith("self.log."):
+                is_known = dotted(call.func).startswith("self.log.") or _called(call) in _RETURNING
+                if not is_known and not returns(call):
                     return True
             case ast.If(body=body, orelse=orelse):
                 pending += [body[-1], *orelse[-1:]]

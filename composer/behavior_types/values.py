@@ -194,6 +194,8 @@ def join(first: Value, second: Value) -> Value:
         return _join_collections(first, second)
     if isinstance(first, FieldType) and isinstance(second, FieldType):
         return _join_fields(first, second)
+    if isinstance(first, ApiValue) and isinstance(second, ApiValue):
+        return _join_ports(first, second)
     return ANYTHING
 
 
@@ -208,6 +210,15 @@ def _join_collections(first: Collection, second: Collection) -> Value:
         items = tuple(map(join, one, other))
     element, key = join(first.element, second.element), join(first.key, second.key)
     return Collection(first.python, element, key, items)
+
+
+def _join_ports(first: ApiValue, second: ApiValue) -> Value:
+    """Return the type of one of two values of the API: that of the first if they are alike."""
+    ports = first.port, second.port
+    if first.class_name != second.class_name:
+        return ANYTHING
+    types = {port.interface.value if port is not None else None for port in ports}
+    return first if len(types) == 1 else ApiValue(first.class_name)
 
 
 def _join_fields(first: FieldType, second: FieldType) -> Value:

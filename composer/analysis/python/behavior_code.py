@@ -41,11 +41,25 @@ def _problems(context: Context) -> tuple[tuple[BehaviorSource, CodeProblem], ...
                 checked.add(module.path)
                 found += ((source, problem) for problem in _of_file(context, node, source, module))
         for problem in behavior_problems(node, source, context.interfaces):
+            if _lacks_parameter(problem, found):
+                continue
             found.append((source, problem))
             if problem.lines is not None:
                 first, last = problem.lines
                 unnamed.append((problem.span.file.path, range(first, last + 1)))
     return tuple(item for item in found if not _follows(item[1], unnamed))
+
+
+def _lacks_parameter(problem: CodeProblem, found: list[tuple[BehaviorSource, CodeProblem]]) -> bool:
+    """Return whether a call passes more than a function takes that uses a name that it lacks."""
+    if problem.called is None:
+        return False
+    function, home = problem.called
+    lines = range(function.lineno, (function.end_lineno or function.lineno) + 1)
+    return any(
+        other.kind is Kind.NAME and other.span.file is home.source and other.span.line in lines
+        for _, other in found
+    )
 
 
 def _follows(problem: CodeProblem, unnamed: list[tuple[str, range]]) -> bool:
@@ -71,7 +85,7 @@ def _of_file(
     try:
         imports = list(import_problems(module, source.reference.folder, context.interfaces))
         # The name that a misspelled import was meant to define is not reported again.
-        meant = {name for _, name in imports if name is not None}
+        meant = {name for _, names in imports for name in names}
         if any(_lacking_self(module)):
             meant.add("self")
         meant.update(_missing_arguments(node, source))

@@ -6,14 +6,15 @@ import ast
 from collections.abc import Iterator
 
 from composer.behavior_checks.fitting import kind_of, shown
+from composer.behavior_checks.operations.operations import uncalled
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
-from composer.behavior_types.syntax.bindings import Binding, How
-from composer.behavior_types.values import OwnObject, Pending, Value
+from composer.behavior_types.syntax.bindings import Binding, How, nodes_of
+from composer.behavior_types.values import OwnClass, OwnObject, Pending, Value
 from composer.field_types import BOOL
 from composer.interfaces import Message
 
@@ -28,6 +29,7 @@ def changing_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
     may well take turns.
     """
     yield from _without_await(types)
+    yield from _without_call(types)
     for name, bindings in types.assigned.items():
         if any(binding.how is How.ANNOTATION for _, binding in bindings):
             continue
@@ -37,6 +39,8 @@ def changing_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
             first = known[0][2]
             value = binding.expression
             other = _differ(first, type_) and not _may_change(types, name, first)
+            if value is not None and _is_calculated(value, scope):
+                continue  # it is reported where the name is set
             if value is not None and (other or _lacks_field(types, name, first, type_)):
                 message = f"attribute '{name}': {shown(type_)} where it is {shown(first)} at first"
                 span = span_of(value, scope.home.source)
@@ -60,9 +64,41 @@ def _without_await(types: BehaviorTypes) -> Iterator[CodeProblem]:
                 yield CodeProblem(Kind.AWAIT, message, span, "write 'await' before it")
 
 
-def _type(place: tuple[FunctionTypes, Binding]) -> Value | None:
+def _is_calculated(value: ast.expr, scope: FunctionTypes) -> bool:
+    """Return whether a name means a method without its call, and is calculated with as well."""
+    return (
+        isinstance(value, ast.Name)
+        and scope.function is not None
+        and uncalled(value, scope) is not None
+        and any(
+            isinstance(item, ast.Name) and item.id == value.id
+            for node in nodes_of(scope.function)
+            if isinstance(node, ast.BinOp)
+            for item in (node.left, node.right)
+        )
+    )
+
+
+def _without_call(types: BehaviorTypes) -> Iterator[CodeProblem]:
+    """Yield the classes that are stored in an attribute which also gets an object of the class."""
+    for places in types.assigned.values():
+        values = [(*place, _bound(place)) for place in places]
+        objects = [found.of for _, _, found in values if isinstance(found, OwnObject)]
+        for scope, binding, found in values:
+            if isinstance(found, OwnClass) and found in objects and binding.expression is not None:
+                name = found.definition.name
+                span = span_of(binding.expression, scope.home.source)
+                message = f"this is the class {name}, not an object of it"
+                yield CodeProblem(Kind.CHANGED, message, span, f"create one: {name}()")
+
+
+def _bound(place: tuple[FunctionTypes, Binding]) -> Value | None:
     scope, binding = place
-    found = scope.bound(binding) if binding.expression is not None else None
+    return scope.bound(binding) if binding.expression is not None else None
+
+
+def _type(place: tuple[FunctionTypes, Binding]) -> Value | None:
+    found = _bound(place)
     if isinstance(found, OwnObject) and is_rclpy(found.of.home):
         return None  # a parameter, then its value
     return found if found is not None and kind_of(found) is not None else None

@@ -177,8 +177,11 @@ def _of_fields(own: OwnClass) -> Signature | None:
         match field.value:
             case ast.Call(func=function, keywords=keywords) if dotted(function).endswith("field"):
                 given = {keyword.arg: keyword.value for keyword in keywords}
-                if {"init", None} & given.keys() or given.keys() - _OF_FIELD:
+                is_known = isinstance(given.get("init", ast.Constant(True)), ast.Constant)
+                if not is_known or None in given or given.keys() - _OF_FIELD:
                     return None
+                if "init" in given and not ast.literal_eval(given["init"]):
+                    continue
                 only = given.get("kw_only")
                 if only is not None:
                     is_by_name = not isinstance(only, ast.Constant) or bool(only.value)

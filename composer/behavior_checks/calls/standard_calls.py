@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -26,6 +27,7 @@ from composer.field_types import INTEGER
 
 #: Functions of math that do not take numbers only.
 _OF_ITERABLES = frozenset({"math.dist", "math.fsum", "math.prod", "math.sumprod"})
+_OF_NUMBERS = frozenset(f"math.{name}" for name in dir(math))
 #: Modules whose functions take arguments of certain types.
 _WITH_TYPES = frozenset({"bisect", "heapq", "numpy", "random", "statistics"})
 
@@ -53,7 +55,7 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
             )
 
             yield from library_argument_problems(call, signature, scope)
-    if name == "time.sleep" or name.startswith("math."):
+    if name == "time.sleep" or name in _OF_NUMBERS:
         takes_numbers = name not in _OF_ITERABLES
         for argument in call.args:
             found = scope.type_of(argument)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.behavior_checks.messages.lengths import length_of
+from composer.behavior_checks.messages.lengths import length_of, looks_first, parameter_length
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.values import Parameters
 from composer.field_types import described
@@ -32,9 +31,9 @@ def element_problems(
                 hint = f"indices count from 0, so the last one is {size - 1}"
                 yield CodeProblem(Kind.INDEX, problem, span_of(index, scope.home.source), hint)
             parameter = parameter_read(owner, scope)
-            if at is None or parameter is None or _looks_first(function):
+            if at is None or parameter is None or looks_first(function):
                 return
-            name, count = parameter.name.value, _count(parameter)
+            name, count = parameter.name.value, parameter_length(parameter)
             if count is not None and not -count <= at < count:
                 yield CodeProblem(
                     Kind.INDEX,
@@ -46,8 +45,8 @@ def element_problems(
             parameter = parameter_read(value, scope)
             if parameter is None or any(isinstance(item, ast.Starred) for item in targets):
                 return
-            name, count = parameter.name.value, _count(parameter)
-            if count not in (None, len(targets)) and not _looks_first(function):
+            name, count = parameter.name.value, parameter_length(parameter)
+            if count not in (None, len(targets)) and not looks_first(function):
                 message = f"parameter '{name}' has {counted(count or 0)}, not {len(targets)}"
                 span = span_of(value, scope.home.source)
                 lines = (function.lineno, function.end_lineno or function.lineno)
@@ -80,16 +79,3 @@ def parameter_read(node: ast.expr, scope: FunctionTypes) -> Parameter | None:
     if isinstance(node, ast.Attribute) and isinstance(scope.type_of(node.value), Parameters):
         return scope.owner.node.parameter(node.attr)
     return None
-
-
-def _count(parameter: Parameter) -> int | None:
-    value = parameter.value.value if parameter.value is not None else None
-    return len(value) if isinstance(value, list) else None
-
-
-def _looks_first(function: Function) -> bool:
-    """Return whether a function asks for a length, or handles an element that is missing."""
-    return any(
-        isinstance(node, ast.Try) or (isinstance(node, ast.Name) and node.id == "len")
-        for node in nodes_of(function)
-    )

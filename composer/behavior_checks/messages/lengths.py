@@ -19,9 +19,11 @@ from composer.behavior_types.values import (
     InterfaceClass,
     ModuleFunction,
     OwnMethod,
+    Parameters,
     Self,
 )
 from composer.interfaces import FieldType, Message
+from composer.model import Parameter
 
 #: The least and the most elements; None: there is no limit.
 Length: TypeAlias = tuple[int, int | None]
@@ -73,6 +75,10 @@ def _of_syntax(node: ast.expr, scope: FunctionTypes, depth: int) -> Length:
             return _of_name(name, scope, depth)
         case ast.Attribute(value=owner, attr=name) if isinstance(scope.type_of(owner), Self):
             return _of_attribute(name, scope, depth)
+        case ast.Attribute(value=owner, attr=name) if isinstance(scope.type_of(owner), Parameters):
+            count = parameter_length(scope.owner.node.parameter(name))
+            is_asked = scope.function is None or looks_first(scope.function)
+            return _UNKNOWN if count is None or is_asked else _exactly(count)
         case _:
             return _UNKNOWN
 
@@ -155,7 +161,7 @@ def _reading(node: ast.AST, scope: FunctionTypes) -> Iterator[ast.expr]:
             yield from (left, *others)
         case ast.BinOp(left=left, right=right):
             yield from (left, right)
-        case ast.Starred(value=value):
+        case ast.Starred(value=value) | ast.Assign(targets=[ast.Tuple() | ast.List()], value=value):
             yield value
         case ast.Assign(targets=[ast.Attribute(value=owner)], value=value):
             if isinstance(scope.type_of(owner), Message):
@@ -185,6 +191,20 @@ def _sliced(whole: Length, part: ast.Slice) -> Length:
     if step in (None, 1) and upper is None and lower is not None and lower < 0:
         return 0, -lower
     return _UNKNOWN
+
+
+def parameter_length(parameter: Parameter | None) -> int | None:
+    """Return how many elements an array parameter has, None if that is not known."""
+    value = parameter.value if parameter is not None else None
+    return len(value.value) if value is not None and isinstance(value.value, list) else None
+
+
+def looks_first(function: Function) -> bool:
+    """Return whether a function asks for a length, or handles an element that is missing."""
+    return any(
+        isinstance(node, ast.Try) or (isinstance(node, ast.Name) and node.id == "len")
+        for node in nodes_of(function)
+    )
 
 
 def _exactly(count: int) -> Length:

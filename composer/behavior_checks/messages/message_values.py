@@ -15,7 +15,7 @@ from composer.behavior_source import Function
 from composer.behavior_source.spans import span_of, start_span
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.numpy_types import ARRAY
-from composer.behavior_types.scalars import is_number
+from composer.behavior_types.scalars import is_float, is_integer, is_number
 from composer.behavior_types.values import Pending, Value
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
@@ -40,12 +40,16 @@ class ValueChecker:
                 hint = f"fields: {fields}" if fields else None
                 yield CodeProblem(Kind.VALUE, problem, self._span(argument), hint)
                 return
+        seen: set[str] = set()
         for keyword in node.keywords:
             if keyword.arg is None:
                 continue
             field = message.field(keyword.arg)
             if field is not None:
-                yield from self.field(keyword.value, field)
+                found = list(self.field(keyword.value, field))
+                # the same slip in several fields is one, as in ColorRGBA(r=1, g=0, b=0)
+                yield from (problem for problem in found if problem.message not in seen)
+                seen.update(problem.message for problem in found)
             elif keyword.arg != "check_fields":
                 problem = f"{message.name} has no field '{keyword.arg}'"
                 hint = suggestion(keyword.arg, message.field_names)
@@ -58,7 +62,13 @@ class ValueChecker:
         if isinstance(node.func, ast.Attribute) and node.func.attr in {"append", "insert"}:
             array = self.scope.type_of(node.func.value)
             if isinstance(array, FieldType) and array.is_array and node.args:
-                yield from self.value(node.args[-1], array.element)
+                yield from self._element(node.args[-1], array)
+
+    def _element(self, node: ast.expr, array: FieldType) -> Iterator[CodeProblem]:
+        """Yield why an expression does not fit the elements of an array; Python converts ints."""
+        is_converted = is_float(array.element) and is_integer(self.scope.type_of(node))
+        if not is_converted:
+            yield from self.value(node, array.element)
 
     def field(self, node: ast.expr, field: Field) -> Iterator[CodeProblem]:
         """Yield why an expression does not fit a field of a message."""
@@ -81,34 +91,66 @@ class ValueChecker:
         if isinstance(found, Pending):
             yield missing_await(found, self.function, self.scope)
             return
-        if isinstance(node, ast.List | ast.Tuple) and isinstance(expected, FieldType):
+        display = _repeated(node)
+        if isinstance(display, ast.List | ast.Tuple) and isinstance(expected, FieldType):
             is_checked = expected.is_array and expected.name != "byte"
-            items = [item for item in node.elts if not isinstance(item, ast.Starred)]
+            items = [item for item in display.elts if not isinstance(item, ast.Starred)]
             items = items if is_checked else []
-            wrong = (problem for item in items for problem in self.value(item, expected.element))
+            wrong = (problem for item in items for problem in self._element(item, expected))
             first = next(wrong, None)  # the others have the same cause
             if first is not None:
                 yield first
                 return
         problem = value_problem(node, found, expected, self.scope.owner.interfaces)
-        if problem is None and isinstance(expected, FieldType) and found == ARRAY:
+        if problem is None and isinstance(expected, FieldType):
             problem = _dimensions(node, expected, self.scope)
         if problem is None and isinstance(expected, FieldType):
             size = size_problem(node, expected, self.scope)
             problem = (size, None) if size is not None else None
         if problem is not None:
-            yield CodeProblem(Kind.VALUE, problem[0], self._span(node), problem[1])
+            place = self._creation(node) if _are_parts(found, expected) else node
+            yield CodeProblem(Kind.VALUE, problem[0], self._span(place), problem[1])
+
+    def _creation(self, node: ast.expr) -> ast.expr:
+        """Return where a message is created that a name means, if that is known."""
+        value = self.scope.bindings.value_of(node.id) if isinstance(node, ast.Name) else None
+        return value.func if isinstance(value, ast.Call) else node
 
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)
 
 
+def _are_parts(found: Value, expected: Value) -> bool:
+    """Return whether two messages are of the same service or action, as request and response."""
+    names = [item.name if isinstance(item, Message) else "" for item in (found, expected)]
+    homes = [name.rpartition("_")[0] for name in names]
+    return homes[0] == homes[1] and ("/srv/" in homes[0] or "/action/" in homes[0])
+
+
+def _repeated(node: ast.expr) -> ast.expr:
+    """Return the list in an expression such as ``[0.0] * 3``, or else the expression."""
+    match node:
+        case ast.BinOp(left=ast.List() as display, op=ast.Mult()):
+            return display
+        case ast.BinOp(op=ast.Mult(), right=ast.List() as display):
+            return display
+        case _:
+            return node
+
+
 def _dimensions(
     node: ast.expr, expected: FieldType, scope: FunctionTypes
 ) -> tuple[str, str | None] | None:
-    """Return why an array of numpy does not fit a field, which takes one dimension only."""
-    is_sequence = expected.is_array and expected.array_size is None
-    if not is_sequence or not is_number(expected.element):
+    """Return why an array of numpy does not fit a field, which takes one dimension only.
+
+    In a field of a fixed size, ROS reads memory beyond the first dimension.
+    """
+    if not expected.is_array or not is_number(expected.element):
+        return None
+    is_list = isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "tolist"
+    if is_list and isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        node = node.func.value
+    if scope.type_of(node) != ARRAY:
         return None
     from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
         rank_of,
@@ -118,4 +160,5 @@ def _dimensions(
     if rank is None or rank <= 1:
         return None
     hint = "write .tobytes()" if expected.name == "uint8" else "write .ravel()"
+    hint += " before it" if is_list else ""
     return f"an array of {rank} dimensions where {described(expected)} is expected", hint

@@ -6,10 +6,12 @@ import ast
 
 from composer.behavior_source.flow import returned_values
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.libraries.numpy_names import Generator
+from composer.behavior_types.libraries.numpy_types import OF_GENERATORS
 from composer.behavior_types.scalars import is_number
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.names import value_named
-from composer.behavior_types.values import ModuleFunction, OwnMethod
+from composer.behavior_types.values import BuiltinObject, ModuleFunction, OwnMethod
 from composer.field_types import ANYTHING
 
 Shape = tuple[int, ...]
@@ -17,6 +19,7 @@ _FROM_LISTS = frozenset({"numpy.array", "numpy.asarray"})
 _FILLED = frozenset({"numpy.empty", "numpy.full", "numpy.ones", "numpy.zeros"})
 _TURNED = frozenset({"numpy.linalg.pinv", "numpy.transpose"})
 _SAME = frozenset({"numpy.abs", "numpy.cos", "numpy.linalg.inv", "numpy.sin", "numpy.sqrt"})
+_SQUARE = frozenset({"numpy.eye", "numpy.identity"})
 _DEEPEST = 6
 _MATRIX = 2
 
@@ -53,10 +56,19 @@ def rank_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> int 
         case ast.Name(id=name):
             value = scope.bindings.value_of(name)
             return None if value is None else rank_of(value, scope, depth - 1)
-        case ast.Call(func=function, args=[ast.Tuple(elts=sizes), *_]):
-            is_filled = scope.called_name(function) in _FILLED
-            is_known = is_filled and not any(isinstance(item, ast.Starred) for item in sizes)
-            return len(sizes) if is_known else None
+        case ast.Call(func=function, args=[ast.Tuple() as sizes, *_]) if (
+            scope.called_name(function) in _FILLED
+        ):
+            return _count(sizes)
+        case ast.Call(func=function, args=[_]) if scope.called_name(function) in _SQUARE:
+            return None if any(item.arg != "dtype" for item in node.keywords) else _MATRIX
+        case ast.Call(func=ast.Attribute(value=owner, attr=name)) if scope.type_of(
+            owner
+        ) == BuiltinObject(Generator):
+            given = [item.value for item in node.keywords if item.arg == "size"]
+            return _count(given[0]) if name in OF_GENERATORS and given else None
+        case ast.Call(func=ast.Attribute(value=owner, attr="astype" | "clip" | "copy" | "round")):
+            return rank_of(owner, scope, depth - 1)
         case ast.Call(func=function):
             match scope.type_of(function):
                 case OwnMethod(method=method, home=home) if method.node is not None:
@@ -65,6 +77,13 @@ def rank_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> int 
                     if len(values) == 1 and inside is not None:
                         return rank_of(values[0], inside, depth - 1)
     return None
+
+
+def _count(sizes: ast.expr) -> int | None:
+    """Return how many dimensions a tuple of sizes gives."""
+    if not isinstance(sizes, ast.Tuple) or any(isinstance(x, ast.Starred) for x in sizes.elts):
+        return None
+    return len(sizes.elts)
 
 
 def product_problem(left: ast.expr, right: ast.expr, scope: FunctionTypes) -> str | None:
@@ -109,7 +128,7 @@ def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Shape | None:
         sizes = first.elts if isinstance(first, ast.Tuple | ast.List) else [first]
         known = [size for size in map(integer_constant, sizes) if size is not None]
         return tuple(known) if len(known) == len(sizes) else None
-    if first is not None and name in {"numpy.eye", "numpy.identity"} and len(call.args) == 1:
+    if first is not None and name in _SQUARE and len(call.args) == 1:
         size = integer_constant(first)
         has_more = any(item.arg in {"M", None} for item in call.keywords)
         return (size, size) if size is not None and not has_more else None

@@ -76,6 +76,8 @@ def unawaited(node: ast.AST, function: Function, scope: FunctionTypes) -> Iterat
         case ast.BinOp(left=left, right=right):
             yield from pending_value(left, function, scope)
             yield from pending_value(right, function, scope)
+        case ast.AugAssign(value=value):
+            yield from pending_value(value, function, scope)
         case ast.Compare(left=left, comparators=others):
             for value in (left, *others):
                 yield from _pending_call(value, function, scope)

@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 
 from composer.behavior_checks.fitting import shown
+from composer.behavior_checks.messages.elements import parameter_read
+from composer.behavior_checks.messages.lengths import length_of
 from composer.behavior_checks.operations.operations import before_changes
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.method_body import dotted
@@ -107,6 +109,8 @@ def _unpacked(
     wrong = _wrong_count(found, len(target.elts))
     if isinstance(origin, ast.List) and scope.type_of(origin) is found and not _stars(origin):
         wrong = _wrong_count(pair(*map(scope.type_of, origin.elts)), len(target.elts))
+    if wrong is None and scope.type_of(origin) is found:
+        wrong = _wrong_length(origin, len(target.elts), scope)
     if wrong is not None:
         span = span_of(origin, scope.home.source)
         lines = (span.line, span.line + _REACH)
@@ -127,6 +131,18 @@ def _wrong_count(found: Value, count: int) -> str | None:
     if is_text(found) or is_scalar(found):
         return f"{shown(found)} is unpacked into {count} names"
     return None
+
+
+def _wrong_length(origin: ast.expr, count: int, scope: FunctionTypes) -> str | None:
+    """Return why a list whose length an expression shows is not unpacked into that many names."""
+    if isinstance(scope.type_of(origin), FieldType) or parameter_read(origin, scope) is not None:
+        return None  # it has a rule of its own
+    least, most = length_of(origin, scope)
+    if least <= count and (most is None or count <= most):
+        return None
+    values = f"{least}" if least == most else f"at least {least}"
+    values = f"at most {most}" if most is not None and most < count and least != most else values
+    return f"{values} values are unpacked into {count} names"
 
 
 def _hint(origin: ast.expr, found: Value, scope: FunctionTypes) -> str | None:

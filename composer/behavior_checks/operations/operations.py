@@ -158,7 +158,8 @@ def _calculation(node: ast.BinOp, scope: FunctionTypes) -> Iterator[CodeProblem]
         problem = _product_problem(left, right, scope)
     if problem is not None:
         about = blamed_name((left, right), scope)
-        yield CodeProblem(Kind.VALUE, problem, span_of(node, source), about=about)
+        place = uncalled(left, scope) or uncalled(right, scope) or node
+        yield CodeProblem(Kind.VALUE, problem, span_of(place, source), about=about)
 
 
 def _problem_of_array(
@@ -233,6 +234,13 @@ def _equality(
     problem = equality_problem(scope.type_of(left), scope.type_of(right))
     if problem is not None:
         yield CodeProblem(Kind.VALUE, problem, span_of(node, source))
+
+
+def uncalled(node: ast.expr, scope: FunctionTypes) -> ast.expr | None:
+    """Return the method that a name means as in ``now = clock.now``: '()' is missing."""
+    value = scope.bindings.value_of(node.id) if isinstance(node, ast.Name) else None
+    is_method = isinstance(value, ast.Attribute) and is_function(scope.type_of(value))
+    return value if is_method else None
 
 
 def blamed_name(operands: Sequence[ast.expr], scope: FunctionTypes) -> str:

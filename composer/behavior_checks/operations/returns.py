@@ -20,10 +20,19 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_source.syntax import name_span
 from composer.behavior_types.expressions.annotations import allows_none, annotated
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.functions import definition_of
 from composer.behavior_types.libraries.handlers import Handler
 from composer.behavior_types.libraries.standard_types import ITERATORS
 from composer.behavior_types.scalars import is_float, is_integer
-from composer.behavior_types.values import NONE, Collection, OwnObject, Pending, Value
+from composer.behavior_types.values import (
+    NONE,
+    ApiMethod,
+    Collection,
+    CollectionMethod,
+    OwnObject,
+    Pending,
+    Value,
+)
 from composer.field_types import ANYTHING, BOOL
 from composer.interfaces import FieldType, Message
 
@@ -69,8 +78,19 @@ def _missing(function: Function, scope: FunctionTypes, expected: Value) -> Itera
     if isinstance(expected, Collection) and _yields(function):
         return
     yield from _empty(function, scope, expected)
-    if reaches_end(function) and not may_raise_at_end(function):
+    if reaches_end(function) and not may_raise_at_end(function, lambda call: _returns(call, scope)):
         yield _without_end(function, scope, expected)
+
+
+def _returns(call: ast.Call, scope: FunctionTypes) -> bool:
+    """Return whether a call is known to return: it does not raise at its end."""
+    called = scope.type_of(call.func)
+    if isinstance(called, ApiMethod | CollectionMethod):
+        return True
+    function = definition_of(called)
+    if function is None or function.decorator_list or is_stub(function):
+        return False
+    return reaches_end(function) and not may_raise_at_end(function)
 
 
 def _empty(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:

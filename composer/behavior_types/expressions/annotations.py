@@ -46,6 +46,7 @@ _GENERIC: dict[str, type] = {
     "collections.OrderedDict": dict,
     "collections.defaultdict": dict,
     "typing.DefaultDict": dict,
+    "typing.Deque": deque,
     "collections.deque": deque,
     "collections.abc.AsyncGenerator": AsyncIterator,
     "collections.abc.AsyncIterator": AsyncIterator,
@@ -56,9 +57,11 @@ _GENERIC: dict[str, type] = {
     "typing.AsyncGenerator": AsyncIterator,
     "typing.AsyncIterator": AsyncIterator,
     "typing.Counter": Counter,
+    "typing.FrozenSet": frozenset,
     "typing.Generator": GeneratorType,
     "typing.Iterable": Iterable,
     "typing.Iterator": Iterator,
+    "typing.OrderedDict": dict,
     "typing.Sequence": Sequence,
 }
 _FUNCTIONS = frozenset({"collections.abc.Callable", "typing.Callable"})

@@ -28,10 +28,12 @@ from composer.behavior_types.syntax.own_classes import (
     fields_of_class,
     has_fields,
     is_enumeration,
+    is_named_tuple,
 )
 from composer.behavior_types.values import (
     NONE,
     Collection,
+    CollectionMethod,
     InterfaceClass,
     ModuleFunction,
     OwnClass,
@@ -68,6 +70,8 @@ def attribute_of_object(scope: FunctionTypes, owner: OwnObject, name: str) -> Va
                 case ast.AnnAssign(target=ast.Name(id=found), annotation=annotation):
                     if found == name:
                         return annotation_in(scope, annotation, own.home, owner.parameter)
+    if is_named_tuple(of) and name in {"count", "index"}:
+        return CollectionMethod(Collection(tuple), name)
     return ANYTHING if is_rclpy(of.home) else _assigned_in(scope, of, name)
 
 

@@ -125,6 +125,8 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
     for value in (left, right):
         if isinstance(value, Message) and ANYTHING in (left, right):
             return f"{value.name} has no operator '{sign}'"
+        if is_function(value) and ANYTHING in (left, right):
+            return f"a function has no operator '{sign}'"
     if ANYTHING in (left, right):
         return None
     if isinstance(operator, ast.Mod) and is_text(left):

@@ -31,7 +31,7 @@ _METHODS = frozenset(
     {"astype", "clip", "copy", "cumsum", "flatten", "ravel", "reshape", "round", "swapaxes"}
     | {"transpose"}
 )
-_OF_GENERATORS = frozenset({"integers", "normal", "random", "uniform"})
+OF_GENERATORS = frozenset({"integers", "normal", "random", "uniform"})
 _ATTRIBUTES: Mapping[str, Value] = {
     "T": ARRAY,
     "nbytes": INTEGER,
@@ -70,7 +70,7 @@ def numpy_method_result(python: type, name: str, keywords: Mapping[str, Value]) 
             return Collection(bytes, INTEGER)
         return ARRAY if name in _METHODS else ANYTHING
     if python is Generator:
-        return ARRAY if name in _OF_GENERATORS and "size" in keywords else ANYTHING
+        return ARRAY if name in OF_GENERATORS and "size" in keywords else ANYTHING
     return None
 
 

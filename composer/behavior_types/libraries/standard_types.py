@@ -238,6 +238,14 @@ def _filter(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     return Collection(filter, element_of(arguments[1])) if len(arguments) == _PAIR else ANYTHING
 
 
+def _from_heap(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return element_of(arguments[0]) if arguments else ANYTHING
+
+
+def _of_heap(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return Collection(list, element_of(arguments[1])) if len(arguments) == _PAIR else ANYTHING
+
+
 def _map(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     return Collection(map) if arguments else ANYTHING
 
@@ -297,6 +305,11 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
     "divmod": _divmod,
     "enumerate": _enumerate,
     "filter": _filter,
+    "heapq.heappop": _from_heap,
+    "heapq.heappushpop": _from_heap,
+    "heapq.heapreplace": _from_heap,
+    "heapq.nlargest": _of_heap,
+    "heapq.nsmallest": _of_heap,
     "map": _map,
     "max": _least,
     "min": _least,

@@ -19,6 +19,7 @@ nodes:
       gain: {type: double, default: 0.5}
     publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
     subscriptions: {ranges: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
+    clients: {enable: {type: std_srvs/srv/SetBool, external: true}}
     action_clients:
       left: {type: composer_interfaces/action/Navigate, external: true}
       right: {type: composer_interfaces/action/Navigate, external: true}
@@ -38,6 +39,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, LaserScan, NavSatFix
 from std_msgs.msg import ColorRGBA, Header
 from std_srvs.srv import SetBool
+
+
+HOME = (47.0, 8)
 
 
 class Cluster(NamedTuple):
@@ -77,6 +81,9 @@ class Code:
         ranges = np.where(valid, ranges, np.inf)
         return np.convolve(ranges, self.kernel, mode="same")
 
+    def on_activate(self):
+        self.last = 0.0
+
     async def drive(self, speed: float) -> float:
         await self.clock.sleep(1.0)
         return speed
@@ -98,8 +105,51 @@ MISTAKES = [
     ("out = LaserScan()\nout.range_max = self.kernel > 1.0", "self.kernel > 1.0"),
     ("self.publishers.scan.publish(np.convolve(self.kernel, self.kernel))",
      "np.convolve(self.kernel, self.kernel)"),
+    # values that one of several expressions has
+    ("client = self.action_clients.left if message.ranges else self.action_clients.right\n"
+     "await client.send_goal(Point())", "Point()"),
+    ("_, point = heapq.heappop(self.queue)\nPose(position=point.x)", "point.x"),
+    ("self.times.add(1.0)", "add"),
+    ("0.05 * self.clusters[0].count", "0.05 * self.clusters[0].count"),
+    ("Battery()", "Battery"),
+    ("Battery(1.0, 2.0)", "2.0"),
+    ("total = 0.0\ntotal += self.drive(1.0)", "self.drive"),
+    # how many values there are
+    ("x, y = self.goal", "self.goal"),
+    ("x, y = range(3)", "range(3)"),
+    ("pose = Odometry()\npose.pose.covariance = [0.0, *self.parameters.goal]",
+     "[0.0, *self.parameters.goal]"),
+    # fields of messages
+    ("full = np.zeros((6, 6))\npose = Odometry()\npose.pose.covariance = full", "full"),
+    ("pose = Odometry()\npose.pose.covariance = np.eye(6).tolist()", "np.eye(6).tolist()"),
+    ("pixels = np.random.default_rng().integers(0, 9, size=(4, len(self.queue), 3))\n"
+     "Image(data=pixels)", "pixels"),
+    ("ColorRGBA(r=1, g=0, b=0, a=0.5)", "1"),
+    ("Image().data = [300] * 4", "300"),
+    ("fix = NavSatFix()\nfix.latitude, fix.longitude = (1.0, 2)", "2"),
+    ("fix = NavSatFix()\nfix.latitude, fix.longitude = HOME", "8"),
+    # functions and classes that are not called
+    ("now = self.clock.now\nself.last = now\nnow - self.last", "self.clock.now"),
+    ("self.battery = Battery", "Battery"),
+    # the other part of a service
+    ("request = SetBool.Response(success=True)\nawait self.clients.enable.call(request)",
+     "SetBool.Response"),
+    # functions and modules
+    ("math.distance(self.goal, self.goal)", "distance"),
+    ("from std_msgs import Bool, Float32\nBool, Float32", "Bool"),
+    ("from nav_msgs.msg import Point, Pose\nPoint, Pose", "Point"),
 ]  # fmt: skip
 RIGHT = [
+    "client = self.action_clients.left if self.queue else self.action_clients.right\n"
+    "await client.send_goal(Navigate.Goal())",
+    "x, y, z = self.goal\na, b, c = range(3)\nself.times.append(1.0)",
+    "_, point = heapq.heappop(self.queue)\nPose(position=point)",
+    "Battery(1.0), self.clusters[0].count(1.0), self.clusters[0].size * 2.0",
+    "pose = Odometry()\npose.pose.covariance = np.zeros((6, 6)).ravel()",
+    "pose.pose.covariance = np.eye(6).flatten().tolist()\npose.pose.covariance = [0.0] * 36",
+    "Image(data=[255] * 4), ColorRGBA(r=1.0), Image(data=np.zeros(4).tolist())",
+    "LaserScan(ranges=[0] * 3), LaserScan(ranges=[1, 2.5]), LaserScan().ranges.append(1)",
+    "fix = NavSatFix()\nfix.latitude, fix.longitude = (1.0, 2.0)",
     "if self.kernel.any() or self.kernel.size or self.kernel[0] > 1.0:\n    pass",
     "if self.kernel is not None and (self.kernel > 0.5).all():\n    pass",
     "mask = (self.kernel > 0.1) & ~(self.kernel > 0.5)\nself.kernel[mask] = 0.0",

@@ -91,7 +91,7 @@ RIGHT = [
     ("odometry", "for i, (x, y) in enumerate([(1.0, 2.0)]):\n    Point(x=x)\n    Time(sec=i)"),
     ("odometry", "first, *others = (1, 'a')\nTime(sec=first)\nothers.anything"),
     ("odometry", "*others, last = (1, 'a')\nString(data=last)"),
-    ("odometry", "for key, value in self.values.items():\n    key.anything\nself.values = {}"),
+    ("odometry", "self.values = {}\nfor key, value in self.values.items():\n    key.anything"),
     ("odometry", "for a in 'xyz':\n    getattr(message.pose.pose.position, a)"),
     ("odometry", "DiagnosticStatus(level=b'\\x02')\nDiagnosticStatus().level.hex()"),
     ("odometry", "DiagnosticStatus(level=bytes([self.count]))"),

@@ -1,0 +1,190 @@
+"""Finds attributes that a method reads, although they may not be set by then."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+
+from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source import Function
+from composer.behavior_source.flow import always_executed
+from composer.behavior_source.spans import attribute_span, span_of
+from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.syntax.bindings import nodes_of
+from composer.behavior_types.syntax.self_attributes import self_attributes
+from composer.behavior_types.values import Self
+
+#: The methods that run before all others.
+_FIRST = ("__init__", "on_configure", "on_activate")
+
+#: A method with the types within it.
+_Methods = Mapping[str, tuple[Function, FunctionTypes]]
+
+
+def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
+    """Yield the attributes that a method uses before any, or perhaps before another one, sets them.
+
+    An attribute that is None at first may be set later as well as one that is not set at all.
+    """
+    if not types.source.complete or types.self_escapes:
+        return
+    methods: dict[str, tuple[Function, FunctionTypes]] = {}
+    for home, known in reversed(types.source.classes):
+        for method in known.methods:
+            scope = types.scope(method, home)
+            if method.node is not None and scope is not None:
+                methods[method.name] = method.node, scope
+    none, values = _stored(methods)
+    first = _reached(_FIRST, methods)
+    later = {name: setters for name, setters in values.items() if not setters & first}
+    at_first = {name: found for name, found in later.items() if none.get(name, set()) & {*_FIRST}}
+    yield from _perhaps_none(types, methods, at_first)
+    known_names = self_attributes(types.source, none) | _in_texts(methods)
+    by_handlers = _reached(tuple(types.handlers), methods)  # others may be called from outside
+    missing = {
+        name: setters
+        for name, setters in later.items()
+        if name not in known_names and setters <= by_handlers
+    }
+    has_start = any(first & setters for setters in values.values())
+    yield from _missing(types, methods, missing, has_start=has_start)
+
+
+def _perhaps_none(
+    types: BehaviorTypes, methods: _Methods, unset: dict[str, set[str]]
+) -> Iterator[CodeProblem]:
+    """Yield the attributes that are None at first and are used by a handler."""
+    for handler in types.handlers:
+        if handler not in methods or handler.startswith("accept_") or not unset:
+            continue
+        function, scope = methods[handler]
+        reached = _reached((handler,), methods)
+        lines = always_executed(function)
+        for node in nodes_of(function):
+            match node:
+                case (
+                    ast.Attribute(value=ast.Attribute(attr=name) as owner)
+                    | ast.Subscript(value=ast.Attribute(attr=name) as owner)
+                ) if name in unset and owner.lineno in lines:
+                    setters = unset[name]
+                    is_accepted = any(item.startswith("accept_") for item in setters)
+                    is_own = isinstance(scope.type_of(owner.value), Self)
+                    if is_own and not is_accepted and not setters & reached:
+                        del unset[name]
+                        setter = min(setters)
+                        message = f"this may be None: '{setter}' sets it, perhaps later"
+                        span = span_of(owner, scope.home.source)
+                        hint = f"check it first, as in 'if self.{name} is not None'"
+                        yield CodeProblem(Kind.NONE, message, span, hint)
+
+
+def _missing(
+    types: BehaviorTypes, methods: _Methods, unset: dict[str, set[str]], *, has_start: bool
+) -> Iterator[CodeProblem]:
+    """Yield the attributes that no method has set when the first ones, or a handler, read them.
+
+    A class whose first methods set no attributes, so that ``has_start`` is false, may rely on the
+    order of its messages.
+    """
+    starts = [name for name in _FIRST if name in methods]
+    handlers = [name for name in types.handlers if not name.startswith("accept_")]
+    for start in (*starts, *(name for name in handlers if name in methods)):
+        if not unset:
+            return
+        is_first = start in _FIRST
+        reached = _reached((start,), methods)
+        for node, scope in _reads(start, methods):
+            name = node.attr
+            setters = unset.get(name)
+            if setters is None or any(item.startswith("accept_") for item in setters):
+                continue
+            is_early = start in setters and node.lineno < _stored_at(name, methods[start][0])
+            others = setters - {start} if is_early else setters
+            is_own = is_early and not others
+            if others & reached or not (has_start or is_first or is_own):
+                continue
+            del unset[name]
+            setter = min(others or setters)
+            span = attribute_span(node, scope.home.source)
+            hint = f"set self.{name} in 'on_configure'"
+            if is_first or is_own:
+                message = f"'{name}' is not set yet: only '{setter}' sets it, later"
+                yield CodeProblem(Kind.ATTRIBUTE, message, span, hint)
+            else:
+                message = f"'{name}' may not be set yet: '{setter}' sets it, perhaps later"
+                yield CodeProblem(Kind.NONE, message, span, hint)
+
+
+def _reads(start: str, methods: _Methods) -> Iterator[tuple[ast.Attribute, FunctionTypes]]:
+    """Yield the attributes of ``self`` that each call of a method reads, also in other methods."""
+    pending, seen = [start], {start}
+    while pending:
+        function, scope = methods[pending.pop()]
+        lines = always_executed(function)
+        for node in nodes_of(function):
+            match node:
+                case ast.Attribute(value=ast.Name(id=owner), ctx=ast.Load()) if (
+                    node.lineno in lines and owner == scope.bindings.receiver
+                ):
+                    yield node, scope
+                case ast.Call(func=ast.Attribute(value=ast.Name(id=owner), attr=name)) if (
+                    node.lineno in lines and owner == scope.bindings.receiver
+                ):
+                    if name in methods and name not in seen:
+                        seen.add(name)
+                        pending.append(name)
+
+
+def _stored_at(name: str, function: Function) -> int:
+    """Return the first line in which a method sets an attribute."""
+    return min(
+        node.lineno
+        for node in nodes_of(function)
+        if isinstance(node, ast.Attribute) and node.attr == name and isinstance(node.ctx, ast.Store)
+    )
+
+
+def _in_texts(methods: _Methods) -> set[str]:
+    """Return the texts in methods: a name in ``hasattr(self, "name")`` is expected to miss."""
+    return {
+        node.value
+        for function, _ in methods.values()
+        for node in nodes_of(function)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
+
+
+def _stored(methods: _Methods) -> tuple[dict[str, set[str]], dict[str, set[str]]]:
+    """Return the methods that set an attribute of the object to None, and to other values."""
+    none: dict[str, set[str]] = {}
+    values: dict[str, set[str]] = {}
+    for method, (function, _) in methods.items():
+        to_none: set[int] = set()
+        for node in nodes_of(function):
+            match node:
+                case ast.Assign(targets=targets, value=value) if _is_none(value):
+                    to_none.update(map(id, targets))
+                case ast.AnnAssign(target=target, value=value) if value is None or _is_none(value):
+                    to_none.add(id(target))
+                case ast.Attribute(attr=name, ctx=ast.Store()):
+                    found = none if id(node) in to_none else values
+                    found.setdefault(name, set()).add(method)
+    return none, values
+
+
+def _is_none(node: ast.expr | None) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None
+
+
+def _reached(names: tuple[str, ...], methods: _Methods) -> set[str]:
+    """Return the methods that these methods name, and these themselves."""
+    found: set[str] = set()
+    pending = list(names)
+    while pending:
+        name = pending.pop()
+        if name not in found and name in methods:
+            found.add(name)
+            inside = nodes_of(methods[name][0])
+            pending += [node.attr for node in inside if isinstance(node, ast.Attribute)]
+    return found
