@@ -64,7 +64,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             members[0] = subprocess.Popen([*command_of(path), "--process", "sensing"])
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
 
-            moves.clear()
+            forget(moves, "active")
             stop_until_the_pause(members[1], system, peer)
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
             assert not moves  # it was active all the time
