@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from playwright.sync_api import sync_playwright
-
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
@@ -100,6 +98,8 @@ def take(browser: Browser, url: str, folder: Path, plotted_s: float = _PLOTTED_S
 
 def main() -> None:
     """Run the system and a dashboard, and take the pictures."""
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - slow, and tests import take()
+
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     with ExitStack() as stack:
