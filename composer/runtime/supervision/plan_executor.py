@@ -244,7 +244,7 @@ class PlanExecutor:
             phase.done.add(step.number)
             return
         limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
-        is_outdated = partial(self._is_outdated, step.node, options.serial)
+        is_outdated = partial(self._is_outdated, step, options)
         others = tuple(other.full_name for other in after)
         future = self._node_set.run_step(step.node, step.transition, is_outdated, others)
         name = node.loop.name
@@ -257,8 +257,12 @@ class PlanExecutor:
         phase.ended.append(number)
         self._main_queue.wakeup.wake()
 
-    def _is_outdated(self, node: str, serial: int | None) -> bool:
-        return serial is not None and self._desired.value.has_moved(node, serial)
+    def _is_outdated(self, step: Step, options: ExecutionOptions) -> bool:
+        """Return whether an external transition came first. Called once no other one can."""
+        if options.serial is not None:
+            return self._desired.value.has_moved(step.node, options.serial)
+        node = self._node_set.nodes[step.node]
+        return options.best_effort and step.transition not in node.lifecycle.available
 
     def _end(self, number: int, phase: _Phase) -> None:
         item = phase.running.pop(number, None)
