@@ -162,9 +162,13 @@ class MemberNode(OutsideNode):
         return not self._is_moving and self._reported not in (INACTIVE, ACTIVE)
 
     async def _request(self, transition: str) -> None:
-        is_kept = transition == "shutdown" and self._process.pid is None
-        if is_kept or self._process.is_left or self._reported in DONE_IN[transition]:
+        if self._process.is_left:
+            return
+        if transition == "shutdown" and self._process.pid is None:
+            await self._follow_end()
             return  # a process that was not started here may be used again
+        if self._reported in DONE_IN[transition]:
+            return
         goal, reported = GOALS[transition], Future[None]()
         self._awaited = goal, reported
         try:
@@ -193,11 +197,26 @@ class MemberNode(OutsideNode):
         response = result.result()
         if not response.successful:
             raise TransitionRefused(response.reason, self._reported or UNCONFIGURED)
-        if self._awaited == (FINALIZED, reported):  # the last report has the final counters
-            left_s = math.inf if self._end_s is None else self._end_s - monotonic()
-            wait_s = min(_REPORTED_WITHIN_S, left_s / 2.0)  # the node is down without it, too
-            with suppress(TimeoutError):
-                await within(self.loop, reported, max(0.0, wait_s))
+        if self._awaited == (FINALIZED, reported):
+            await self._wait_for_counters(reported)
+
+    async def _follow_end(self) -> None:
+        """Wait for the report that follows the last transition here, if it is missing."""
+        if self._reported != UNCONFIGURED or not self._process.is_report_due(self.full_name):
+            return
+        reported = Future[None]()
+        self._awaited = UNCONFIGURED, reported
+        try:
+            await self._wait_for_counters(reported)
+        finally:
+            self._awaited = None
+
+    async def _wait_for_counters(self, reported: Future[None]) -> None:
+        """Wait for the last report, with the final counters; the node is down without it, too."""
+        left_s = math.inf if self._end_s is None else self._end_s - monotonic()
+        wait_s = min(_REPORTED_WITHIN_S, left_s / 2.0)
+        with suppress(TimeoutError):
+            await within(self.loop, reported, max(0.0, wait_s))
 
     async def _wait_for(self, future: Future[Any]) -> None:
         """Wait while nodes of the process move: this one may have to wait for others.

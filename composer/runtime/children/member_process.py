@@ -140,6 +140,13 @@ class MemberProcess:
         """Return the rates and counters of a node."""
         return self._figures[node]
 
+    def is_report_due(self, node: str) -> bool:
+        """Return whether the last report may be older than the last response about a node."""
+        life = self._life
+        if life is None or life.last is None or life.lost:
+            return False
+        return life.last.number <= life.answered.get(node, -1)
+
     def start_soon(self) -> None:
         """Start the process unless it runs: all at once, not each with its first node."""
 

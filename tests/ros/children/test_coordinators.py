@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.other_instances import Instance
-from composer.runtime.process.instance_lock import hold_instance_lock
+from composer.runtime.process.instance_lock import hold_instance_lock, local_systems
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
 from tests.ros.children.split_robot import DETECTOR, TEXT, command_of, split, states
@@ -156,6 +156,30 @@ def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
         for member in members:
             member.send_signal(signal.SIGINT)
             member.communicate(timeout=20)
+
+
+def test_the_last_counters_of_processes_that_stay(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
+    members = [
+        subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.DEVNULL)
+        for name in ("sensing", "acting")
+    ]
+    try:
+        wait_until(lambda: len(local_systems()) == 2, "the processes")
+        with split(tmp_path) as system:
+            found = system.node("arm").statistics
+            wait_until(lambda: found.received > 20, "messages")
+            outcome = system.stop()
+        assert [member.poll() for member in members] == [None, None]
+    finally:
+        for member in members:
+            member.send_signal(signal.SIGINT)
+            member.wait(PATIENCE_S)
+    camera, detector, arm = outcome.nodes
+    # Each is deactivated after the nodes that receive its messages.
+    assert camera.sent >= detector.received >= detector.sent >= arm.received > 20
 
 
 def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
