@@ -16,7 +16,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from composer.dashboard.context import Dashboard
 from composer.dashboard.feeds import Receiver
-from composer.dashboard.outbox import Outbox, Update
+from composer.dashboard.protocol.outbox import Outbox, Update
 
 MAX_PENDING = 16
 #: A program that sends only malformed messages is disconnected.

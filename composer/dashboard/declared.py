@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from composer.dashboard.errors import RequestError
+from composer.dashboard.protocol.errors import RequestError
 from composer.diagnostics import Diagnostic
 from composer.graph.scenes.facts import node_facts
 from composer.graph.scenes.rates import publishing_rates_hz

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.dashboard.errors import RequestError, from_ros
-from composer.dashboard.messages import to_json
-from composer.dashboard.outbox import Delivery, Update
+from composer.dashboard.protocol.errors import RequestError, from_ros
+from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.errors import RequestError
-from composer.dashboard.messages import Values
+from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import Values
 from composer.model import PortKind
 from composer.qos import PRESETS, Durability, QosProfile, incompatibilities
 

@@ -13,8 +13,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, TypeVar
 
-from composer.dashboard.errors import RequestError, from_ros
 from composer.dashboard.feeds import Feeds
+from composer.dashboard.protocol.errors import RequestError, from_ros
 
 if TYPE_CHECKING:
     from composer.dashboard.forms import Forms

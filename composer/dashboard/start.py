@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from composer.dashboard.access import Access, is_loopback, new_token, read_token
-from composer.dashboard.app import make_app
 from composer.dashboard.context import Dashboard, Options
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.forms import Forms
 from composer.dashboard.ros_side import RosSide
-from composer.dashboard.server import listen, serve
+from composer.dashboard.web.app import make_app
+from composer.dashboard.web.server import listen, serve
 from composer.interfaces import Interfaces
 from composer.node_types import interface_folders
 from composer.project import Project

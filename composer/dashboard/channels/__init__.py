@@ -22,7 +22,7 @@ from composer.dashboard.channels.timing import TimingFeed
 from composer.dashboard.channels.topics import TopicsFeed
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values
+from composer.dashboard.protocol.messages import Values
 
 CHANNELS: dict[str, Callable[[Values, Declared | None], Feed]] = {
     "graph": PictureFeed,

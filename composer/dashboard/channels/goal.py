@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
-from composer.dashboard.errors import RequestError, from_ros
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, json_safe, to_json
-from composer.dashboard.outbox import Delivery, Update
+from composer.dashboard.protocol.errors import RequestError, from_ros
+from composer.dashboard.protocol.messages import Values, json_safe, to_json
+from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared, required
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, to_json
 from composer.dashboard.observing.report_pairs import ReportPairs
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.messages import Values, to_json
+from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:
     from composer.dashboard.observing.topology import Topology

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, to_json
-from composer.dashboard.outbox import Delivery, Update
+from composer.dashboard.protocol.messages import Values, to_json
+from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:
     from composer.dashboard.observing.log_lines import LogLine

@@ -9,10 +9,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
-from composer.dashboard.errors import RequestError, from_ros
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, json_safe, to_json
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.errors import RequestError, from_ros
+from composer.dashboard.protocol.messages import Values, json_safe, to_json
+from composer.dashboard.protocol.outbox import Update
 from composer.qos import QosProfile
 
 if TYPE_CHECKING:

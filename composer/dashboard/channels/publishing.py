@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, to_json
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.messages import Values, to_json
+from composer.dashboard.protocol.outbox import Update
 from composer.dashboard.publishing import Outgoing, read_outgoing
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.channels.topics import is_installed
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, to_json
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.messages import Values, to_json
+from composer.dashboard.protocol.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.channels.image import COMPRESSED, IMAGE
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import Values, to_json
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.messages import Values, to_json
+from composer.dashboard.protocol.outbox import Update
 from composer.graph.labels import qos_facts
 from composer.model import PortKind
 

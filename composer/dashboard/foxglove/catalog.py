@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.frames import CDR, SCHEMA_ENCODING
 from composer.dashboard.foxglove.schemas import Schemas
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:

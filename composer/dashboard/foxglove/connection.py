@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from starlette.websockets import WebSocket
 
 from composer.dashboard.context import Dashboard
-from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.foxglove.catalog import (
     Catalog,
     CatalogFeed,
@@ -32,8 +31,9 @@ from composer.dashboard.foxglove.messages import Publications, Subscriptions
 from composer.dashboard.foxglove.requests import Parameters, call_service
 from composer.dashboard.foxglove.schemas import Schemas
 from composer.dashboard.foxglove.topics import ClockFeed
-from composer.dashboard.messages import Values
-from composer.dashboard.outbox import Delivery, Outbox, Update, Waiting
+from composer.dashboard.protocol.errors import BadRequestError, RequestError
+from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
 from composer.diagnostics import nearest
 
 #: Messages of a topic that wait for a client.

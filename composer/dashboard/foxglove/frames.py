@@ -7,8 +7,8 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-from composer.dashboard.errors import BadRequestError
-from composer.dashboard.messages import Values
+from composer.dashboard.protocol.errors import BadRequestError
+from composer.dashboard.protocol.messages import Values
 
 #: The names of the protocol, the one that is preferred first.
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")

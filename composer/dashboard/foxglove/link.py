@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.dashboard.client import MAX_PENDING, POLICY_VIOLATION, Client
-from composer.dashboard.errors import RequestError
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.foxglove.frames import WARNING, status
-from composer.dashboard.messages import to_json
-from composer.dashboard.outbox import Outbox, Update
+from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.outbox import Outbox, Update
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

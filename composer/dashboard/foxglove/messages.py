@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 
-from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.foxglove.catalog import Channel
 from composer.dashboard.foxglove.frames import WARNING, ClientMessage, number, status
 from composer.dashboard.foxglove.link import Link, Running
 from composer.dashboard.foxglove.topics import PublishedFeed, TopicFeed
-from composer.dashboard.messages import Values
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.errors import BadRequestError, RequestError
+from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.outbox import Update
 
 #: Of one client.
 _MAX_SUBSCRIPTIONS = 1000

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.errors import BadRequestError
 from composer.dashboard.feeds import Feed
-from composer.dashboard.messages import to_json
-from composer.dashboard.outbox import Delivery, Update
+from composer.dashboard.protocol.errors import BadRequestError
+from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.outbox import Delivery, Update
 from composer.qos import QosProfile
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.foxglove.catalog import OfferedService
 from composer.dashboard.foxglove.frames import CDR, ERROR, ServiceCall, service_response
 from composer.dashboard.foxglove.link import Link, Running, error_text
@@ -17,8 +16,9 @@ from composer.dashboard.foxglove.parameters import (
     read_setting,
     set_all,
 )
-from composer.dashboard.messages import Values
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.errors import BadRequestError, RequestError
+from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

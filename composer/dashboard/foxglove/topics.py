@@ -6,12 +6,12 @@ from collections import deque
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from composer.dashboard.errors import BadRequestError, RequestError, from_ros
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.catalog import Channel
-from composer.dashboard.messages import to_json
 from composer.dashboard.observing.large_messages import LARGE_TYPES
-from composer.dashboard.outbox import Delivery, Update
+from composer.dashboard.protocol.errors import BadRequestError, RequestError, from_ros
+from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.outbox import Delivery, Update
 from composer.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from composer.dashboard.errors import RequestError
 from composer.dashboard.observing.large_messages import (
     LARGE_BYTES,
     LARGE_TYPES,
     ByteLimit,
     large_profile,
 )
+from composer.dashboard.protocol.errors import RequestError
 from composer.model import PortKind
 
 if TYPE_CHECKING:

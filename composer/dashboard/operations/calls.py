@@ -6,8 +6,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.context import Dashboard
-from composer.dashboard.messages import Values, json_safe
 from composer.dashboard.operations.operation import Prepared
+from composer.dashboard.protocol.messages import Values, json_safe
 from composer.dashboard.publishing import read_outgoing
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from composer.dashboard.channels.nodes import COMMANDS
 from composer.dashboard.channels.topics import shown_qos
 from composer.dashboard.context import Dashboard
 from composer.dashboard.declared import required
-from composer.dashboard.errors import RequestError, from_ros
-from composer.dashboard.messages import Values, json_safe
 from composer.dashboard.operations.operation import Prepared
+from composer.dashboard.protocol.errors import RequestError, from_ros
+from composer.dashboard.protocol.messages import Values, json_safe
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

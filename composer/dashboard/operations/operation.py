@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.context import Dashboard
-from composer.dashboard.messages import Values
+from composer.dashboard.protocol.messages import Values
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.context import Dashboard
-from composer.dashboard.messages import Values
 from composer.dashboard.operations.operation import Prepared
+from composer.dashboard.protocol.messages import Values
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

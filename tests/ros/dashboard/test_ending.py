@@ -9,7 +9,7 @@ import uvicorn
 from uvicorn.server import ServerState
 from websockets.asyncio.client import connect
 
-from composer.dashboard.server import _WebSocketProtocol
+from composer.dashboard.web.server import _WebSocketProtocol
 
 
 class EndsMeanwhile(_WebSocketProtocol):

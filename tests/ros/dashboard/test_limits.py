@@ -11,8 +11,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from composer.dashboard.app import MAX_CONNECTIONS
-from composer.dashboard.server import BACKLOG, MAX_OPEN
+from composer.dashboard.web.app import MAX_CONNECTIONS
+from composer.dashboard.web.server import BACKLOG, MAX_OPEN
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import (
     PATIENCE_S,

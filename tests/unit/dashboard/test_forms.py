@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from composer.dashboard.errors import RequestError
 from composer.dashboard.forms import Forms
+from composer.dashboard.protocol.errors import RequestError
 from composer.interfaces import Interfaces
 from composer.resources import interfaces_folder
 

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.dashboard.errors import BadRequestError
 from composer.dashboard.foxglove.catalog import Contents, changes, graph_update
 from composer.dashboard.foxglove.frames import (
     ClientMessage,
@@ -24,6 +23,7 @@ from composer.dashboard.foxglove.frames import (
 )
 from composer.dashboard.foxglove.parameters import Setting, parameter, read_setting
 from composer.dashboard.foxglove.schemas import Schemas
+from composer.dashboard.protocol.errors import BadRequestError
 from composer.interfaces import Interfaces
 
 BETWEEN = "=" * 80

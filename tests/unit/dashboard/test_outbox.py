@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.dashboard.outbox import MAX_BATCHES, MAX_BYTES, Delivery, Outbox, Update
+from composer.dashboard.protocol.outbox import MAX_BATCHES, MAX_BYTES, Delivery, Outbox, Update
 
 
 def next_message(outbox: Outbox) -> str | bytes:

@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from composer.dashboard.messages import to_json
 from composer.dashboard.observing.processes import ProcessMonitor, total
+from composer.dashboard.protocol.messages import to_json
 from composer.remote.systems.system_reports import (
     SystemReport,
     of_whole_systems,

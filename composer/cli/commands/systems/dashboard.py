@@ -109,8 +109,8 @@ def dashboard(
     require_ros("compose dashboard", None if declared is None else declared.system)
     from composer.dashboard.access import InvalidTokenFileError
     from composer.dashboard.context import Options
-    from composer.dashboard.server import PortInUseError
     from composer.dashboard.start import Address, NotPrivateError, run_dashboard
+    from composer.dashboard.web.server import PortInUseError
 
     def on_ready(url: str) -> None:
         if descriptor is not None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from composer.dashboard.errors import BadRequestError
+from composer.dashboard.protocol.errors import BadRequestError
 from composer.diagnostics import nearest
 from composer.document.scalars import text_of_not_finite
 

@@ -17,11 +17,11 @@ from composer.dashboard.channels import CHANNELS
 from composer.dashboard.channels.goal import GoalFeed
 from composer.dashboard.client import MAX_PENDING, Client
 from composer.dashboard.context import Dashboard
-from composer.dashboard.errors import BadRequestError, RequestError
 from composer.dashboard.feeds import Feed, Receiver
-from composer.dashboard.messages import ClientRequest, Values, parse_request, to_json
 from composer.dashboard.operations import OPERATIONS
-from composer.dashboard.outbox import Outbox
+from composer.dashboard.protocol.errors import BadRequestError, RequestError
+from composer.dashboard.protocol.messages import ClientRequest, Values, parse_request, to_json
+from composer.dashboard.protocol.outbox import Outbox
 from composer.diagnostics import nearest
 
 _MAX_SUBSCRIPTIONS = 64

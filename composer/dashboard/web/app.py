@@ -18,12 +18,12 @@ from starlette.websockets import WebSocket
 
 from composer.dashboard.access import Refusal, Request
 from composer.dashboard.client import Client
-from composer.dashboard.connection import Connection
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
-from composer.dashboard.page_modules import file_of_page, index_of, style_sheet
-from composer.dashboard.preparation import prepare
+from composer.dashboard.web.connection import Connection
+from composer.dashboard.web.page_modules import file_of_page, index_of, style_sheet
+from composer.dashboard.web.preparation import prepare
 
 Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]

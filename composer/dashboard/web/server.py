@@ -21,7 +21,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.exceptions import InvalidState
 
 from composer.dashboard.access import Refusal
-from composer.dashboard.app import AccessCheck, refusal_page, security_headers
+from composer.dashboard.web.app import AccessCheck, refusal_page, security_headers
 
 DEFAULT_PORT = 8800
 #: Ports that are tried if the default one is in use.

@@ -6,9 +6,9 @@ import asyncio
 
 from composer.dashboard.channels.graph import DiagramFeed
 from composer.dashboard.context import Dashboard
-from composer.dashboard.errors import RequestError
-from composer.dashboard.messages import Values
-from composer.dashboard.outbox import Update
+from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.outbox import Update
 from composer.dashboard.ros_side import LINGER_S
 
 _KEY = "diagram of a page that is being loaded"

@@ -1,0 +1,1 @@
+"""What a browser and the dashboard send to each other: requests, errors, and updates that wait."""
