@@ -179,6 +179,7 @@ def test_nothing_is_left_after_close(tmp_path: Path) -> None:
     assert not folder.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_no_orphan_whatever_ends_the_composer(number: signal.Signals) -> None:
     mark = f"{os.getpid()}-{number.name}-{time.monotonic_ns()}"
