@@ -31,8 +31,11 @@ _COMMON = "/tmp"  # noqa: S108 - the folder in it belongs to the user, or is ref
 _SESSIONS = "/run/user/"
 _DEFAULT_DOMAIN = "0"
 _SUFFIX = ".lock"
-#: A process that only looks whether a system runs holds its lock for some microseconds.
-_LOOKED_AT_WITHIN_S = 0.05
+#: A process that only looks whether a system runs shares its lock for some microseconds, on a busy
+#: computer for longer.
+_LOOKED_AT_WITHIN_S = 5.0
+#: A process that has just started writes who it is.
+_WRITTEN_WITHIN_S = 0.05
 _POLL_S = 0.005
 #: A change of the folder is only known for certain after this time: its clock advances in steps.
 _CHANGE_IS_CERTAIN_NS = 100_000_000
@@ -66,11 +69,14 @@ def hold_instance_lock(name: str, discovery: Mapping[str, str] | None = None) ->
         yield
         return
     with lock, _kept_folder():
-        end_s = time.monotonic() + _LOOKED_AT_WITHIN_S
+        start_s = time.monotonic()
         while not _is_locked(lock, fcntl.LOCK_EX):
-            if time.monotonic() > end_s:
+            is_shared = _is_locked(lock, fcntl.LOCK_SH)
+            limit_s = _LOOKED_AT_WITHIN_S if is_shared else _WRITTEN_WITHIN_S
+            if time.monotonic() - start_s > limit_s:
                 holder = _holder(lock)
                 raise already_running(name, holder["host"], holder["pid"])
+            fcntl.flock(lock, fcntl.LOCK_UN)
             time.sleep(_POLL_S)
         lock.seek(0)
         lock.truncate()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,7 @@ from composer.runtime.process.instance_lock import (
 
 OTHER_USER = 65534
 NAME = "/robot"
+REAL_SLEEP = time.sleep
 
 
 @pytest.fixture
@@ -37,6 +40,26 @@ def test_a_held_lock_refuses_a_second_process_and_is_listed(folder: Path) -> Non
             pass
     assert local_systems() == {}
     assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_a_start_waits_for_a_process_that_only_looks(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with hold_instance_lock(NAME):
+        pass
+    with (folder / "7.robot.lock").open() as looking:
+        fcntl.flock(looking, fcntl.LOCK_SH)
+        polls = iter(range(30))
+
+        def sleep(_: float) -> None:
+            """Count the polls of a busy computer, and end the look with the last one."""
+            REAL_SLEEP(0.005)
+            if next(polls) == 29:
+                fcntl.flock(looking, fcntl.LOCK_UN)
+
+        monkeypatch.setattr("time.sleep", sleep)
+        with hold_instance_lock(NAME):
+            assert is_held(NAME)
 
 
 def test_looking_for_a_lock_that_was_never_held_creates_no_file(folder: Path) -> None:
