@@ -13,6 +13,8 @@ from composer.field_types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
 from composer.names import join
 
+_SEVERAL = 2
+
 
 @dataclass(frozen=True, slots=True)
 class TypeMismatch:
@@ -67,6 +69,72 @@ def wrong_connection(
     ):
         return here[0]
     return None
+
+
+def misnamed_port(context: Context, mismatch: TypeMismatch) -> tuple[Endpoint, str] | None:
+    """Return where a connection names a wrong port of a node, and the one that is meant.
+
+    The other one has the type of the channel, and the name of the channel or of another port on it.
+    """
+    system = context.system
+    for connection in _connections(context, mismatch):
+        ends = [
+            (end, port)
+            for end in (*connection.sources, *connection.sinks)
+            if (port := system.port(end)) is not None
+        ]
+        for end, port in ends:
+            others = [other for _, other in ends if other is not port]
+            names = {other.name.value for other in others}
+            names.add(connection.name.value.rpartition("/")[2])
+            types = {other.interface.value for other in others} - {port.interface.value}
+            node = system.node(end.node)
+            if node is None or port.name.value in names:
+                continue
+            if all(_key(item) != (end.node, end.port) for item in mismatch.channel.ends):
+                continue
+            for meant in node.ports_of(port.kind):
+                is_alike = meant.interface.value in types and meant.name.value in names
+                if is_alike and meant not in others:
+                    return end, f"{end.node}.{meant.name}"
+    return None
+
+
+def misnamed_connection(context: Context, mismatch: TypeMismatch) -> Connection | None:
+    """Return the connection whose name is that of another one with ports of another type."""
+    connections = _connections(context, mismatch)
+    types = [
+        {
+            port.interface.value
+            for end in (*connection.sources, *connection.sinks)
+            if (port := context.system.port(end)) is not None
+        }
+        for connection in connections
+    ]
+    if len(connections) < _SEVERAL or any(len(found) != 1 for found in types):
+        return None
+    usual = mismatch.usual.port.interface.value
+    last = mismatch.channel.name.rpartition("/")[2]
+    wrong = [
+        item
+        for item in connections
+        if all(end.port != last for end in (*item.sources, *item.sinks))
+    ]
+    if len(wrong) == len(connections):
+        wrong = [item for item, found in zip(connections, types, strict=True) if usual not in found]
+    has_both = all(item.sources and item.sinks for item in wrong)
+    return wrong[0] if len(wrong) == 1 and has_both else None
+
+
+def _connections(context: Context, mismatch: TypeMismatch) -> list[Connection]:
+    """Return the connections that give a channel its name."""
+    channel, namespace = mismatch.channel, context.system.namespace
+    return [
+        connection
+        for connection in context.system.connections
+        if connection.kind is channel.kind
+        and join(namespace, connection.name.value) == channel.name
+    ]
 
 
 def _has_type(context: Context, connection: Connection, endpoint: PortOfNode) -> bool:

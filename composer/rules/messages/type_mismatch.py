@@ -7,12 +7,14 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.endpoints.type_mismatches import (
     TypeMismatch,
+    misnamed_connection,
+    misnamed_port,
     type_mismatches,
     wrong_connection,
 )
 from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import PortOfNode
+from composer.model import Endpoint, PortOfNode
 
 RULE = register(
     Rule(
@@ -50,8 +52,32 @@ _SHOWN = 3
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the types on every channel; report each type other than the most common one."""
     for mismatch in context.once(type_mismatches):
+        misnamed = misnamed_port(context, mismatch)
+        if misnamed is not None:
+            yield _of_wrong_port(mismatch, *misnamed)
+            continue
         for name, endpoints in mismatch.others.items():
             yield _diagnostic(context, mismatch, name, endpoints)
+
+
+def _of_wrong_port(mismatch: TypeMismatch, end: Endpoint, meant: str) -> Diagnostic:
+    """Report a connection that names the wrong port of a node."""
+    channel = mismatch.channel
+    wrong = next(
+        item
+        for item in channel.ends
+        if (item.node.name.value, item.port.name.value) == (end.node, end.port)
+    )
+    own = wrong.port.interface.value
+    other = next(item for item in channel.ends if item.port.interface.value != own)
+    return Diagnostic(
+        RULE,
+        f"{wrong.port.kind} '{end.text}' has type '{own}', "
+        f"but {channel.kind} '{channel.name}' has '{other.port.interface}'",
+        end.text.span,
+        (Label(other.port.interface.span, f"the type of {other.port.kind} '{port_name(other)}'"),),
+        f"did you mean '{meant}'?",
+    )
 
 
 def _diagnostic(
@@ -68,8 +94,14 @@ def _diagnostic(
         for endpoint in endpoints[1 : 1 + _SHOWN]
     ]
     primary = different.port.interface.span
+    named_twice = misnamed_connection(context, mismatch)
     connected = wrong_connection(context, different, mismatch)
-    if connected is not None:
+    hint = None
+    if named_twice is not None:
+        labels.append(Label(primary, f"its type: {name}"))
+        primary = named_twice.name.span
+        hint = "another connection has the same name"
+    elif connected is not None:
         labels.append(Label(primary, f"its type, which fits its node: {name}"))
         primary = connected.text.span
     return Diagnostic(
@@ -78,4 +110,5 @@ def _diagnostic(
         f"but {channel.kind} '{channel.name}' has '{common}'",
         primary,
         tuple(labels),
+        hint,
     )

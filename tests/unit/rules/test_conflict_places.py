@@ -104,6 +104,16 @@ TYPES = {
         + "  - {topic: /name, from: name.out, to: [sink.speed, sink.name]}\n",
         [("type-mismatch", 10)],
     ),
+    "the wrong port of the right node": (
+        NODES % "" + "  - {topic: /name, from: name.out, to: sink.speed}\n",
+        [("type-mismatch", 10)],
+    ),
+    "two connections with the same name": (
+        NODES % ""
+        + "  - {topic: /name, from: name.out, to: sink.name}\n"
+        + "  - {topic: /name, from: speed.out, to: sink.speed}\n",
+        [("type-mismatch", 11)],
+    ),
     "nothing says that the type is right": (
         NODES % "" + "  - {topic: /name, from: name.out, to: [sink.speed, sink.name]}\n",
         [("type-mismatch", 7)],
