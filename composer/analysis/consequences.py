@@ -14,9 +14,14 @@ from composer.source import Span
 
 _QUOTED = re.compile(r"'([^']*)'")
 _WORD = re.compile(r"\w+")
+#: The name of an interface, without its part such as '_Request'.
+_INTERFACE = re.compile(r"[a-z]\w*/(?:msg|srv|action)/[A-Za-z0-9]+")
 _NAMESPACE = re.compile(r"\bnamespace\b")
 #: What is only reported because nodes are not in their namespaces.
 _OF_NAMESPACES = frozenset({"duplicate-server", "port-connected-twice"})
+#: The keys of a timer, and what is wrong without them.
+_TIMES = frozenset({"period_ms", "rate_hz"})
+_OF_TIMES = frozenset({"silence-too-short"})
 _SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER})
 
 #: What depends on the names that connections give to ports.
@@ -53,9 +58,13 @@ _FOLLOWING = {
     "parameter-range": frozenset(
         {"executor-busy", "executor-overloaded", "timer-period", "unusual-rate"}
     ),
+    "parameter-choice": frozenset({"invalid-value"}),
     "parameter-type": frozenset({"index-out-of-range", "unusual-rate"}),
-    "type-mismatch": frozenset({"port-connected-twice"}),
+    "type-mismatch": frozenset(
+        {"handler-annotation", "invalid-value", "port-connected-twice", "unknown-field"}
+    ),
     "unknown-key": frozenset({"transform-source", "unused-restart"}),
+    "unknown-port": frozenset({"handler-without-port"}),
     "unknown-process": frozenset({"conflicting-process", "split-executor", "unmeasured-chain"}),
     "yaml-syntax": frozenset({"missing-parameter"}),
 }
@@ -80,8 +89,10 @@ class Consequences:
                 self._all |= _OF_FOLDERS
             elif rules is not None and item.rule.name in _WITHOUT_NAMES:
                 self._all |= rules
-            elif item.rule.name == "unknown-variable" and _is_of_namespace(item.primary):
+            elif _lacks_namespace(item):
                 self._all |= _OF_NAMESPACES
+            elif item.rule.name == "wrong-type" and not _TIMES.isdisjoint(quoted(item.message)):
+                self._all |= _OF_TIMES
             elif rules is not None:
                 self._add(rules, _names(item, context))
             if item.rule.name in _WRONG_ENDS or item.rule.name == "invalid-ros-name":
@@ -110,6 +121,18 @@ def _is_of_namespace(span: Span) -> bool:
     return _NAMESPACE.search(span.file.line(span.line)[: span.column]) is not None
 
 
+def _lacks_namespace(item: Diagnostic) -> bool:
+    """Return whether nodes lack their namespace: its variable, or the key of an include, is wrong.
+
+    The prefix of an include separates its nodes as well.
+    """
+    if item.rule.name == "unknown-variable":
+        return _is_of_namespace(item.primary)
+    meant = {"namespace", "prefix"}.intersection(quoted(item.hint))
+    is_key = item.rule.name == "unknown-key" and item.message.endswith("this include")
+    return is_key and bool(meant)
+
+
 def quoted(text: str | None) -> list[str]:
     """Return the names in a message."""
     return _QUOTED.findall(text or "")
@@ -118,6 +141,7 @@ def quoted(text: str | None) -> list[str]:
 def _mentioned(item: Diagnostic) -> Iterator[str]:
     """Yield the names in a message and the words at its places, and the file it is about."""
     yield from quoted(item.message)
+    yield from _INTERFACE.findall(item.message)
     for span in (item.primary, *(label.span for label in item.related)):
         yield from _WORD.findall(span.text)
     yield item.primary.file.path
@@ -125,6 +149,12 @@ def _mentioned(item: Diagnostic) -> Iterator[str]:
 
 def _names(item: Diagnostic, context: Context) -> Iterator[str]:
     """Yield what the reports that follow from a mistake may mention."""
+    if item.rule.name == "type-mismatch":
+        yield from quoted(item.message)[:-1]  # without the right type
+        return
+    if item.rule.name == "unknown-port":
+        yield from (f"on_{name}" for name in quoted(item.message)[-1:])
+        return
     yield from (*quoted(item.message), *quoted(item.hint))
     nodes = context.system.nodes
     match item.rule.name:

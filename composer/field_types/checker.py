@@ -159,15 +159,22 @@ class FieldChecker:
                     yield from self._field(Constant(number, span), type_)
                 else:
                     yield from self._computed(expression, span, type_)
-            case Text(span=span):
-                yield from self.text(template)
-                if not is_string(type_):
-                    hint = 'write a single expression: "{...}"'
-                    yield Problem(f"a string where {type_} is expected", span, hint)
+            case Text():
+                yield from self._text(template, type_)
             case Record(span=span):
                 yield from self._nested(template, type_, span)
             case Items():
                 yield from self._items(template, type_)
+
+    def _text(self, text: Text, type_: FieldType) -> Iterator[Problem]:
+        yield from self.text(text)
+        if not is_string(type_):
+            hint = 'write a single expression: "{...}"'
+            yield Problem(f"a string where {type_} is expected", text.span, hint)
+        least = sum(len(part) for part in text.parts if isinstance(part, str))
+        if type_.string_bound is not None and least > type_.string_bound:
+            message = f"a string of at least {least} characters does not fit {type_}"
+            yield Problem(message, text.span)
 
     def _nested(self, record: Record, type_: FieldType, span: Span) -> Iterator[Problem]:
         if type_.is_primitive or type_.is_array:

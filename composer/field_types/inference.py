@@ -278,8 +278,10 @@ def _report(
     node: ast.expr, inference: Inference, message: str, hint: str | None = None
 ) -> ValueType:
     end = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
-    length = end - node.col_offset
-    inference.problems.append(ExpressionProblem(message, node.col_offset, length, hint))
+    inside = range(node.col_offset, end)
+    if not any(problem.offset in inside for problem in inference.problems):  # it follows from that
+        found = ExpressionProblem(message, node.col_offset, len(inside), hint)
+        inference.problems.append(found)
     return ANYTHING
 
 

@@ -92,6 +92,7 @@ NOT_FITTING: list[tuple[str, Any, str, str | None]] = [
     ("text", 5, "the number 5 where string is expected", 'write it in quotes: "5"'),
     ("text", None, "null where string is expected", None),
     ("short_text", "abcd", "a string of 4 characters does not fit string<=3", None),
+    ("short_text", "abcd{count}", "a string of at least 4 characters does not fit", None),
     ("three", 1.0, "the number 1.0 where float64[3] is expected", "write a list: [...]"),
     ("three", [1, 2], "a list of 2 elements does not fit float64[3]", None),
     ("few", [1, 2, 3], "a list of 3 elements does not fit int8[<=2]", None),
