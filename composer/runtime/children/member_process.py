@@ -245,6 +245,8 @@ class MemberProcess:
         """Return that the process has not reported in time, and as much of the reason as known."""
         is_found = self._context.manager.count_publishers(self._reports.topic_name)
         reason = "its reports do not arrive" if is_found else "it is not in the ROS graph"
+        if self._life is None and is_held(self._name):
+            reason += ", and another process holds its instance lock"
         return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
 
     async def _start_child(self) -> Child:

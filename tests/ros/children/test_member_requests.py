@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -23,6 +24,7 @@ from composer.runtime.children.member_report import MemberReport
 from composer.runtime.children.member_requests import MemberRequests
 from composer.runtime.executors.loop import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
+from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import (
     CHANGE_STATES,
@@ -269,13 +271,16 @@ def test_the_error_says_why_a_process_has_not_reported(
     is_in_the_graph: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(member_process, "STARTS_WITHIN_S", 0.0)
-    with bench(ExecutorKind.EVENTS) as on:
+    lock = nullcontext() if is_in_the_graph else hold_instance_lock("/robot/acting")
+    with bench(ExecutorKind.EVENTS) as on, lock:
         process = silent_process(on, tmp_path)
         if is_in_the_graph:
             on.node.create_publisher(DiagnosticArray, "/robot/acting/manager/state", STATE_QOS)
         start = on.loop.run_task(process.ensure())
         wait_until(start.done, "the error")
-        reason = "its reports do not arrive" if is_in_the_graph else "it is not in the ROS graph"
+        reason = "its reports do not arrive"
+        if not is_in_the_graph:
+            reason = "it is not in the ROS graph, and another process holds its instance lock"
         expected = f"process 'acting' has not reported within 0 s: {reason}"
         assert str(start.exception()) == expected
         process.close()
