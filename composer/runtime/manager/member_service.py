@@ -19,6 +19,7 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
 from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
@@ -35,6 +36,7 @@ from composer.runtime.ros.manager_protocol import (
 )
 
 _MAX_LISTED = 3
+_TRANSITIONS = (*DONE_IN, CREATE)
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
 
@@ -86,6 +88,7 @@ class MemberService:
         self._log = log
         self._received = ReceivedSteps[_Step]()
         self._reports = ReportTimes()
+        self._repeats = RepeatLimit()
         service = node.create_service(limited(SetParameters), f"~/{CHANGE_STATES}", unused_callback)
         loop.add_service(service, self._on_request)
 
@@ -108,8 +111,7 @@ class MemberService:
         if GOALS in values:
             self._callbacks.keep_goals(values[GOALS].string_value)
         if self._is_outdated(values):
-            late = ", ".join(_steps(values)[:_MAX_LISTED])
-            self._log(f"ignored a request that has arrived too late: {late}")
+            self._log_late(values)
             return
         if LAST_STEPS in values:
             self._callbacks.expect_end()
@@ -118,6 +120,16 @@ class MemberService:
     def _is_outdated(self, values: Mapping[str, Any]) -> bool:
         seen = values.get(SEEN_REPORT)
         return seen is not None and self._reports.is_outdated(seen.integer_value, monotonic())
+
+    def _log_late(self, values: Mapping[str, Any]) -> None:
+        admission = self._repeats.admit("late")
+        if admission is None:
+            return
+        nodes = self._callbacks.nodes()
+        steps = [text.split()[:2] for text in _steps(values) if text.split()]
+        known = [step for step in steps if step[0] in _TRANSITIONS and step[-1] in nodes]
+        listed = ", ".join(" ".join(step) for step in known[:_MAX_LISTED])
+        self._log(f"ignored a request that has arrived too late: {listed}{admission.suffix}")
 
     async def _change_states(self, values: Mapping[str, Any], reply: Reply) -> None:
         """Run all steps of a request, at the same time unless they wait for each other."""
