@@ -56,11 +56,11 @@ run: $(READY)
 	@echo "==> compose run $(SYSTEM)    (Ctrl-C to stop)"
 	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
 
-# Six workers for two CPUs: tests with ROS mostly wait. Tests of a file share fixtures, so they stay together.
+# Five workers for two CPUs: tests with ROS mostly wait. Tests of a file share fixtures, so they stay together.
 # A dead worker fails the run: xdist would wait forever for its tests.
 test: $(READY) $(STAMPS)/tf2_msgs $(STAMPS)/dev
 	@echo "==> pytest"
-	@$(BIN)/python -m pytest --numprocesses 6 $(XDIST)
+	@$(BIN)/python -m pytest --numprocesses 5 $(XDIST)
 
 # The inner loop: half of the examples that hypothesis generates otherwise.
 test-fast: $(STAMPS)/composer $(STAMPS)/dev
@@ -131,7 +131,7 @@ test-wheel: $(READY) $(STAMPS)/dev
 	@rm -f $(STAMPS)/composer $(STAMPS)/dev
 	@rm -rf build/tree && mkdir -p build/tree
 	@git archive HEAD ':!composer' | tar -x -C build/tree
-	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 6 $(XDIST) \
+	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 5 $(XDIST) \
 	  --ignore tests/packaging
 
 requirements: $(STAMPS)/tools
