@@ -31,9 +31,11 @@ def element_problems(
                 hint = f"indices count from 0, so the last one is {size - 1}"
                 yield CodeProblem(Kind.INDEX, problem, span_of(index, scope.home.source), hint)
             parameter = parameter_read(owner, scope)
-            if at is None or parameter is None or looks_first(function):
+            if at is None or parameter is None:
                 return
             name, count = parameter.name.value, parameter_length(parameter)
+            if looks_first(function, name, scope):
+                return
             if count is not None and not -count <= at < count:
                 yield CodeProblem(
                     Kind.INDEX,
@@ -46,7 +48,7 @@ def element_problems(
             if parameter is None or any(isinstance(item, ast.Starred) for item in targets):
                 return
             name, count = parameter.name.value, parameter_length(parameter)
-            if count not in (None, len(targets)) and not looks_first(function):
+            if count not in (None, len(targets)) and not looks_first(function, name, scope):
                 message = f"parameter '{name}' has {counted(count or 0)}, not {len(targets)}"
                 span = span_of(value, scope.home.source)
                 lines = (function.lineno, function.end_lineno or function.lineno)

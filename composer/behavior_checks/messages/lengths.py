@@ -77,7 +77,7 @@ def _of_syntax(node: ast.expr, scope: FunctionTypes, depth: int) -> Length:
             return _of_attribute(name, scope, depth)
         case ast.Attribute(value=owner, attr=name) if isinstance(scope.type_of(owner), Parameters):
             count = parameter_length(scope.owner.node.parameter(name))
-            is_asked = scope.function is None or looks_first(scope.function)
+            is_asked = scope.function is None or looks_first(scope.function, name, scope)
             return _UNKNOWN if count is None or is_asked else _exactly(count)
         case _:
             return _UNKNOWN
@@ -199,12 +199,30 @@ def parameter_length(parameter: Parameter | None) -> int | None:
     return len(value.value) if value is not None and isinstance(value.value, list) else None
 
 
-def looks_first(function: Function) -> bool:
-    """Return whether a function asks for a length, or handles an element that is missing."""
-    return any(
-        isinstance(node, ast.Try) or (isinstance(node, ast.Name) and node.id == "len")
-        for node in nodes_of(function)
-    )
+def looks_first(function: Function, name: str, scope: FunctionTypes) -> bool:
+    """Return whether a function handles missing elements of a parameter, or asks for a length.
+
+    The length of another parameter does not limit this one, unless they have as many elements.
+    """
+    for node in nodes_of(function):
+        match node:
+            case ast.Try() | ast.Call(args=[ast.Name(id="len"), *_]):  # map(len, ...)
+                return True
+            case ast.Call(func=ast.Name(id="len"), args=[measured]):
+                if not _is_other(measured, name, scope):
+                    return True
+    return False
+
+
+def _is_other(measured: ast.expr, name: str, scope: FunctionTypes) -> bool:
+    """Return whether an expression is a parameter of another length than that of ``name``."""
+    if not isinstance(measured, ast.Attribute):
+        return False
+    if not isinstance(scope.type_of(measured.value), Parameters):
+        return False
+    parameter = scope.owner.node.parameter
+    count = parameter_length(parameter(measured.attr))
+    return count not in (None, parameter_length(parameter(name)))
 
 
 def _exactly(count: int) -> Length:

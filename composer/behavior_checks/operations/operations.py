@@ -285,9 +285,6 @@ def _runs_asyncio(home: Module) -> bool:
     return any(start in home.source.text for start in starts)
 
 
-_TEXT = FieldType("string")
-
-
 def _index_problem(owner: Value, index: Value) -> str | None:
     is_list = isinstance(owner, FieldType) and owner.is_array
     is_sequence = isinstance(owner, Collection) and owner.python in (list, tuple, bytes)
@@ -302,7 +299,7 @@ def _index_problem(owner: Value, index: Value) -> str | None:
 def _owner_problem(owner: Value) -> str | None:
     if is_function(owner):
         return "a function has no items: call it"
-    if isinstance(owner, Message) or (is_scalar(owner) and owner != _TEXT):
+    if isinstance(owner, Message) or (is_scalar(owner) and not is_text(owner)):
         return f"{described(owner)} is not a list"  # type: ignore[arg-type]
     return None
 
@@ -319,7 +316,9 @@ def _position_problem(owner: Value, index: ast.expr) -> str | None:
 def _has_no_length(type_: Value) -> bool:
     if isinstance(type_, Collection):
         return type_.python in ITERATORS or type_.python is Iterator
-    return is_function(type_) or isinstance(type_, Message) or (is_scalar(type_) and type_ != _TEXT)
+    if is_function(type_) or isinstance(type_, Message):
+        return True
+    return is_scalar(type_) and not is_text(type_)
 
 
 def _unused(value: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
