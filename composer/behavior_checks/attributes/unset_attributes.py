@@ -40,13 +40,17 @@ def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
     later = {name: setters for name, setters in values.items() if not setters & first}
     at_first = {name: found for name, found in later.items() if none.get(name, set()) & {*_FIRST}}
     yield from _perhaps_none(types, methods, at_first)
-    known_names = self_attributes(types.source, none) | _in_texts(methods)
     by_handlers = _reached(tuple(types.handlers), methods)  # others may be called from outside
+    own = {name for _, scope in methods.values() for name in scope.bindings.attributes}
     missing = {
         name: setters
         for name, setters in later.items()
-        if name not in known_names and setters <= by_handlers
+        if name in own and name not in none and setters <= by_handlers
     }
+    if not missing:
+        return
+    known_names = self_attributes(types.source, ()) | _in_texts(methods)
+    missing = {name: setters for name, setters in missing.items() if name not in known_names}
     has_start = any(first & setters for setters in values.values())
     yield from _missing(types, methods, missing, has_start=has_start)
 

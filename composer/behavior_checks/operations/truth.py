@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import lru_cache
 
 from composer.behavior_checks.problems import CodeProblem, Kind
-from composer.behavior_source import Function
+from composer.behavior_source import Function, Module
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -29,7 +30,8 @@ def truth_problems(
 ) -> Iterator[CodeProblem]:
     """Yield the methods that a condition tests without a call, as in ``if sensor.is_ready``."""
     yield from constant_problems(node, scope)
-    yield from _arrays(node, scope)
+    if _uses_numpy(scope.home):
+        yield from _arrays(node, scope)
     for test in _tested(node):
         name = _always_true(test, scope)
         # 'if self.hook: self.hook()' expects that there may be none
@@ -37,6 +39,11 @@ def truth_problems(
             message = f"the function '{name}' is not called, so that this is always true"
             span = span_of(test, scope.home.source)
             yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
+
+
+@lru_cache(maxsize=128)
+def _uses_numpy(home: Module) -> bool:
+    return any(item.module.partition(".")[0] == "numpy" for item in home.imports.values())
 
 
 def _arrays(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
