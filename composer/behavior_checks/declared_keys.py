@@ -14,9 +14,9 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.syntax.bindings import Binding, bindings_of, nodes_of
-from composer.behavior_types.syntax.lineage import RECORDS, lineage
+from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.names import value_named
-from composer.behavior_types.syntax.own_classes import fields_of_class, updated_targets
+from composer.behavior_types.syntax.own_classes import fields_of_class, is_record, updated_targets
 from composer.behavior_types.values import OwnModule, OwnObject, Self
 from composer.diagnostics import suggestion
 from composer.field_types import ANYTHING
@@ -77,9 +77,9 @@ def _of_record(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int
     found = scope.type_of(node.value)
     if not isinstance(found, OwnObject) or not isinstance(node.ctx, ast.Load):
         return None
-    family = lineage(found.of)
-    if not family.others or not family.others <= RECORDS:
+    if not is_record(found.of):
         return None
+    family = lineage(found.of)
     fields = (field.name for own in family.classes for field in fields_of_class(own))
     return frozenset(fields).union(*map(_all_stored, scope.owner.source.own_modules))
 

@@ -23,7 +23,7 @@ from composer.behavior_checks.operations.operations import annotations_by_name, 
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.receivers import lacks_self
-from composer.behavior_source.spans import span_of
+from composer.behavior_source.spans import span_of, start_span
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.expressions.objects import fields_expected
 from composer.behavior_types.expressions.protocols import special_method
@@ -31,7 +31,13 @@ from composer.behavior_types.expressions.results import changed_tuple
 from composer.behavior_types.hosted import rclpy_function
 from composer.behavior_types.libraries.api_values import api_parameters
 from composer.behavior_types.libraries.numpy_names import ndarray
-from composer.behavior_types.syntax.own_classes import abstract_methods, constructor_of
+from composer.behavior_types.syntax.lineage import lineage
+from composer.behavior_types.syntax.own_classes import (
+    abstract_methods,
+    constructor_of,
+    fields_of_class,
+    is_record,
+)
 from composer.behavior_types.values import (
     AnyFunction,
     ApiMethod,
@@ -44,7 +50,7 @@ from composer.behavior_types.values import (
     OwnMethod,
     Value,
 )
-from composer.diagnostics import nearest
+from composer.diagnostics import nearest, suggestion
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Message, Service
 from composer.source import Span
@@ -115,11 +121,23 @@ class CallChecker:
         yield from enumeration_problems(node, own, self.scope)
         parameters = constructor(own)
         missing = abstract_methods(own)
-        if missing:
+        if is_record(own):
+            yield from self._record(node, own)
+        elif missing:
             yield self._abstract(node, own, missing)
         elif parameters is not None:
             fields = self._of_constructor(own)
             yield from call_problems(node, parameters, self.scope, fields)
+
+    def _record(self, node: ast.Call, own: OwnClass) -> Iterator[CodeProblem]:
+        """Check the keys that a TypedDict is created with."""
+        fields = [item.name for known in lineage(own).classes for item in fields_of_class(known)]
+        for keyword in node.keywords:
+            if keyword.arg is not None and keyword.arg not in fields:
+                message = f"'{own.definition.name}' has no key '{keyword.arg}'"
+                span = start_span(keyword, len(keyword.arg), self.scope.home.source)
+                yield CodeProblem(Kind.CALL, message, span, suggestion(keyword.arg, fields))
+                return
 
     def _abstract(self, node: ast.Call, own: OwnClass, missing: list[str]) -> CodeProblem:
         name = own.definition.name

@@ -15,12 +15,14 @@ from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.syntax.bindings import How, bindings_of, nodes_of
+from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.values import (
     BuiltinMethod,
     CollectionMethod,
     ModuleFunction,
     OwnMethod,
+    OwnObject,
 )
 
 _MATCHING = frozenset({"fullmatch", "match", "search"})
@@ -42,6 +44,7 @@ def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodePro
         return
     if _expects_none(function):
         return
+    looks_up = _looks_up(function)
     seen = set(_tested_names(function, scope))
     for node in nodes:
         for used in needed_values(node, scope):
@@ -51,7 +54,7 @@ def missing_values(function: Function, scope: FunctionTypes) -> Iterator[CodePro
             elif isinstance(used, ast.Call):
                 reason = _reason(used, scope)
                 name = ast.unparse(used) if reason is not None else ""
-            if reason is None or name in seen:
+            if reason is None or name in seen or (looks_up and reason.startswith("'get'")):
                 continue
             value = scope.bindings.value_of(name) if isinstance(used, ast.Name) else used
             if _is_certain(node, value, scope):
@@ -98,9 +101,13 @@ def _is_certain(node: ast.AST, value: ast.expr | None, scope: FunctionTypes) -> 
 def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
     """Return why a value may be None, None if it is not known to be."""
     call = node.value if isinstance(node, ast.Await) else node
+    if isinstance(call, ast.Attribute):
+        return _of_property(call, scope)
     if not isinstance(call, ast.Call):
         return None
     name = scope.called_name(call.func)
+    if name in {"max", "min", "next"} and _gives_none(name, call):
+        return f"'{name}' returns None for nothing"
     if name.startswith("re.") and name.removeprefix("re.") in _MATCHING and call.args:
         return None if _may_be_empty(call.args[0]) else f"'{name}' returns None without a match"
     match scope.type_of(call.func):
@@ -116,6 +123,28 @@ def _reason(node: ast.expr | None, scope: FunctionTypes) -> str | None:
             return _of_function(function)
         case _:
             return None
+
+
+def _gives_none(name: str, call: ast.Call) -> bool:
+    """Return whether a call of ``max``, ``min`` or ``next`` has a default of None."""
+    defaults = [item.value for item in call.keywords if item.arg == "default"]
+    defaults += call.args[1:2] if name == "next" else []
+    return any(map(_is_none, defaults))
+
+
+def _of_property(node: ast.Attribute, scope: FunctionTypes) -> str | None:
+    """Return why a property of an object of the project may be None, None if it may not."""
+    owner = scope.type_of(node.value)
+    for own in lineage(owner.of).classes if isinstance(owner, OwnObject) else ():
+        for method in own.definition.methods:
+            if method.name == node.attr and method.node is not None:
+                decorators = {dotted(item) for item in method.node.decorator_list}
+                returns = method.node.returns
+                is_property = decorators == {"property"} and returns is not None
+                if is_property and returns is not None and _names_none(returns):
+                    return f"'{node.attr}' is None in some cases"
+                return None
+    return None
 
 
 def _pattern(function: ast.expr, scope: FunctionTypes) -> ast.expr | None:
@@ -195,7 +224,7 @@ def _is_none(node: ast.expr | None) -> bool:
 
 
 def _expects_none(function: Function) -> bool:
-    """Return whether a function catches what a use of None raises, or looks for keys."""
+    """Return whether a function catches what a use of None raises."""
     for node in nodes_of(function):
         match node:
             case ast.ExceptHandler(type=caught):
@@ -204,12 +233,18 @@ def _expects_none(function: Function) -> bool:
                 names = names if caught is not None else {*_CAUGHT}
                 if names & _CAUGHT:
                     return True
-            case ast.Compare(ops=operators):
-                if any(isinstance(item, ast.In | ast.NotIn) for item in operators):
-                    return True
             case ast.Name(id="suppress") | ast.Attribute(attr="suppress"):
                 return True
     return False
+
+
+def _looks_up(function: Function) -> bool:
+    """Return whether a function asks for keys, so that 'get' finds them."""
+    return any(
+        isinstance(node, ast.Compare)
+        and any(isinstance(item, ast.In | ast.NotIn) for item in node.ops)
+        for node in nodes_of(function)
+    )
 
 
 def _tested_names(function: Function, scope: FunctionTypes) -> set[str]:

@@ -17,6 +17,8 @@ from composer.behavior_types.syntax.module_names import module_names
 from composer.behavior_types.syntax.own_classes import (
     assigned_from_outside,
     is_enumeration,
+    is_frozen,
+    is_record,
     known_attributes,
 )
 from composer.behavior_types.syntax.self_attributes import escapes_from
@@ -167,6 +169,9 @@ def _of_function(owner: OwnMethod | ModuleFunction, name: str) -> Found | None:
 def _of_own_class(types: BehaviorTypes, owner: OwnClass | OwnObject, name: str) -> Found | None:
     own = owner.of if isinstance(owner, OwnObject) else owner
     known = known_attributes(own)
+    if isinstance(owner, OwnObject) and is_record(own) and not hasattr(dict, name):
+        problem = f"'{own.definition.name}' has no attribute '{name}': it is a dict"
+        return Kind.ATTRIBUTE, problem, f"write ['{name}']"
     if known is None or name in known:
         return None
     if is_rclpy(own.home):
@@ -174,8 +179,8 @@ def _of_own_class(types: BehaviorTypes, owner: OwnClass | OwnObject, name: str) 
             return None
     elif _may_have(types, own, name):
         return None
-    is_similar = nearest(name, known) is not None
-    if not is_similar and not is_enumeration(own) and _is_passed_on(own):
+    is_similar = nearest(name, known) is not None or is_enumeration(own) or is_frozen(own)
+    if not is_similar and _is_passed_on(own):
         return None
     public = [other for other in known if not other.startswith("_")]
     problem = f"'{own.definition.name}' has no attribute '{name}'"

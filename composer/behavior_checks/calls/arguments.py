@@ -142,7 +142,10 @@ def _keeps_signature(function: Function, *, is_bound: bool) -> bool:
     """Return whether the decorators of a function leave its parameters as they are."""
     if is_bound and is_class_method(function):
         return True
-    return {dotted(item) for item in function.decorator_list} <= _TRANSPARENT
+    decorators = (
+        item.func if isinstance(item, ast.Call) else item for item in function.decorator_list
+    )
+    return {dotted(item) for item in decorators} <= _TRANSPARENT
 
 
 def constructor(own: OwnClass) -> Signature | None:

@@ -11,7 +11,7 @@ from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.scalars import is_text
+from composer.behavior_types.scalars import is_float, is_integer, is_text
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import NONE, Collection, OwnObject, Value
 from composer.interfaces import Message
@@ -106,6 +106,10 @@ def _spec_problem(value: Value, spec: str) -> str | None:
         return f"{what} cannot be formatted with ':{spec}'"
     if is_text(value) and spec[-1] in "bcdeEfFgGnoxX%":
         return f"a string cannot be formatted with ':{spec}'"
+    if is_float(value) and spec[-1] in "bcdoxX":
+        return f"a float cannot be formatted with ':{spec}'"
+    if is_integer(value) and spec[-1] == "d" and "." in spec:
+        return f"an integer has no decimals, as in ':{spec}'"
     return None
 
 

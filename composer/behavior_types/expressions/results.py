@@ -25,7 +25,7 @@ from composer.behavior_types.values import (
     Value,
 )
 from composer.field_types import ANYTHING
-from composer.interfaces import Message
+from composer.interfaces import FieldType, Message
 
 if TYPE_CHECKING:
     from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -74,7 +74,8 @@ def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
     if not full or any(isinstance(item, ast.Starred) for item in node.args):
         return ANYTHING
     named = {item.arg: scope.type_of(item.value) for item in node.keywords if item.arg}
-    return called(full, [scope.type_of(item) for item in node.args], named)
+    found = called(full, [scope.type_of(item) for item in node.args], named)
+    return scope.normal(found) if isinstance(found, FieldType) else found
 
 
 def changed_tuple(scope: FunctionTypes, call: ast.Call) -> OwnObject | None:

@@ -14,6 +14,7 @@ from composer.behavior_types.syntax.lineage import (
     ENUMS,
     NAMED_TUPLE,
     PLAIN_BASES,
+    RECORDS,
     VALUE_BASES,
     decorator_name,
     decorators_of,
@@ -230,6 +231,12 @@ def is_named_tuple(owner: OwnClass) -> bool:
     """Return whether a class is a NamedTuple."""
     family = lineage(owner)
     return family.others == {NAMED_TUPLE} and len(family.classes) == 1
+
+
+def is_record(owner: OwnClass) -> bool:
+    """Return whether a class is a TypedDict."""
+    others = lineage(owner).others
+    return bool(others) and others <= RECORDS
 
 
 def is_plain(owner: OwnClass) -> bool:

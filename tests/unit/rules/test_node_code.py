@@ -25,12 +25,13 @@ nodes:
       right: {type: composer_interfaces/action/Navigate, external: true}
 """
 CODE = """\
+import functools
 import heapq
 import math
 import time
 from collections import deque
-from dataclasses import dataclass, field
-from typing import Deque, NamedTuple, Optional
+from dataclasses import dataclass, field, replace
+from typing import Deque, NamedTuple, Optional, TypedDict
 
 import numpy as np
 from composer_interfaces.action import Navigate
@@ -58,6 +59,34 @@ class Battery:
         self.level = self.capacity
 
 
+@dataclass(frozen=True)
+class Spot:
+    x: float
+    y: float
+
+    def moved(self, dx: float) -> "Spot":
+        return replace(self, x=self.x + dx)
+
+
+@dataclass
+class Route:
+    spots: list[Spot] = field(default_factory=list)
+
+    @property
+    def current(self) -> Spot | None:
+        return self.spots[0] if self.spots else None
+
+
+class Section(TypedDict):
+    name: str
+    width: float
+
+
+@functools.lru_cache(maxsize=4)
+def slices(count: int, width: float) -> tuple[float, ...]:
+    return tuple(at * width for at in range(count))
+
+
 class Code:
     def on_configure(self):
         self.positions = np.zeros(6)
@@ -66,6 +95,7 @@ class Code:
         self.queue: list[tuple[int, Point]] = []
         self.battery = Battery(1.0)
         self.clusters: list[Cluster] = []
+        self.route = Route([Spot(0.0, 0.0)])
         self.goal = tuple(self.parameters.goal)
 
     async def on_ranges(self, message: LaserScan):
@@ -134,12 +164,32 @@ MISTAKES = [
     # the other part of a service
     ("request = SetBool.Response(success=True)\nawait self.clients.enable.call(request)",
      "SetBool.Response"),
+    # values that may be None
+    ("spot = self.route.current\nspot.moved(1.0)", "spot"),
+    ("best = max(self.clusters, key=lambda c: c.size, default=None)\nbest.size", "best"),
+    ("first = next((c for c in self.clusters), None)\nprint(first.x)", "first"),
+    # classes that are known completely
+    ("self.route.spots[0].z", "z"),
+    ("Section(name='a', widht=1.0)", "widht"),
+    ("Section(name='a', width=1.0).width", "width"),
+    ("slices(3)", "slices"),
+    ("worst = max(message.intensities)\nself.queue[0][1].w", "w"),
+    # formats
+    ("f'{1.0 / 3:d}'", "1.0 / 3"),
+    ("f'{len(self.queue):.2d}'", "len(self.queue)"),
     # functions and modules
     ("math.distance(self.goal, self.goal)", "distance"),
     ("from std_msgs import Bool, Float32\nBool, Float32", "Bool"),
     ("from nav_msgs.msg import Point, Pose\nPoint, Pose", "Point"),
 ]  # fmt: skip
 RIGHT = [
+    "spot = self.route.current\nif spot is not None:\n    spot.moved(1.0).x",
+    "best = max(self.clusters, key=lambda c: c.size, default=None)\nbest and best.size",
+    "first = next((c for c in self.clusters), Cluster(1.0, 2))\nfirst.x",
+    "Section(name='a', width=1.0)['width'], Section(name='a', width=1.0).get('name')",
+    "slices(3, 1.0)",
+    "f'{1.0:.2f} {len(self.queue):3d} {len(self.queue):.1f} {round(1.5):d} {1:e}'",
+    "a, b, c = self.parameters.goal",
     "client = self.action_clients.left if self.queue else self.action_clients.right\n"
     "await client.send_goal(Navigate.Goal())",
     "x, y, z = self.goal\na, b, c = range(3)\nself.times.append(1.0)",
