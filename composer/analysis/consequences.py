@@ -37,6 +37,8 @@ _OF_CONNECTIONS = frozenset(
         "unused-remapping",
     }
 )
+#: What depends on the names of nodes.
+_OF_NAMES = _OF_CONNECTIONS | {"missing-parameter", "unmatched-parameters"}
 #: Errors in the ports of a connection.
 _WRONG_ENDS = frozenset(
     {"unknown-node", "unknown-port", "wrong-port-kind", "port-connected-twice", "type-mismatch"}
@@ -85,14 +87,11 @@ class Consequences:
         wrong: dict[tuple[str, int], list[Diagnostic]] = {}
         for item in found:
             rules = _FOLLOWING.get(item.rule.name)
-            if "is not a folder" in item.message:
-                self._all |= _OF_FOLDERS
-            elif rules is not None and item.rule.name in _WITHOUT_NAMES:
-                self._all |= rules
-            elif _lacks_namespace(item):
-                self._all |= _OF_NAMESPACES
-            elif item.rule.name == "wrong-type" and not _TIMES.isdisjoint(quoted(item.message)):
-                self._all |= _OF_TIMES
+            everything = _left_out_of_all(item)
+            if everything:
+                self._all |= everything
+            elif item.rule.name == "unknown-variable":
+                self._add(_OF_NAMES, _names_with(quoted(item.message)[0], context))
             elif rules is not None:
                 self._add(rules, _names(item, context))
             if item.rule.name in _WRONG_ENDS or item.rule.name == "invalid-ros-name":
@@ -115,6 +114,18 @@ class Consequences:
             return True
         names = self._names.get(item.rule.name)
         return names is not None and not names.isdisjoint(_mentioned(item))
+
+
+def _left_out_of_all(item: Diagnostic) -> frozenset[str]:
+    """Return the rules whose reports may all follow from a mistake, whatever they mention."""
+    if "is not a folder" in item.message:
+        return _OF_FOLDERS
+    if item.rule.name in _WITHOUT_NAMES:
+        return _FOLLOWING[item.rule.name]
+    if _lacks_namespace(item):
+        return _OF_NAMESPACES
+    is_of_time = item.rule.name == "wrong-type" and not _TIMES.isdisjoint(quoted(item.message))
+    return _OF_TIMES if is_of_time else frozenset()
 
 
 def _is_of_namespace(span: Span) -> bool:
@@ -177,6 +188,14 @@ def _names(item: Diagnostic, context: Context) -> Iterator[str]:
             ports = {f"{node.name}.{port.name}": port for node in nodes for port in node.ports}
             known = (ports.get(name) for name in quoted(item.message))
             yield from (port.full_name for port in known if port is not None)
+
+
+def _names_with(variable: str, context: Context) -> Iterator[str]:
+    """Yield the nodes whose names a variable is missing in, and the names of their ports."""
+    written = f"${{{variable}}}"
+    unnamed = [node for node in context.system.nodes if written in node.name.value]
+    yield from (node.name.value for node in unnamed)
+    yield from _names_around(unnamed, context) if unnamed else ()
 
 
 def _is_inside(namespace: str, outer: str) -> bool:

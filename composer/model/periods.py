@@ -25,15 +25,20 @@ class PeriodError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """The time between two calls of a timer: a number, or an expression over ``parameters``."""
+    """The time between two calls of a timer: a number, or an expression over ``parameters``.
 
-    value: float | Expression
+    None: it is not known, since it is invalid or a load-time variable without a value.
+    """
+
+    value: float | Expression | None
     unit: PeriodUnit
     span: Span = field(compare=False)
 
     def evaluate(self, parameters: Mapping[str, object]) -> float:
         """Return the number in ``unit`` for the given parameter values. Raises PeriodError."""
         value: object = self.value
+        if value is None:
+            raise PeriodError(f"{self.unit} is not known")
         try:
             if isinstance(value, Expression):
                 value = value.evaluate({"parameters": parameters})

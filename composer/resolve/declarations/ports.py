@@ -173,16 +173,12 @@ def _timer(entry: Entry, diagnostics: list[Diagnostic]) -> Timer:
 
 
 def _period(tree: Mapping, span: Span, diagnostics: list[Diagnostic]) -> Period:
-    """Return the period of a timer.
-
-    If it is invalid (reported elsewhere) or has a load-time variable without value, return one
-    second to keep the timer in the model.
-    """
+    """Return the period of a timer, without a value if it is invalid (reported elsewhere)."""
     for unit in PeriodUnit:
         written = tree.get(unit.value)
         if written is not None:
             return _written_period(written, unit, diagnostics)
-    return Period(1000.0, PeriodUnit.MILLISECONDS, span)
+    return Period(None, PeriodUnit.MILLISECONDS, span)
 
 
 def _written_period(tree: Tree, unit: PeriodUnit, diagnostics: list[Diagnostic]) -> Period:
@@ -195,4 +191,4 @@ def _written_period(tree: Tree, unit: PeriodUnit, diagnostics: list[Diagnostic])
     if isinstance(compiled, Text):
         message = f"'{unit}' takes a number or one '{{expression}}', not text around it"
         diagnostics.append(Diagnostic(RULE, message, tree.span))
-    return Period(1000.0, PeriodUnit.MILLISECONDS, tree.span)
+    return Period(None, unit, tree.span)

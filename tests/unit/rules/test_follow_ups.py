@@ -20,6 +20,19 @@ def system(*nodes: str, connections: tuple[str, ...] = (), above: str = "") -> s
 
 
 MISTAKES = {
+    "a rate with an unknown variable is not known": (
+        system(
+            "talker: {"
+            "publishers: {out: {type: std_msgs/msg/String, qos: command, external: true}}, "
+            'timers: {tick: {rate_hz: "${rate}", publish: {out: {data: hello}}}}, '
+            "lifecycle: {watch: {topic_silence_ms: 1000}}}",
+        ),
+        ["unknown-variable"],
+    ),
+    "what sets the parameters of a node is not known if its name is not": (
+        system("motor_${name}: {for_each: {side: [left]}, parameters: {limit: {type: double}}}"),
+        ["unknown-variable"],
+    ),
     "a parameter file that is missing may set what a node needs": (
         system(
             "motor: {parameters: {limit: {type: double}}, on_activate: {log: started}}",
