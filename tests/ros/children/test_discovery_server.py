@@ -169,7 +169,7 @@ def test_a_killed_server_is_replaced(port: int, shared_domain_id: int, tmp_path:
             assert time.monotonic() < until_s
         assert servers(port) == []
         system.wait_for("is started again")
-        (successor,) = servers(port)
+        (successor,) = wait_until(lambda: servers(port), "the next server")
         assert successor != pid
         with observing("/move", *NODES, environment=environment(port)) as after:
             after.wait_until_ready()

@@ -334,7 +334,10 @@ def test_any_process_is_killed_fifty_times(
                 runs[name].process.wait()
                 runs[name] = start(name)
             else:
-                os.kill(int(local_systems()[f"/pipeline/{name}"]), signal.SIGKILL)
+                pid = local_systems()[f"/pipeline/{name}"]
+                os.kill(int(pid), signal.SIGKILL)
+                # Until then, the state before may still be reported.
+                wait_until(lambda pid=pid: pid not in local_systems().values(), "its end")
         wait_until(lambda: is_up(path), "all nodes", SOAK_PATIENCE_S)
         # Killed processes remain in the ROS graph for 20 s.
         external.spin_until(lambda: sorted(set(NODES) & set(names_of(external))) == sorted(NODES))
