@@ -19,9 +19,6 @@ _INTERFACE = re.compile(r"[a-z]\w*/(?:msg|srv|action)/[A-Za-z0-9]+")
 _NAMESPACE = re.compile(r"\bnamespace\b")
 #: What is only reported because nodes are not in their namespaces.
 _OF_NAMESPACES = frozenset({"duplicate-server", "port-connected-twice"})
-#: The keys of a timer, and what is wrong without them.
-_TIMES = frozenset({"period_ms", "rate_hz"})
-_OF_TIMES = frozenset({"silence-too-short"})
 _SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER})
 
 #: What depends on the names that connections give to ports.
@@ -122,10 +119,7 @@ def _left_out_of_all(item: Diagnostic) -> frozenset[str]:
         return _OF_FOLDERS
     if item.rule.name in _WITHOUT_NAMES:
         return _FOLLOWING[item.rule.name]
-    if _lacks_namespace(item):
-        return _OF_NAMESPACES
-    is_of_time = item.rule.name == "wrong-type" and not _TIMES.isdisjoint(quoted(item.message))
-    return _OF_TIMES if is_of_time else frozenset()
+    return _OF_NAMESPACES if _lacks_namespace(item) else frozenset()
 
 
 def _is_of_namespace(span: Span) -> bool:

@@ -53,6 +53,15 @@ def key_problems_of(
             span = span_of(item if is_here else node.slice, scope.home.source)
             yield CodeProblem(Kind.VALUE, message, span, hint)
             return
+    from composer.behavior_checks.parameter_values import (  # noqa: PLC0415 (start-up time)
+        parameter_values,
+    )
+
+    for value in parameter_values(node.slice, scope):
+        if value not in declared:
+            message = f"'{ast.unparse(node.value)}' has no key {value!r} for this parameter"
+            yield CodeProblem(Kind.VALUE, message, span_of(node.slice, scope.home.source))
+            return
 
 
 def member_key_problems_of(

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from composer.behavior_checks.fitting import kind_of, shown
+from composer.behavior_checks.parameter_values import parameter_values
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -138,7 +139,7 @@ def enumeration_problems(
 ) -> Iterator[CodeProblem]:
     """Yield the value that no member of an enumeration has, as in ``Mode("fastt")``."""
     given = call.args[0] if len(call.args) == 1 and not call.keywords else None
-    if not isinstance(given, ast.Constant) or not is_enumeration(own, *_PLAIN_ENUMS):
+    if given is None or not is_enumeration(own, *_PLAIN_ENUMS):
         return
     family = lineage(own)
     values: list[object] = []
@@ -153,8 +154,11 @@ def enumeration_problems(
                     pass
                 case _:
                     return
-    if values and given.value not in values:
-        message = f"no member of '{own.definition.name}' has the value {ast.unparse(given)}"
+    expected = [given.value] if isinstance(given, ast.Constant) else parameter_values(given, scope)
+    missing = [item for item in expected if item not in values] if values else []
+    if missing:
+        message = f"no member of '{own.definition.name}' has the value {missing[0]!r}"
+        message += "" if isinstance(given, ast.Constant) else " of this parameter"
         yield CodeProblem(Kind.VALUE, message, span_of(given, scope.home.source))
 
 

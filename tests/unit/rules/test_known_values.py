@@ -1,4 +1,4 @@
-"""Lists and parameters whose length is known, and what is read from them."""
+"""What code reads from lists of a known length and with the known values of parameters."""
 
 from __future__ import annotations
 
@@ -17,10 +17,25 @@ nodes:
     parameters:
       gains: {type: double_array, default: [1.0, 2.0]}
       limits: {type: double_array, default: [1.0, 2.0]}
+      mode: {type: string, default: fast, choices: [fast, slow]}
       sections: {type: bool_array, default: [true, true, true]}
 """
 CODE = """\
+from enum import Enum
+
 from composer.behavior import Behavior
+
+FACTORS = {"fast": 2.0, "slow": 1.0}
+FACTOR = {"fast": 2.0}
+
+
+class Mode(Enum):
+    FAST = "fast"
+    SLOW = "slow"
+
+
+class FastMode(Enum):
+    FAST = "fast"
 
 
 class Code(Behavior):
@@ -44,6 +59,12 @@ GUARD = "if len(self.parameters.{}) != 3:\n    raise ValueError\n"
         # the length of another parameter does not limit this one
         (GUARD.format("sections") + "a, b, c = self.parameters.gains", "self.parameters.gains"),
         (GUARD.format("sections") + "self.parameters.gains[2]", "2"),
+        # a choice that is not a key, or not the value of a member
+        ("FACTOR[self.parameters.mode]", "self.parameters.mode"),
+        (
+            "self.mode = FastMode(self.parameters.mode)\nif self.mode is FastMode.FAST:\n    pass",
+            "self.parameters.mode",
+        ),
     ],
 )
 def test_what_a_known_length_contradicts_is_found(
@@ -56,6 +77,11 @@ def test_what_a_known_length_contradicts_is_found(
     "statement",
     [
         GUARD.format("gains") + "a, b, c = self.parameters.gains",
+        "FACTORS[self.parameters.mode], Mode(self.parameters.mode)",
+        "if self.parameters.mode != 'slow':\n    FACTOR[self.parameters.mode]",
+        "mode = self.parameters.mode\nif mode == 'fast':\n    FastMode(self.parameters.mode)",
+        "try:\n    FACTOR[self.parameters.mode]\nexcept KeyError:\n    pass",
+        "try:\n    FastMode(self.parameters.mode)\nexcept ValueError:\n    pass",
         "if len(self.parameters.limits) > 2:\n    self.parameters.gains[2]",  # one for each
         "for values in (self.parameters.gains,):\n"
         "    if len(values) > 2:\n        self.parameters.gains[2]",
