@@ -341,10 +341,14 @@ def _identity(diagnostic: Diagnostic) -> _Identity:
     return (diagnostic.rule.code, str(diagnostic.primary))
 
 
+#: Rules whose diagnostics may be about node types, also those that were left out as follow-ups.
+_HIDING_NODE_TYPES = ("bad-setting", "unknown-base", "unknown-node-type")
+
+
 def _lacks_node_types(result: LoadResult) -> bool:
     """Return whether a system may use node types that are not in its model."""
     rules = {diagnostic.rule.name for diagnostic in result.diagnostics}
-    return result.system is None or not rules.isdisjoint(("unknown-node-type", "unknown-base"))
+    return result.system is None or not rules.isdisjoint(_HIDING_NODE_TYPES)
 
 
 def project_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:

@@ -41,6 +41,7 @@ _WRONG_ENDS = frozenset(
     {"unknown-node", "unknown-port", "wrong-port-kind", "port-connected-twice", "type-mismatch"}
 )
 #: What may only be reported because a folder of the project is missing.
+_OF_NODE_FOLDERS = frozenset({"unknown-node-type"})
 _OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-import"})
 #: Rules, and others whose reports may follow from theirs. A warning does not hide errors: they may
 #: have another cause, and the system would run with them.
@@ -116,7 +117,7 @@ class Consequences:
 def _left_out_of_all(item: Diagnostic) -> frozenset[str]:
     """Return the rules whose reports may all follow from a mistake, whatever they mention."""
     if "is not a folder" in item.message:
-        return _OF_FOLDERS
+        return _of_folder(item.primary)
     if item.rule.name in _WITHOUT_NAMES:
         return _FOLLOWING[item.rule.name]
     return _OF_NAMESPACES if _lacks_namespace(item) else frozenset()
@@ -124,6 +125,14 @@ def _left_out_of_all(item: Diagnostic) -> frozenset[str]:
 
 def _is_of_namespace(span: Span) -> bool:
     return _NAMESPACE.search(span.file.line(span.line)[: span.column]) is not None
+
+
+def _of_folder(span: Span) -> frozenset[str]:
+    """Return what may follow from a folder that is missing: of interfaces, of node types or any."""
+    line = span.file.line(span.line)
+    if "interfaces" in line:
+        return _OF_FOLDERS
+    return _OF_NODE_FOLDERS if "nodes" in line else _OF_FOLDERS | _OF_NODE_FOLDERS
 
 
 def _lacks_namespace(item: Diagnostic) -> bool:

@@ -133,6 +133,11 @@ def _renamed(item: Diagnostic, context: Context) -> tuple[str, ...] | None:
             interface = _INTERFACE.match(item.message)
             is_own = interface is not None and context.interfaces.source_folder(f"{interface[1]}/")
             return ("field", item.message) if is_own else None
+        case "unknown-interface" | "unknown-import" | "module-not-installed":
+            package = _named(item)[-1].partition("/")[0]
+            is_missing = item.message.startswith("no module named") or "/" in _named(item)[-1]
+            is_unknown = package not in context.interfaces.packages() and "." not in package
+            return ("package", package) if is_missing and is_unknown else None
         case "unknown-variable":
             return ("variable", item.primary.file.path, item.message)
         case "unknown-port" if item.hint is not None:  # the ports that the node has instead

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.support.checking import rules_broken
+from composer.loading import collect_diagnostics, load_files, project_diagnostics
+from tests.unit.support.checking import diagnostics_in, rules_broken
 
 TWIST = "geometry_msgs/msg/Twist"
 SYSTEM = """\
@@ -91,3 +92,28 @@ def test_a_misspelled_namespace_of_an_include_is_reported_once(tmp_path: Path) -
         "prefix: '${name}_'}\n"
     )
     assert rules_broken(text, tmp_path) == ["unknown-key"]
+
+
+def test_a_package_that_is_missing_is_reported_once_with_all_uses(tmp_path: Path) -> None:
+    (tmp_path / "drive.py").write_text(
+        "from arm_msgs.msg import Grip\nfrom arm_msgs.srv import Move\n\n\nclass Drive:\n"
+        "    def on_grip(self, message):\n        print(Grip, Move)\n",
+        encoding="utf-8",
+    )
+    text = (
+        "system: demo\nnodes:\n  drive:\n    behavior: drive:Drive\n    subscriptions:\n"
+        "      grip: {type: arm_msgs/msg/Grip, qos: command, external: true}\n"
+        "    clients: {move: {type: arm_msgs/srv/Move, external: true}}\n"
+    )
+    [found] = diagnostics_in(text, tmp_path)
+    assert len(found.related) >= len(["the other import", "the port", "the client"])
+
+
+def test_a_missing_folder_of_node_types_is_reported_once(tmp_path: Path) -> None:
+    (tmp_path / "composer.yaml").write_text("nodes: [node_types]\n", encoding="utf-8")
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "nodes" / "motor.yaml").write_text("node: motor\non_activate: {log: started}\n")
+    (tmp_path / "system.yaml").write_text("system: demo\nnodes: {motor: {type: motor}}\n")
+    results = load_files([tmp_path / "system.yaml", tmp_path / "nodes" / "motor.yaml"])
+    found = [*collect_diagnostics(results), *project_diagnostics(results)]
+    assert [item.rule.name for item in found] == ["bad-setting"]
