@@ -154,6 +154,9 @@ def argument_problem(
         return f"{shown(found)} where {shown(expected)} is expected"
     if _are_related(found, expected):
         return None
+    is_enum = isinstance(expected, OwnObject) and is_enumeration(expected.of)
+    if is_enum and is_float(found):  # an int may stand for a member of an IntEnum
+        return f"{shown(found)} where {shown(expected)} is expected"
     if kind is not None and wanted is not None and kind != wanted:
         return f"{shown(found)} where {shown(expected)} is expected"
     if not isinstance(expected, Collection):

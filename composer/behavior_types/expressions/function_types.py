@@ -30,6 +30,7 @@ from composer.behavior_types.syntax.names import (
     function_named,
     interface_name,
 )
+from composer.behavior_types.syntax.rebound_names import old_values
 from composer.behavior_types.values import (
     NONE,
     ApiValue,
@@ -76,6 +77,7 @@ class FunctionTypes:
     #: The names that are not of the type that they have at first.
     _changing: set[str] = field(default_factory=set)
     _is_started: bool = False
+    _old_values: dict[int, Binding] | None = None
 
     def type_of(self, node: ast.expr) -> Value:
         """Return the type of an expression, ANYTHING if it is unknown."""
@@ -145,8 +147,9 @@ class FunctionTypes:
             case ast.JoinedStr():
                 return STRING
             case ast.Name(id=name):
-                caught = self.bindings.uses.get(id(node)) or self._caught(node)
-                return self.name(name) if caught is None else self.bound(caught)
+                only = self.bindings.uses.get(id(node)) or self._caught(node)
+                only = only or self._old_value(node)
+                return self.name(name) if only is None else self.bound(only)
             case ast.Attribute(value=value):
                 name = dotted(node)
                 found = self._global(name) if name else ANYTHING
@@ -181,6 +184,13 @@ class FunctionTypes:
             if item.expression is not None and item.expression.lineno <= node.lineno
         ]
         return earlier[-1] if earlier else None
+
+    def _old_value(self, node: ast.Name) -> Binding | None:
+        """Return what a name is bound to where its new value is computed from it."""
+        if self._old_values is None:
+            function = self.function if self.bindings.computed else None
+            self._old_values = {} if function is None else old_values(function, self.bindings)
+        return self._old_values.get(id(node))
 
     def name(self, name: str) -> Value:
         """Return the type of a name."""

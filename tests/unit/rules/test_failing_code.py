@@ -44,6 +44,8 @@ SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_m
         ("PoseStamped().pose.position = self.find('a')", "unchecked-none", "self.find('a')"),
         ("high = self.highest()\nPoint(x=high)", "unchecked-none", "high"),
         ("high = self.highest()\n1.0 + high", "unchecked-none", "high"),
+        # a name that its own new value is computed from
+        ("place = PoseStamped()\nplace = self.use(place)", "call-arguments", "place"),
         # functions that are called with other arguments
         ("sorted(Path().poses, key=lambda: 1)", "call-arguments", "lambda: 1"),
         ("[1].sort(key=lambda a, b: a - b)", "call-arguments", "lambda a, b: a - b"),
@@ -81,6 +83,10 @@ def test_it_is_reported_once(statement: str, rule: str, text: str, tmp_path: Pat
         "list(map(lambda a, b: a, [1], [2])), sorted([1], key=str), min([1], key=self.find)",
         "a, b = 'ab'",
         "found = self.ends('a')\nif found is not None:\n    a, b = found",
+        "place = Point()\nplace = self.use(place)\nplace + 1.0",
+        "place = Point()\nfor _ in 'ab':\n    place = place.upper() if place else 'a'",
+        "text = 5\nwhile text:\n    text = str(text).upper() or text.upper()",
+        "text = self.parameters.names\ntext = text[0] if isinstance(text, list) else text.upper()",
         "longest = self.longest()\n'a' + longest",
         "near = self.find('a')\nif near:\n    self.use(near)",
         "near = self.find('a')\nself.show(near)\nself.keep(near)\nself.look(near)",

@@ -21,7 +21,7 @@ nodes:
       sections: {type: bool_array, default: [true, true, true]}
 """
 CODE = """\
-from enum import Enum
+from enum import Enum, IntEnum
 
 from composer.behavior import Behavior
 
@@ -38,7 +38,15 @@ class FastMode(Enum):
     FAST = "fast"
 
 
+class Leg(IntEnum):
+    LEFT = 0
+    RIGHT = 1
+
+
 class Code(Behavior):
+    def side(self, leg: Leg) -> int:
+        return leg
+
     def on_tick(self):
         {statement}
 """
@@ -59,6 +67,8 @@ GUARD = "if len(self.parameters.{}) != 3:\n    raise ValueError\n"
         # the length of another parameter does not limit this one
         (GUARD.format("sections") + "a, b, c = self.parameters.gains", "self.parameters.gains"),
         (GUARD.format("sections") + "self.parameters.gains[2]", "2"),
+        # a float is not a member
+        ("self.side(self.clock.now())", "self.clock.now()"),
         # a choice that is not a key, or not the value of a member
         ("FACTOR[self.parameters.mode]", "self.parameters.mode"),
         (
@@ -77,6 +87,7 @@ def test_what_a_known_length_contradicts_is_found(
     "statement",
     [
         GUARD.format("gains") + "a, b, c = self.parameters.gains",
+        "self.side(Leg.LEFT), self.side(1), [self.side(leg) for leg in Leg]",
         "FACTORS[self.parameters.mode], Mode(self.parameters.mode)",
         "if self.parameters.mode != 'slow':\n    FACTOR[self.parameters.mode]",
         "mode = self.parameters.mode\nif mode == 'fast':\n    FastMode(self.parameters.mode)",
