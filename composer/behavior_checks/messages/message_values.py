@@ -19,7 +19,7 @@ from composer.behavior_types.scalars import is_float, is_integer, is_number
 from composer.behavior_types.values import Pending, Value
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
-from composer.field_types import described
+from composer.field_types import BOOL, described
 from composer.interfaces import Field, FieldType, Message
 from composer.source import Span
 
@@ -102,6 +102,8 @@ class ValueChecker:
                 yield first
                 return
         problem = value_problem(node, found, expected, self.scope.owner.interfaces)
+        if problem is None and expected == BOOL and "numpy" in self.scope.home.source.text:
+            problem = _of_numpy(node, self.scope)
         if problem is None and isinstance(expected, FieldType):
             problem = _dimensions(node, expected, self.scope)
         if problem is None and isinstance(expected, FieldType):
@@ -136,6 +138,14 @@ def _repeated(node: ast.expr) -> ast.expr:
             return display
         case _:
             return node
+
+
+def _of_numpy(node: ast.expr, scope: FunctionTypes) -> tuple[str, str | None] | None:
+    from composer.behavior_checks.messages.numpy_values import (  # noqa: PLC0415 (start-up time)
+        numpy_problem,
+    )
+
+    return numpy_problem(node, scope)
 
 
 def _dimensions(

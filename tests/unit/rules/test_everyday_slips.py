@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 from geometry_msgs.msg import Point
 from sensor_msgs.msg import CameraInfo, Image, LaserScan
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 
 
 class Mode(Enum):
@@ -86,6 +86,9 @@ MISTAKES = [
     ("self.scan.ranges / 2.0", "self.scan.ranges / 2.0"),
     ("1 - self.scan.ranges", "1 - self.scan.ranges"),
     ("Image(data=self.pixels())", "self.pixels()"),
+    ("Bool(data=np.any(self.pixels() > 1))", "np.any(self.pixels() > 1)"),
+    ("Bool(data=self.pixels().any())", "self.pixels().any()"),
+    ("high = np.max(self.pixels())\nBool().data = high > 1.0", "high > 1.0"),
     # conversions
     ("float(self.point)", "self.point"),
     ("int(self.row)", "self.row"),
@@ -116,6 +119,8 @@ MISTAKES = [
 RIGHT = [
     "self.clock.now() - 1.0, self.name.upper() + 'a'",
     "for name, task in self.by_name.items():\n    task.label()",
+    "Bool(data=bool(np.any(self.pixels()))), Bool(data=not np.any(self.row))",
+    "Bool(data=np.any is None), Bool(data=any(self.row)), Bool(data=max(self.row) > 1.0)",
     "self.row[0], self.row[-1:], self.row[True], self.scan.ranges[0], self.name[0]",
     "Mode['FAST'], Mode('fast'), Mode.__members__['FAST']",
     "self.row.sort()\nself.tasks.append(Task('a'))\nself.tasks.pop(0)",
