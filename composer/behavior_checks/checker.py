@@ -154,6 +154,16 @@ def _checkers(types: BehaviorTypes, source: BehaviorSource) -> Iterator[_Functio
                     yield _FunctionChecker(types, scope, method.node)
 
 
+def _index_problems(
+    node: ast.Subscript, function: Function, scope: FunctionTypes
+) -> Iterator[CodeProblem]:
+    from composer.behavior_checks.operations.known_indices import (  # noqa: PLC0415 (start-up time)
+        index_problems,
+    )
+
+    return index_problems(node, function, scope)
+
+
 @dataclass(frozen=True, slots=True)
 class _FunctionChecker:
     types: BehaviorTypes
@@ -202,6 +212,8 @@ class _FunctionChecker:
                     yield from self._index(node)
                     yield from key_problems_of(node, self.function, self.scope)
                     yield from member_key_problems_of(node, self.function, self.scope)
+                    if not isinstance(node.slice, ast.Constant | ast.Slice):
+                        yield from _index_problems(node, self.function, self.scope)
                 case ast.Call():
                     yield from calls.problems(node)
                 case ast.Assign(targets=[target], value=value):

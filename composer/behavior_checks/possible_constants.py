@@ -21,13 +21,14 @@ def possible_constants(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.exp
     for item in _written(node, scope):
         yield item
         if isinstance(item, ast.Name):
-            yield from _passed(item, scope)
+            for given, outside in passed(item, scope):
+                yield from _written(given, outside)
 
 
 def _written(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
     """Yield the same without calls: for the name of a loop, what it iterates over."""
     for item in possible_values(node, scope):
-        binding = _only_binding(item, scope)
+        binding = only_binding(item, scope)
         is_element = binding is not None and binding.how is How.ELEMENT and not binding.positions
         if is_element and binding is not None and binding.expression is not None:
             yield from _elements(binding.expression, scope) or [item]
@@ -35,7 +36,7 @@ def _written(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
             yield item
 
 
-def _only_binding(node: ast.expr, scope: FunctionTypes) -> Binding | None:
+def only_binding(node: ast.expr, scope: FunctionTypes) -> Binding | None:
     """Return the binding of a name that has only one, None for others and other expressions."""
     if not isinstance(node, ast.Name):
         return None
@@ -64,9 +65,9 @@ def _compares(function: Function, name: str) -> bool:
     )
 
 
-def _passed(node: ast.Name, scope: FunctionTypes) -> Iterator[ast.expr]:
-    """Yield what calls of a function pass for an argument, not what they get from further calls."""
-    binding, function, name = _only_binding(node, scope), scope.function, node.id
+def passed(node: ast.Name, scope: FunctionTypes) -> Iterator[tuple[ast.expr, FunctionTypes]]:
+    """Yield what calls of a function pass for an argument, each with its scope."""
+    binding, function, name = only_binding(node, scope), scope.function, node.id
     if binding is None or binding.how is not How.ANNOTATION:
         return
     if function is None or _compares(function, name):
@@ -95,4 +96,4 @@ def _passed(node: ast.Name, scope: FunctionTypes) -> Iterator[ast.expr]:
             given = dict(zip(names[1 if is_bound else 0 :], call.args, strict=False))
             given.update({item.arg: item.value for item in call.keywords if item.arg})
             if name in given and not any(isinstance(item, ast.Starred) for item in call.args):
-                yield from _written(given[name], outside)
+                yield given[name], outside

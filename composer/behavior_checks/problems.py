@@ -26,7 +26,7 @@ class Kind(Enum):
     UNUSED = "a comparison or a function whose value is not used"
     ASYNCIO = "an awaited function of asyncio"
     RETURN = "a function that may not return what its annotation says"
-    INDEX = "an element that an array parameter does not have"
+    INDEX = "an element that a list or an array parameter does not have"
     CHANGED = "an attribute that gets a value of another kind"
     NONE = "a value that may be None"
     ANNOTATION = "a handler that annotates its argument with another type"
@@ -60,7 +60,7 @@ class CodeProblem:
 
 
 #: The kinds of which one wrong value causes several.
-_OF_VALUES = frozenset({Kind.CALL, Kind.FIELD, Kind.VALUE})
+_OF_VALUES = frozenset({Kind.CALL, Kind.FIELD, Kind.INDEX, Kind.VALUE})
 
 
 def distinct(problems: Iterable[CodeProblem]) -> Iterator[CodeProblem]:

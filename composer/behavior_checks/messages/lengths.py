@@ -11,13 +11,16 @@ from composer.behavior_source.flow import returned_values
 from composer.behavior_types.expressions.fillings import fillings_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.expressions.objects import has_plain_result
+from composer.behavior_types.libraries.numpy_types import ARRAY
 from composer.behavior_types.syntax.bindings import How, nodes_of
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.names import constant_named
+from composer.behavior_types.syntax.own_classes import is_enumeration, member_values
 from composer.behavior_types.values import (
     Collection,
     InterfaceClass,
     ModuleFunction,
+    OwnClass,
     OwnMethod,
     Parameters,
     Self,
@@ -41,7 +44,20 @@ def length_of(node: ast.expr, scope: FunctionTypes, depth: int = 0) -> Length:
         return _exactly(len(found.items))
     if isinstance(found, FieldType) and found.array_size is not None:
         return _exactly(found.array_size)
-    return _of_syntax(node, scope, depth + 1) if depth < _DEEPEST else _UNKNOWN
+    if isinstance(found, OwnClass) and is_enumeration(found):
+        members = member_values(found)
+        return _exactly(len({ast.unparse(x) for x in members.values()})) if members else _UNKNOWN
+    length = _of_syntax(node, scope, depth + 1) if depth < _DEEPEST else _UNKNOWN
+    return _of_array(node, scope) if found == ARRAY and length == _UNKNOWN else length
+
+
+def _of_array(node: ast.expr, scope: FunctionTypes) -> Length:
+    from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+        shape_of,
+    )
+
+    shape = shape_of(node, scope)
+    return _exactly(shape[0]) if shape else _UNKNOWN
 
 
 def _of_syntax(node: ast.expr, scope: FunctionTypes, depth: int) -> Length:
@@ -85,6 +101,9 @@ def _of_syntax(node: ast.expr, scope: FunctionTypes, depth: int) -> Length:
 
 def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Length:
     called = scope.called_name(call.func)
+    match call.func:
+        case ast.Attribute(value=array, attr="tolist") if not call.args:
+            return length_of(array, scope, depth)
     if called in _KEEPING and call.args:
         return length_of(call.args[0], scope, depth)
     if called == "range" and len(call.args) == 1:

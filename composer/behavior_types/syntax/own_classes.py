@@ -227,6 +227,22 @@ def is_enumeration(owner: OwnClass, *bases: str) -> bool:
     return not lineage(owner).others.isdisjoint(bases or ENUMS)
 
 
+def member_values(owner: OwnClass) -> dict[str, ast.expr] | None:
+    """Return the values of the members of an enumeration, by name; None if they are computed."""
+    if len(lineage(owner).classes) != 1 or defines(owner, "__new__"):
+        return None
+    found: dict[str, ast.expr] = {}
+    for statement in owner.definition.node.body:
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Constant() as value):
+                found[name] = value
+            case ast.Expr() | ast.Pass() | ast.FunctionDef():
+                pass
+            case _:
+                return None
+    return found
+
+
 def is_named_tuple(owner: OwnClass) -> bool:
     """Return whether a class is a NamedTuple."""
     family = lineage(owner)

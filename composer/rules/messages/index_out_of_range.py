@@ -18,9 +18,9 @@ RULE = register(
         code="RC308",
         name="index-out-of-range",
         severity=Severity.WARNING,
-        summary="An element of an array parameter is read that does not exist.",
+        summary="An element of a list or an array parameter is read that does not exist.",
         why=(
-            "Reading it fails, unless the parameter is set to a longer array "
+            "Reading it fails, unless a parameter is set to a longer array "
             "while the node runs. Indices count from 0."
         ),
         bad="""\

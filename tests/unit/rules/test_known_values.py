@@ -23,7 +23,9 @@ nodes:
 CODE = """\
 from enum import Enum, IntEnum
 
+import numpy as np
 from composer.behavior import Behavior
+from sensor_msgs.msg import Imu
 
 FACTORS = {"fast": 2.0, "slow": 1.0}
 FACTOR = {"fast": 2.0}
@@ -41,9 +43,21 @@ class FastMode(Enum):
 class Leg(IntEnum):
     LEFT = 0
     RIGHT = 1
+    MIDDLE = 2
 
 
 class Code(Behavior):
+    def on_configure(self):
+        self.row = [1.0, 2.0]
+
+    def third(self, message) -> int | None:
+        if message:
+            return 2
+        return None
+
+    def read(self, index: int) -> float:
+        return self.row[index]
+
     def side(self, leg: Leg) -> int:
         return leg
 
@@ -67,6 +81,20 @@ GUARD = "if len(self.parameters.{}) != 3:\n    raise ValueError\n"
         # the length of another parameter does not limit this one
         (GUARD.format("sections") + "a, b, c = self.parameters.gains", "self.parameters.gains"),
         (GUARD.format("sections") + "self.parameters.gains[2]", "2"),
+        # an index beyond the end
+        ("index = self.third(1)\nif index is not None:\n    self.row[index]", "index"),
+        ("for index in (0, 1, 2):\n    self.row[index]", "index"),
+        (
+            "raw = np.zeros(3)\nfor at, name in ((0, 'a'), (2, 'b')):\n    raw[at + 1] = 1.0",
+            "at + 1",
+        ),
+        ("[self.row[index] for index in range(3)]", "index"),
+        ("self.row[Leg.MIDDLE]", "Leg.MIDDLE"),
+        ("[self.row[leg] for leg in Leg]", "leg"),
+        ("self.read(2)", "index"),
+        # as many items as an enumeration has members, and as an array of numpy
+        ("Imu().orientation_covariance = [1.0 for leg in Leg]", "[1.0 for leg in Leg]"),
+        ("Imu().orientation_covariance = np.zeros(3).tolist()", "np.zeros(3).tolist()"),
         # a float is not a member
         ("self.side(self.clock.now())", "self.clock.now()"),
         # a choice that is not a key, or not the value of a member
@@ -88,6 +116,15 @@ def test_what_a_known_length_contradicts_is_found(
     [
         GUARD.format("gains") + "a, b, c = self.parameters.gains",
         "self.side(Leg.LEFT), self.side(1), [self.side(leg) for leg in Leg]",
+        "self.row[Leg.RIGHT], self.row[-1], self.read(1), [self.row[index] for index in range(2)]",
+        "for index in (0, 1, 2):\n    if index < 2:\n        self.row[index]",
+        "for index in (0, 1, 2):\n    self.row[index]\n    if index == 1:\n        break",
+        "for index, name in ((0, 'a'), (2, 'b')):\n    if name == 'a':\n        self.row[index]",
+        "try:\n    [self.row[index] for index in range(3)]\nexcept IndexError:\n    pass",
+        "[self.row[leg] for leg in Leg if leg != Leg.MIDDLE]",
+        "index = self.third(1)\nif index:\n    self.row[index]",
+        "row = [1.0]\nrow.append(2.0)\nfor index in range(2):\n    row[index]",
+        "Imu().orientation_covariance = np.zeros(9).tolist()",
         "FACTORS[self.parameters.mode], Mode(self.parameters.mode)",
         "if self.parameters.mode != 'slow':\n    FACTOR[self.parameters.mode]",
         "mode = self.parameters.mode\nif mode == 'fast':\n    FastMode(self.parameters.mode)",
