@@ -26,7 +26,7 @@ def set_from_outside(types: BehaviorTypes) -> Iterator[str]:
         for node in walk(home.tree.body, closed=_FUNCTIONS):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
                 yield node.attr
-    for scope, function in _functions(types):
+    for scope, function in functions_of(types):
         for node in nodes_of(function):
             match node:
                 case ast.Attribute(value=owner, attr=name, ctx=ast.Store()) if name in names:
@@ -34,7 +34,8 @@ def set_from_outside(types: BehaviorTypes) -> Iterator[str]:
                         yield name
 
 
-def _functions(types: BehaviorTypes) -> Iterator[tuple[FunctionTypes, Function]]:
+def functions_of(types: BehaviorTypes) -> Iterator[tuple[FunctionTypes, Function]]:
+    """Yield all functions and methods of the files, each with its types."""
     own = {id(known) for _, known in types.source.classes}
     for home in types.source.own_modules:
         for item in home.tree.body:

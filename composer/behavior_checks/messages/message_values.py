@@ -19,7 +19,7 @@ from composer.behavior_types.scalars import is_float, is_integer, is_number
 from composer.behavior_types.values import Pending, Value
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
-from composer.field_types import BOOL, described
+from composer.field_types import ANYTHING, BOOL, described
 from composer.interfaces import Field, FieldType, Message
 from composer.source import Span
 
@@ -160,7 +160,9 @@ def _dimensions(
     is_list = isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "tolist"
     if is_list and isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
         node = node.func.value
-    if scope.type_of(node) != ARRAY:
+    found = scope.type_of(node)
+    is_attribute = is_list and isinstance(node, ast.Attribute) and found is ANYTHING
+    if found != ARRAY and not is_attribute:
         return None
     from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
         rank_of,

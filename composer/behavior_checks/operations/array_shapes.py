@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Sequence
 
+from composer.behavior_source import Function
 from composer.behavior_source.flow import returned_values
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.numpy_names import Generator
 from composer.behavior_types.libraries.numpy_types import OF_GENERATORS
+from composer.behavior_types.outside_assignments import functions_of
 from composer.behavior_types.scalars import is_number
+from composer.behavior_types.syntax.bindings import How, bindings_of, nodes_of, reads_attribute
+from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.names import value_named
-from composer.behavior_types.values import BuiltinObject, ModuleFunction, OwnMethod
+from composer.behavior_types.values import (
+    BuiltinObject,
+    ModuleFunction,
+    OwnClass,
+    OwnMethod,
+    OwnObject,
+    Self,
+)
 from composer.field_types import ANYTHING
+from composer.interfaces import Message
 
 Shape = tuple[int, ...]
 _FROM_LISTS = frozenset({"numpy.array", "numpy.asarray"})
@@ -56,6 +69,10 @@ def rank_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> int 
         case ast.Name(id=name):
             value = scope.bindings.value_of(name)
             return None if value is None else rank_of(value, scope, depth - 1)
+        case ast.Attribute(value=owner, attr=name):
+            object_ = scope.type_of(owner)
+            if isinstance(object_, OwnObject):
+                return _rank_of_attribute(object_.of, name, scope, depth)
         case ast.Call(func=function, args=[ast.Tuple() as sizes, *_]) if (
             scope.called_name(function) in _FILLED
         ):
@@ -77,6 +94,36 @@ def rank_of(node: ast.expr, scope: FunctionTypes, depth: int = _DEEPEST) -> int 
                     if len(values) == 1 and inside is not None:
                         return rank_of(values[0], inside, depth - 1)
     return None
+
+
+def _rank_of_attribute(own: OwnClass, name: str, scope: FunctionTypes, depth: int) -> int | None:
+    """Return the rank that an attribute has at first; what is computed from it has the same."""
+    types = scope.owner
+    is_alone = len(lineage(own).classes) == 1 and not types.project_classes.derived(own)
+    methods = [method.node for method in own.definition.methods if method.node is not None]
+    if not is_alone or _sets_outside(name, methods, scope):
+        return None
+    ranks: set[int | None] = set()
+    for method in methods:
+        bindings = bindings_of(method)
+        for binding in bindings.attributes.get(name, ()):
+            inside = types.function(method, own.home, own)
+            if binding.how is not How.VALUE or binding.positions or binding.expression is None:
+                return None
+            if not reads_attribute(binding.expression, bindings.receiver, name):
+                ranks.add(rank_of(binding.expression, inside, depth - 1))
+    return ranks.pop() if len(ranks) == 1 else None
+
+
+def _sets_outside(name: str, methods: Sequence[Function], scope: FunctionTypes) -> bool:
+    """Return whether other functions than these methods set an attribute of such a name."""
+    for inside, function in functions_of(scope.owner):
+        for node in nodes_of(function) if function not in methods else ():
+            match node:
+                case ast.Attribute(value=owner, attr=attr, ctx=ast.Store()) if attr == name:
+                    if not isinstance(inside.type_of(owner), Message | Self):
+                        return True
+    return False
 
 
 def _count(sizes: ast.expr) -> int | None:
@@ -128,6 +175,9 @@ def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Shape | None:
         sizes = first.elts if isinstance(first, ast.Tuple | ast.List) else [first]
         known = [size for size in map(integer_constant, sizes) if size is not None]
         return tuple(known) if len(known) == len(sizes) else None
+    if first is not None and name == "numpy.diag" and len(call.args) == 1:
+        found = shape_of(first, scope, depth - 1)
+        return (*found, *found) if found is not None and len(found) == 1 else None
     if first is not None and name in _SQUARE and len(call.args) == 1:
         size = integer_constant(first)
         has_more = any(item.arg in {"M", None} for item in call.keywords)

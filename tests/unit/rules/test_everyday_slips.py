@@ -16,7 +16,7 @@ from enum import Enum
 
 import numpy as np
 from geometry_msgs.msg import Point
-from sensor_msgs.msg import CameraInfo, Image, LaserScan
+from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 from std_msgs.msg import Bool, String
 
 
@@ -32,8 +32,18 @@ class Task:
         return self.name
 
 
+class Filter:
+    def __init__(self):
+        self.covariance = np.diag([1.0, 1.0, 1.0])
+        self.state = np.zeros(9)
+
+    def predict(self, change):
+        self.covariance = change @ self.covariance @ change.T
+
+
 class Code:
     def on_configure(self):
+        self.filter = Filter()
         self.tasks: list[Task] = []
         self.by_name: dict[str, Task] = {}
         self.mode = Mode.FAST
@@ -86,6 +96,8 @@ MISTAKES = [
     ("self.scan.ranges / 2.0", "self.scan.ranges / 2.0"),
     ("1 - self.scan.ranges", "1 - self.scan.ranges"),
     ("Image(data=self.pixels())", "self.pixels()"),
+    ("Imu().orientation_covariance = self.filter.covariance.tolist()",
+     "self.filter.covariance.tolist()"),
     ("Bool(data=np.any(self.pixels() > 1))", "np.any(self.pixels() > 1)"),
     ("Bool(data=self.pixels().any())", "self.pixels().any()"),
     ("high = np.max(self.pixels())\nBool().data = high > 1.0", "high > 1.0"),
@@ -119,6 +131,8 @@ MISTAKES = [
 RIGHT = [
     "self.clock.now() - 1.0, self.name.upper() + 'a'",
     "for name, task in self.by_name.items():\n    task.label()",
+    "Imu().orientation_covariance = self.filter.covariance.ravel().tolist()",
+    "Imu().orientation_covariance = self.filter.state.tolist()",
     "Bool(data=bool(np.any(self.pixels()))), Bool(data=not np.any(self.row))",
     "Bool(data=np.any is None), Bool(data=any(self.row)), Bool(data=max(self.row) > 1.0)",
     "self.row[0], self.row[-1:], self.row[True], self.scan.ranges[0], self.name[0]",
