@@ -84,8 +84,10 @@ def _texts(facts: Mapping[str, str | None]) -> dict[str, Any]:
 def _packages() -> dict[str, str]:
     found: dict[str, str] = {}
     for distribution in distributions():
-        metadata = distribution.metadata  # empty after an installation that was interrupted
-        name = (metadata["Name"] or "").lower().replace("_", "-")
+        metadata = distribution.metadata
+        if "Name" not in metadata:  # an installation was interrupted
+            continue
+        name = metadata["Name"].lower().replace("_", "-")
         if name in _PACKAGES or name.startswith(_ROS_PREFIX):
             found.setdefault(name, metadata["Version"] or "unknown")
     return found

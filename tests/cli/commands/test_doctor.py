@@ -48,7 +48,9 @@ def test_interface_packages_are_those_of_the_project_and_of_the_system(
     monkeypatch.chdir(tmp_path)
     tmp_path.joinpath("composer.yaml").touch()
     assert "interfaces   " not in compose("doctor").out
-    assert "interfaces   built: composer_interfaces\n" in compose("doctor", "pipeline").out
+    lines = compose("doctor", "pipeline").out.splitlines()
+    (found,) = [line for line in lines if "  interfaces   " in line]
+    assert "composer_interfaces" in found  # it is built if ROS is installed
 
 
 def test_an_invalid_environment_is_reported_with_a_remedy(
