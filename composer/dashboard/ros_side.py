@@ -31,6 +31,7 @@ _BACKGROUND_THREADS = 2
 #: Requests that run or wait for a thread; more are refused.
 _MAX_REQUESTS = 32
 _JOINED_WITHIN_S = 20.0
+_IMPORTING = threading.Lock()
 
 
 class RosGraphSide:
@@ -117,10 +118,10 @@ class RosSide:
             self._requests -= 1
 
     def _call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
-        from composer.remote.session import Deadline, RosError
-
         if not self._joined.wait(_JOINED_WITHIN_S) or self._side is None:
             raise RequestError("failed", self.message or "the ROS graph cannot be joined")
+        from composer.remote.session import Deadline, RosError
+
         try:
             return operation(self._side, Deadline(timeout_s))
         except RosError as error:
@@ -163,6 +164,7 @@ class RosSide:
             self._feeds.run(side, self._is_needed)
 
     def _join(self, stack: ExitStack) -> RosGraphSide:
+        _import()
         from composer.dashboard.observing.observed import Observed, first_topology
         from composer.remote.shared_session import SharedSession
         from composer.runtime.process.dds_announcements import announce_less_often
@@ -178,10 +180,17 @@ class RosSide:
         return RosGraphSide(session, observed, self._forms, self._work)
 
 
+def _import() -> None:
+    """Import what joining takes, on one thread at a time: modules of rclpy import each other."""
+    with _IMPORTING:
+        import composer.dashboard.observing.observed
+        import composer.dashboard.pictures  # for the first diagram
+        import composer.remote.shared_session
+        import composer.runtime.process.dds_announcements  # noqa: F401
+
+
 def _prepare() -> None:
-    import composer.dashboard.pictures  # for the first diagram
-    import composer.remote.shared_session
-    import composer.runtime.process.dds_announcements  # noqa: F401
+    _import()
     from composer.dashboard.observing.observed import first_topology
 
     first_topology()

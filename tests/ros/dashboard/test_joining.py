@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from contextlib import ExitStack
 
@@ -51,3 +53,35 @@ def test_a_browser_that_comes_while_leaving_is_served(
         ros.may_leave.set()
         ros.leave()
         ros.close(PATIENCE_S)
+
+
+#: A browser comes while the dashboard imports rclpy, in the middle of the package.
+EARLY_BROWSER = """
+import builtins, threading, time
+from composer.dashboard.feeds import Feeds
+from composer.dashboard.forms import Forms
+from composer.dashboard.ros_side import RosSide
+from composer.interfaces import Interfaces
+
+def interrupted(name, *rest):
+    if name == "rclpy.signals" and threading.current_thread().name == "prepare":
+        side.enter()
+        threading.Event().wait(0.5)  # for the thread of the browser
+    return found(name, *rest)
+
+found, builtins.__import__ = builtins.__import__, interrupted
+side = RosSide(Feeds(), Forms(Interfaces.load()))
+side.prepare()
+while side.state not in ("ready", "failed"):
+    time.sleep(0.01)
+print(side.state, side.message)
+side.leave()
+side.close(5.0)
+"""
+
+
+def test_a_browser_that_comes_during_the_imports_is_served(ros_domain_id: int) -> None:
+    command = (sys.executable, "-c", EARLY_BROWSER)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.stdout, done.returncode) == ("ready \n", 0), done.stderr
+    assert "Traceback" not in done.stderr
