@@ -227,7 +227,7 @@ def _wrong_ends(connection: Connection, wrong: _Errors) -> list[Endpoint]:
     """Return the ports of a connection that an error points at."""
     return [
         end
-        for end in (*connection.sources, *connection.sinks)
+        for end in connection.ends
         if any(
             item.rule.name in _WRONG_ENDS and _covers(end.text.span, item.primary)
             for item in wrong.get(_line(end.text.span), ())
@@ -262,7 +262,7 @@ def _names_of_connection(
     """Yield the names of the channel, of the ports, and of those that may be meant instead."""
     yield join(context.system.namespace, connection.name.value)
     meant: set[str] = set()
-    for end in (*connection.sources, *connection.sinks):
+    for end in connection.ends:
         node, port = context.system.node(end.node), context.system.port(end)
         is_source = end in connection.sources
         is_right = port is not None and (port.kind in _SOURCES) is is_source

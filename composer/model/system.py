@@ -252,6 +252,11 @@ class Connection:
     delivery: Located[Delivery] | None = None
     isolation: Located[Isolation] | None = None
 
+    @property
+    def ends(self) -> tuple[Endpoint, ...]:
+        """The sources and the sinks."""
+        return (*self.sources, *self.sinks)
+
 
 @dataclass(frozen=True, slots=True)
 class Chain:

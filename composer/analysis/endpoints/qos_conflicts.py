@@ -126,7 +126,7 @@ def _place(context: Context, endpoint: PortOfNode, policy: str) -> Span:
         return endpoint.port.qos.own_span(policy)
     name = f"{endpoint.node.name}.{endpoint.port.name}"
     for connection in context.system.connections:
-        for end in (*connection.sources, *connection.sinks):
+        for end in connection.ends:
             if end.text.value == name:
                 return end.text.span
     return endpoint.node.name.span

@@ -51,15 +51,13 @@ def wrong_connection(
     That is so if another connection of the port fits its type, or if what the node does with the
     port fits its type and not that of the channel.
     """
-    channel = mismatch.channel
     here: list[Endpoint] = []
     elsewhere: list[Connection] = []
     for connection in context.system.connections:
-        ends = (*connection.sources, *connection.sinks)
-        own = [end for end in ends if (end.node, end.port) == _key(endpoint)]
-        if connection.kind is not channel.kind or not own:
+        own = [end for end in connection.ends if (end.node, end.port) == _key(endpoint)]
+        if not own or connection.kind is not mismatch.channel.kind:
             continue
-        if join(context.system.namespace, connection.name.value) == channel.name:
+        if _channel_name(context, connection) == mismatch.channel.name:
             here.extend(own)
         else:
             elsewhere.append(connection)
@@ -78,11 +76,7 @@ def misnamed_port(context: Context, mismatch: TypeMismatch) -> tuple[Endpoint, s
     """
     system = context.system
     for connection in _connections(context, mismatch):
-        ends = [
-            (end, port)
-            for end in (*connection.sources, *connection.sinks)
-            if (port := system.port(end)) is not None
-        ]
+        ends = [(end, port) for end in connection.ends if (port := system.port(end)) is not None]
         for end, port in ends:
             others = [other for _, other in ends if other is not port]
             names = {other.name.value for other in others}
@@ -106,7 +100,7 @@ def misnamed_connection(context: Context, mismatch: TypeMismatch) -> Connection 
     types = [
         {
             port.interface.value
-            for end in (*connection.sources, *connection.sinks)
+            for end in connection.ends
             if (port := context.system.port(end)) is not None
         }
         for connection in connections
@@ -115,11 +109,7 @@ def misnamed_connection(context: Context, mismatch: TypeMismatch) -> Connection 
         return None
     usual = mismatch.usual.port.interface.value
     last = mismatch.channel.name.rpartition("/")[2]
-    wrong = [
-        item
-        for item in connections
-        if all(end.port != last for end in (*item.sources, *item.sinks))
-    ]
+    wrong = [item for item in connections if all(end.port != last for end in item.ends)]
     if len(wrong) == len(connections):
         wrong = [item for item, found in zip(connections, types, strict=True) if usual not in found]
     has_both = all(item.sources and item.sinks for item in wrong)
@@ -128,20 +118,23 @@ def misnamed_connection(context: Context, mismatch: TypeMismatch) -> Connection 
 
 def _connections(context: Context, mismatch: TypeMismatch) -> list[Connection]:
     """Return the connections that give a channel its name."""
-    channel, namespace = mismatch.channel, context.system.namespace
+    channel = mismatch.channel
     return [
         connection
         for connection in context.system.connections
-        if connection.kind is channel.kind
-        and join(namespace, connection.name.value) == channel.name
+        if connection.kind is channel.kind and _channel_name(context, connection) == channel.name
     ]
+
+
+def _channel_name(context: Context, connection: Connection) -> str:
+    return join(context.system.namespace, connection.name.value)
 
 
 def _has_type(context: Context, connection: Connection, endpoint: PortOfNode) -> bool:
     """Return whether another port of a connection has the type of a port."""
     ports = (
         context.system.port(end)
-        for end in (*connection.sources, *connection.sinks)
+        for end in connection.ends
         if (end.node, end.port) != _key(endpoint)
     )
     own = endpoint.port.interface.value

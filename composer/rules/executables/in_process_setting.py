@@ -95,7 +95,7 @@ def _isolated_by_connection(context: Context) -> frozenset[tuple[str, str]]:
         (end.node, end.port)
         for connection in context.system.connections
         if connection.isolation is not None
-        for end in (*connection.sources, *connection.sinks)
+        for end in connection.ends
     )
 
 

@@ -57,7 +57,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for connection in context.system.connections:
         if connection.isolation is None:
             continue
-        ports = (*connection.sources, *connection.sinks)
+        ports = connection.ends
         found = [channel_of.get((end.node, end.port)) for end in ports]
         known = [channel for channel in found if channel is not None]
         if len(known) < len(found) or not known or any(map(_has_pair_in_process, known)):

@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     first: dict[str, tuple[Connection, Endpoint]] = {}
     reported: set[tuple[str, int, int]] = set()  # a pattern stands for several ports
     for connection in context.system.connections:
-        for endpoint in (*connection.sources, *connection.sinks):
+        for endpoint in connection.ends:
             if context.system.port(endpoint) is None or is_unresolved(connection.name.value):
                 continue
             earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
