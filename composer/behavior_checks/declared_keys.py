@@ -9,7 +9,7 @@ from functools import lru_cache
 from composer.behavior_checks.parts import possible_values
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module, helper_named
-from composer.behavior_source.method_body import dotted
+from composer.behavior_source.method_body import catches
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -116,12 +116,8 @@ def expects_missing(function: Function, owner: ast.expr) -> bool:
     written = ast.unparse(owner)
     for node in nodes_of(function):
         match node:
-            case ast.ExceptHandler(type=None):
+            case ast.ExceptHandler() if catches(node, _CAUGHT):
                 return True
-            case ast.ExceptHandler(type=ast.expr() as caught):
-                names = {dotted(item) for item in ast.walk(caught) if isinstance(item, ast.expr)}
-                if names & _CAUGHT:
-                    return True
             case ast.Compare(ops=operators, comparators=others):
                 asks = any(isinstance(item, ast.In | ast.NotIn) for item in operators)
                 if asks and any(ast.unparse(item) == written for item in others):

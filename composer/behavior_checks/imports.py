@@ -13,7 +13,7 @@ from composer.behavior_checks.attributes.module_attributes import module_attribu
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
 from composer.behavior_source.library import is_standard, standard_names
-from composer.behavior_source.method_body import dotted
+from composer.behavior_source.method_body import catches, dotted
 from composer.behavior_source.modules import (
     Unreadable,
     is_installed,
@@ -293,20 +293,15 @@ def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
     while pending:
         node = pending.pop()
         yield node
-        if isinstance(node, ast.Try) and any(_handles_imports(item) for item in node.handlers):
+        if isinstance(node, ast.Try) and any(
+            catches(item, _IMPORT_ERRORS) for item in node.handlers
+        ):
             inner: list[ast.AST] = [*node.handlers, *node.orelse, *node.finalbody]
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
             inner = [*node.orelse]
         else:
             inner = [item for name in _BODIES for item in getattr(node, name, ())]
         pending.extend(inner[::-1])
-
-
-def _handles_imports(handler: ast.ExceptHandler) -> bool:
-    if handler.type is None:
-        return True
-    names = (node.id for node in ast.walk(handler.type) if isinstance(node, ast.Name))
-    return not _IMPORT_ERRORS.isdisjoint(names)
 
 
 def _is_type_checking(test: ast.expr) -> bool:

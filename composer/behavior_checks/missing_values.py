@@ -10,7 +10,7 @@ from composer.behavior_checks.needed_values import direct_names, needed_values, 
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import empty_returns, returned_values
-from composer.behavior_source.method_body import dotted
+from composer.behavior_source.method_body import catches, dotted, is_none
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -129,7 +129,7 @@ def _gives_none(name: str, call: ast.Call) -> bool:
     """Return whether a call of ``max``, ``min`` or ``next`` has a default of None."""
     defaults = [item.value for item in call.keywords if item.arg == "default"]
     defaults += call.args[1:2] if name == "next" else []
-    return any(map(_is_none, defaults))
+    return any(map(is_none, defaults))
 
 
 def _of_property(node: ast.Attribute, scope: FunctionTypes) -> str | None:
@@ -197,7 +197,7 @@ def _is_none_at_first(value: ast.expr, function: Function) -> bool:
     """Return whether a result is a name that is set to None, and then perhaps, in a loop."""
     bindings = bindings_of(function, is_method=False).names
     found = bindings.get(value.id, []) if isinstance(value, ast.Name) else []
-    starts = [item for item in found if _is_none(item.expression) and item.how is How.VALUE]
+    starts = [item for item in found if is_none(item.expression) and item.how is How.VALUE]
     if not starts or len(found) == len(starts) or not isinstance(value, ast.Name):
         return False
     if value.id in {item.arg for item in walk([function.args]) if isinstance(item, ast.arg)}:
@@ -219,20 +219,12 @@ def _is_none_at_first(value: ast.expr, function: Function) -> bool:
     return outside == len(starts) == 1 and not any(value.id in direct_names(test) for test in asked)
 
 
-def _is_none(node: ast.expr | None) -> bool:
-    return isinstance(node, ast.Constant) and node.value is None
-
-
 def _expects_none(function: Function) -> bool:
     """Return whether a function catches what a use of None raises."""
     for node in nodes_of(function):
         match node:
-            case ast.ExceptHandler(type=caught):
-                parts = walk([caught]) if caught is not None else ()
-                names = {item.id for item in parts if isinstance(item, ast.Name)}
-                names = names if caught is not None else {*_CAUGHT}
-                if names & _CAUGHT:
-                    return True
+            case ast.ExceptHandler() if catches(node, _CAUGHT):
+                return True
             case ast.Name(id="suppress") | ast.Attribute(attr="suppress"):
                 return True
     return False

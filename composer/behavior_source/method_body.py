@@ -97,6 +97,18 @@ def dotted(node: ast.expr) -> str:
     return ".".join((node.id, *reversed(parts)))
 
 
+def is_none(node: ast.expr | None) -> bool:
+    """Return whether an expression is None as written."""
+    return isinstance(node, ast.Constant) and node.value is None
+
+
+def catches(handler: ast.ExceptHandler, errors: frozenset[str]) -> bool:
+    """Return whether an ``except`` catches everything, or names one of these exceptions."""
+    if handler.type is None:
+        return True
+    return any(isinstance(x, ast.Name) and x.id in errors for x in ast.walk(handler.type))
+
+
 @dataclass(slots=True)
 class _BodyVisitor:
     """The names and calls collected so far; names are as written."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import always_executed
+from composer.behavior_source.method_body import is_none
 from composer.behavior_source.spans import attribute_span, span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.inference import BehaviorTypes
@@ -167,18 +168,14 @@ def _stored(methods: _Methods) -> tuple[dict[str, set[str]], dict[str, set[str]]
         to_none: set[int] = set()
         for node in nodes_of(function):
             match node:
-                case ast.Assign(targets=targets, value=value) if _is_none(value):
+                case ast.Assign(targets=targets, value=value) if is_none(value):
                     to_none.update(map(id, targets))
-                case ast.AnnAssign(target=target, value=value) if value is None or _is_none(value):
+                case ast.AnnAssign(target=target, value=value) if value is None or is_none(value):
                     to_none.add(id(target))
                 case ast.Attribute(attr=name, ctx=ast.Store()):
                     found = none if id(node) in to_none else values
                     found.setdefault(name, set()).add(method)
     return none, values
-
-
-def _is_none(node: ast.expr | None) -> bool:
-    return isinstance(node, ast.Constant) and node.value is None
 
 
 def _reached(names: tuple[str, ...], methods: _Methods) -> set[str]:

@@ -31,7 +31,7 @@ def at_definitions(
     }
     for problem in found:
         key = (id(problem.called[0]), problem.message) if problem.called is not None else (0, "")
-        if key not in alike or key not in moved:
+        if key not in moved:
             yield problem
         elif problem is alike[key][0] and problem.called is not None:
             function, home = problem.called

@@ -18,7 +18,7 @@ _OTHERS = (ast.In, ast.Is, ast.IsNot, ast.NotIn)
 
 def numpy_problem(node: ast.expr, scope: FunctionTypes) -> tuple[str, str] | None:
     """Return why a value does not fit a field for a bool, and a hint; None if it may fit."""
-    value = scope.bindings.value_of(node.id) if isinstance(node, ast.Name) else node
+    value = _written(node, scope)
     match value:
         case ast.Call() if _is_result(value, _TESTS, frozenset({"all", "any"}), scope):
             pass
@@ -32,8 +32,13 @@ def numpy_problem(node: ast.expr, scope: FunctionTypes) -> tuple[str, str] | Non
     return "a value of numpy where bool is expected", "write bool(...); ROS publishes False for it"
 
 
+def _written(node: ast.expr, scope: FunctionTypes) -> ast.expr | None:
+    """Return what a name is bound to, None if that is not known; or another expression itself."""
+    return scope.bindings.value_of(node.id) if isinstance(node, ast.Name) else node
+
+
 def _is_number(node: ast.expr, scope: FunctionTypes) -> bool:
-    value = scope.bindings.value_of(node.id) if isinstance(node, ast.Name) else node
+    value = _written(node, scope)
     return isinstance(value, ast.Call) and _is_result(value, _NUMBERS, _NUMBERS_OF_ARRAYS, scope)
 
 

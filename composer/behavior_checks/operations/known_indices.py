@@ -11,7 +11,7 @@ from composer.behavior_checks.possible_constants import only_binding, passed
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import returned_values
-from composer.behavior_source.method_body import dotted
+from composer.behavior_source.method_body import catches
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import children
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -48,11 +48,10 @@ def _expects_missing(function: Function) -> bool:
     """Return whether a function asks for a length, or handles an element that is missing."""
     for node in nodes_of(function):
         match node:
-            case ast.Name(id="len") | ast.ExceptHandler(type=None):
+            case ast.Name(id="len"):
                 return True
-            case ast.ExceptHandler(type=ast.expr() as caught):
-                if _CAUGHT & {dotted(x) for x in ast.walk(caught) if isinstance(x, ast.expr)}:
-                    return True
+            case ast.ExceptHandler() if catches(node, _CAUGHT):
+                return True
     return False
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python.hosted_classes import calls_in, hosted_classes
+from composer.behavior_source.method_body import is_none
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -64,7 +65,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
             if not (isinstance(call.func, ast.Attribute) and call.func.attr == "__init__"):
                 continue
             for keyword in call.keywords:
-                if keyword.arg in _HINTS and not _is_none(keyword.value):
+                if keyword.arg in _HINTS and not is_none(keyword.value):
                     yield found.diagnostic(
                         RULE,
                         f"'{found.source.reference.class_name}' gives its node a '{keyword.arg}' of"
@@ -72,7 +73,3 @@ def check(context: Context) -> Iterator[Diagnostic]:
                         span,
                         _HINTS[keyword.arg],
                     )
-
-
-def _is_none(value: ast.expr) -> bool:
-    return isinstance(value, ast.Constant) and value.value is None

@@ -77,4 +77,4 @@ class ReportTimes:
     def is_outdated(self, number: int, now_s: float) -> bool:
         """Return whether the sender of a request had last seen a report that is too old."""
         limit_s = now_s - _OUTDATED_S
-        return (number, True) not in ((known, at_s >= limit_s) for known, at_s in self._times)
+        return not any(known == number and at_s >= limit_s for known, at_s in self._times)
