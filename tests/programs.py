@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,3 +24,12 @@ def require_package(folder: Path, package: str) -> None:
     """Require Node.js and the npm packages of a folder of tests, ``package`` among them."""
     is_installed = shutil.which("node") and (folder / "node_modules" / package).exists()
     require(is_installed, f"{package} is not installed: npm ci --prefix tests/{folder.name}")
+
+
+def require_module(name: str) -> Any:
+    """Import a module of a package in the extra ``dev``, which few tests need."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        require(False, f"{name} is not installed: it is in the extra 'dev'")
+        raise

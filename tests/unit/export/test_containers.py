@@ -12,6 +12,7 @@ import yaml
 
 from composer.export.deployment import VARIABLES
 from tests.cli.compose import compose
+from tests.programs import require_module
 
 SYSTEM = """\
 system: my_robot
@@ -81,7 +82,7 @@ def export(kind: str, *options: str) -> str:
 
 def kubernetes(*options: str) -> list[dict[str, Any]]:
     """Return the manifests, after the schemas of Kubernetes have accepted them."""
-    validator = pytest.importorskip("kubernetes_validate")
+    validator = require_module("kubernetes_validate")
     found = list(yaml.safe_load_all(export("kubernetes", *options)))
     for manifest in found:
         validator.validate(manifest, validator.latest_version(), strict=True)
@@ -89,7 +90,7 @@ def kubernetes(*options: str) -> list[dict[str, Any]]:
 
 
 def test_docker_compose_reads_what_the_system_declares(project: Path) -> None:
-    parser = pytest.importorskip("compose_spec")
+    parser = require_module("compose_spec")
     export("docker-compose", "-o", "deploy")
     text = (project / "deploy" / "compose.yaml").read_text()
     parser.PyCompose.from_yaml(text).validate()
@@ -127,10 +128,11 @@ def test_docker_itself_reads_the_file(project: Path) -> None:
     command = [docker, "compose", "-f", "deploy/compose.yaml", "config"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    camera = yaml.safe_load(done.stdout)["services"]["my-robot-front-camera"]
+    services = yaml.safe_load(done.stdout)["services"]
+    camera = services["my-robot-front-camera"]
     printed = {name: text.replace("$$", "$") for name, text in camera["environment"].items()}
     assert printed == {"ROS_DOMAIN_ID": "7", **VALUES}
-    assert camera["build"]["context"] == str(project)
+    assert services["my-robot"]["build"]["context"] == str(project)
 
 
 def test_kubernetes_accepts_the_manifests(project: Path) -> None:

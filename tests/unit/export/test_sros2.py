@@ -13,6 +13,7 @@ from composer.export.sros2 import enclaves, policy
 from composer.loading import load
 from composer.model import PortKind, System
 from tests.cli.compose import compose
+from tests.programs import require_module
 
 SYSTEM = """\
 system: robot
@@ -125,7 +126,7 @@ nodes:
 
 def schema(name: str) -> Any:
     """Return a schema of SROS2; see THIRD_PARTY.md."""
-    xmlschema = pytest.importorskip("xmlschema")
+    xmlschema = require_module("xmlschema")
     return xmlschema.XMLSchema(Path(__file__).parent / "sros2" / name, allow="local")
 
 

@@ -15,6 +15,7 @@ from composer.hosts.remote_command import python_words
 from composer.loading import load
 from composer.model import Host, System
 from tests.cli.compose import compose
+from tests.programs import require
 
 PYTHON = ("/opt/my robot/bin/python", "-P", "-m", "composer")
 NODES = "nodes: {a: {on_activate: {log: a}}, b: {on_activate: {log: b}}, d: {log_level: warn}}\n"
@@ -164,10 +165,10 @@ def test_several_units_need_a_folder(tmp_path: Path) -> None:
     assert (tmp_path / "units" / "jetson" / "robot-c.service").is_file()
 
 
-@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
 @pytest.mark.parametrize("user", [False, True])
 @pytest.mark.parametrize("policy", ["restart, restart: {backoff_ms: 250}", "shutdown"])
 def test_systemd_accepts_the_units(policy: str, user: bool, tmp_path: Path) -> None:
+    require(shutil.which("systemd-analyze"), "systemd-analyze is not installed (package systemd)")
     environment = {"ROS_DOMAIN_ID": "7", "PYTHONPATH": "/a b:/c%d"}
     python = (sys.executable, "-P", "-m", "composer")
     installation = Installation(python, environment, remote, None if user else "daemon")

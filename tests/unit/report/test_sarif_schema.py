@@ -17,6 +17,7 @@ import pytest
 
 from composer.loading import load
 from composer.report import sarif
+from tests.programs import require_module
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = sorted((ROOT / "tests" / "golden" / "err").glob("*.yaml"))
@@ -25,7 +26,7 @@ EXAMPLES = sorted((ROOT / "tests" / "golden" / "err").glob("*.yaml"))
 def check(log: Any) -> None:
     """Raise ValueError if the log does not match."""
     # Not above: importing it takes longer than collecting a hundred files of tests.
-    model = pytest.importorskip("pydantic_sarif.model")
+    model = require_module("pydantic_sarif.model")
     model.StaticAnalysisResultsFormatSarifVersion210JsonSchema.model_validate_json(json.dumps(log))
 
 
