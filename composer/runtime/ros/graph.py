@@ -143,8 +143,14 @@ class RosGraph:
         return ended_participants(known, self._node.context.get_domain_id())
 
     def _all_nodes(self) -> list[NodeName]:
+        """Return the nodes of all participants that DDS knows.
+
+        If the names of nodes arrive after the end of their participant, rmw keeps them for good. It
+        has no enclave for them: a participant announces its enclave itself.
+        """
         try:
-            found = self._node.get_node_names_and_namespaces()
+            listed = self._node.get_node_names_and_namespaces_with_enclaves()
+            found = [(name, namespace) for name, namespace, enclave in listed if enclave]
         except rclpy_implementation.RCLError:  # a node without a name, so rcl returns none at all
             self.skipped.add(_INVALID, "node ''")
             found = self._nodes_with_endpoints()

@@ -20,6 +20,7 @@ from composer.runtime.ros.endpoints import UNKNOWN_NODE
 from composer.runtime.ros.graph import RosGraph, participant
 from tests.ros.support.commands import PYTHON, hand_written
 from tests.ros.support.in_process import Peer, wait_until
+from tests.ros.support.raw_rmw import NodeNames, own_prefix
 
 #: A participant that is not discovered at once is discovered 1 to 3 s later; without the profile,
 #: that is every second one. The share allows for delays on a busy machine.
@@ -149,6 +150,26 @@ def test_the_nodes_of_a_killed_process_are_not_waited_for(ros_domain_id: int) ->
         wait_until(graph.are_nodes_known)
         assert ("talker", "/lab") in graph.nodes()
         observer.destroy_node()
+
+
+def test_nodes_announced_after_the_end_of_their_participant_do_not_count(
+    ros_domain_id: int,
+) -> None:
+    """rmw lists them for good. They run again in another process, so each would be listed twice."""
+    with Context() as context, Context() as another:
+        graph, late = Node("graph", context=context), Node("late", context=another)
+        ended = bytes(byte ^ 1 for byte in own_prefix(late))
+        names = NodeNames(late, ended, [("/", "late")])
+
+        def is_announced() -> bool:
+            names.announce()
+            return graph.get_node_names().count("late") == 2
+
+        wait_until(is_announced)
+        found = RosGraph(graph)
+        assert [name for name, _ in found.nodes()] == ["graph", "late"]
+        for node in (graph, late):
+            node.destroy_node()
 
 
 def number(process: int) -> bytes:

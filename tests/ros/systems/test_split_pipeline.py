@@ -339,10 +339,11 @@ def test_any_process_is_killed_fifty_times(
                 # Until then, the state before may still be reported.
                 wait_until(lambda pid=pid: pid not in local_systems().values(), "its end")
         wait_until(lambda: is_up(path), "all nodes", SOAK_PATIENCE_S)
-        # Killed processes remain in the ROS graph for 20 s.
-        external.spin_until(lambda: sorted(set(NODES) & set(names_of(external))) == sorted(NODES))
+        graph = RosGraph(external.node)
         try:
-            external.spin_until(lambda: all(names_of(external).count(n) == 1 for n in NODES), 60.0)
+            external.spin_until(
+                lambda: [node_names(graph).count(name) for name in NODES] == [1, 1, 1]
+            )
         except AssertionError as error:
             error.add_note(f"listed: {names_of(external)}\n{participants_of(external)}")
             raise
