@@ -88,7 +88,8 @@ class Installation:
     ``python`` is the command that starts compose here. Of ``environment``, the variables that ROS
     reads become part of the units. ``remote`` returns the command that runs a service on
     another computer, in its workspace: the name of a shell and its arguments. ``user`` is who runs
-    services here, None for the user of the service manager.
+    services, unless their computer names another one; None for the user of the service manager.
+    systemd sets HOME only with a user, also for root.
     """
 
     python: Sequence[str]
@@ -165,8 +166,8 @@ def _there(
 ) -> tuple[Sequence[str], str]:
     """Return the same for another computer, whose shell finds the workspace and Python."""
     shell, *words = installation.remote(host, service)
-    login = None if user or host.user is None else host.user.value
-    return [f"/bin/{shell}", *words], _login(login)
+    login = installation.user if host.user is None else host.user.value  # as ssh does
+    return [f"/bin/{shell}", *words], _login(None if user else login)
 
 
 def _login(name: str | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import pwd
 import shutil
 import subprocess
 import sys
@@ -82,6 +84,27 @@ def test_a_unit_runs_as_who_exports_it_with_the_files_that_are_set(tmp_path: Pat
     assert [line for line in text.splitlines() if line.startswith("Environment=")] == [
         f"Environment={name}={value}" for name, value in environment.items()
     ]
+
+
+def test_units_of_another_computer_run_as_its_user_or_as_who_exports_them(tmp_path: Path) -> None:
+    for host, user, expected in (
+        ("{workspace: ~/robot}", "ada", "User=ada\n"),
+        ("{workspace: ~/robot}", "root", "User=root\n"),  # without it, there is no HOME
+        ("{workspace: ~/robot, user: robot}", "ada", "User=robot\n"),
+        ("{workspace: ~/robot, user: robot}", None, ""),
+    ):
+        system = system_of(tmp_path, PROCESSES.replace("jetson: {}", f"jetson: {host}"))
+        found = units(*system, Installation(PYTHON, {}, remote, user), user=user is None)
+        text = found[PurePosixPath("jetson/robot-c.service")]
+        lines = [f"{line}\n" for line in text.splitlines() if line.startswith("User=")]
+        assert "".join(lines) == expected
+
+
+def test_the_command_names_its_user_also_if_that_is_root(tmp_path: Path) -> None:
+    _, path = system_of(tmp_path)
+    done = compose("export", "systemd", str(path))
+    assert f"\nUser={pwd.getpwuid(os.geteuid()).pw_name}\n" in done.out
+    assert "User=" not in compose("export", "systemd", str(path), "--user").out
 
 
 def test_each_process_has_a_unit_with_its_limits(tmp_path: Path) -> None:

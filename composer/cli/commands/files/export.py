@@ -260,14 +260,14 @@ def export_sros2(
         _write_all(output, files, replace=force)
 
 
-def _user() -> str | None:
-    """Return the name of this user, or the number if there is no name; None for root."""
+def _user() -> str:
+    """Return the name of this user, or the number if there is no name."""
     import os
     import pwd
 
     number = os.geteuid()
     try:
-        return pwd.getpwuid(number).pw_name if number else None
+        return pwd.getpwuid(number).pw_name
     except KeyError:
         return str(number)
 
