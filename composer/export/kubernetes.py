@@ -5,7 +5,7 @@ The containers of a pod share its network and its shared memory, as processes of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from composer.export.container_image import USER_ID, WRITABLE, Contents
@@ -19,6 +19,7 @@ from composer.export.deployment import (
 )
 from composer.export.yaml_text import yaml_text
 from composer.model import System
+from composer.model.discovery import is_loopback
 
 _HEAD = """\
 # Written by 'compose export kubernetes' for the system {system}.
@@ -30,6 +31,10 @@ _SHARED_MEMORY, _TEMPORARY = "shared-memory", "temporary"
 _OUTSIDE = (
     "Nodes outside the pod take part: it discovers them in the network of the computer, and\n"
     "exchanges messages by its shared memory. Namespaces with restricted pods do not allow this."
+)
+_ADDRESS = (
+    "The pod belongs on the computer with the address of the discovery server. Name that\n"
+    "in 'hosts' of the system, which binds the server to it, or add a nodeSelector."
 )
 _PROBES = "It has started once it responds, and is ready once its nodes are up."
 _PRIORITY = "It needs real-time priority {priority}, which Kubernetes only grants to the user root."
@@ -58,7 +63,8 @@ def manifests(
             }
             for service in here
         }
-        pod = _pod(containers, ends=not is_restarted(system), is_open=is_open)
+        place = _place(system, here)
+        pod = place | _pod(containers, ends=not is_restarted(system), is_open=is_open)
         found.append(yaml_text(_workload(system, here[0], pod)))
     return _HEAD.format(system=system.name, image=image) + "---\n".join(found)
 
@@ -98,6 +104,16 @@ def _label_value(name: str) -> str:
     return name[:63].strip("_.-")
 
 
+def _place(system: System, here: Sequence[Service]) -> dict[str, Any]:
+    """Return what binds the pod of these services to a computer."""
+    if here[0].host is not None:
+        return {"nodeSelector": {"kubernetes.io/hostname": here[0].host}}
+    discovery = system.discovery
+    if discovery is None or not any(service.is_server for service in here):
+        return {}
+    return {} if all(is_loopback(host) for host, _ in discovery.servers) else {"#0": _ADDRESS}
+
+
 def _pod(
     containers: Mapping[Service, dict[str, Any]], *, ends: bool, is_open: bool
 ) -> dict[str, Any]:
@@ -112,8 +128,6 @@ def _pod(
     sidecars = [item for item in containers if item not in main] if main else []
     sidecars.sort(key=lambda item: not item.is_server)
     pod: dict[str, Any] = {}
-    if first.host is not None:
-        pod["nodeSelector"] = {"kubernetes.io/hostname": first.host}
     if is_open:
         pod |= {
             "#1": _OUTSIDE,

@@ -179,6 +179,8 @@ def test_a_discovery_server_is_ready_before_the_processes_start(project: Path) -
     (deployment,) = kubernetes()
     pod = deployment["spec"]["template"]["spec"]
     assert pod["hostNetwork"]  # where the address is
+    note = "The pod belongs on the computer with the address of the discovery server."
+    assert note in export("kubernetes")
     (server,) = pod["initContainers"]
     assert (server["name"], server["restartPolicy"]) == ("my-robot-discovery", "Always")
     assert server["command"] == ask[:-1]
@@ -193,9 +195,18 @@ def test_a_discovery_server_is_ready_before_the_processes_start(project: Path) -
     assert "depends_on" not in found["my-robot-discovery"]
 
     path = project / "systems" / "robot.yaml"
-    path.write_text(path.read_text().replace("10.0.0.1", "127.0.0.1"))
+    text = path.read_text()
+    path.write_text(text + "hosts: {base: {address: 10.0.0.1}}\n")
+    _, deployment = kubernetes()
+    pod = deployment["spec"]["template"]["spec"]
+    assert pod["nodeSelector"] == {"kubernetes.io/hostname": "base"}
+    assert [container["name"] for container in pod["containers"]] == ["my-robot-discovery-base"]
+    assert note not in export("kubernetes")
+
+    path.write_text(text.replace("10.0.0.1", "127.0.0.1"))
     (deployment,) = kubernetes()
     assert "hostNetwork" not in deployment["spec"]["template"]["spec"]
+    assert note not in export("kubernetes")
 
 
 def test_a_failure_ends_a_system_that_shuts_down_on_failure(project: Path) -> None:
