@@ -12,6 +12,7 @@ from composer.behavior_checks.attributes.misspelled_attributes import misspelled
 from composer.behavior_checks.attributes.unknown_attributes import attribute_problem
 from composer.behavior_checks.attributes.unset_attributes import unset_attributes
 from composer.behavior_checks.calls.collection_calls import (
+    default_problem,
     key_problems,
     stored_problems,
 )
@@ -19,7 +20,7 @@ from composer.behavior_checks.calls.rclpy_calls import transition_problems
 from composer.behavior_checks.calls.wrong_definitions import at_definitions
 from composer.behavior_checks.classes import class_problems
 from composer.behavior_checks.declared_keys import key_problems_of, member_key_problems_of
-from composer.behavior_checks.fitting import argument_problem, value_problem
+from composer.behavior_checks.fitting import argument_problem, problem_place, value_problem
 from composer.behavior_checks.function_calls import CallChecker
 from composer.behavior_checks.messages.elements import element_problems
 from composer.behavior_checks.messages.message_values import ValueChecker
@@ -293,7 +294,8 @@ class _FunctionChecker:
             wrong = argument_problem(value, self.scope.type_of(value), expected, self.scope.type_of)
             if wrong is not None:
                 problem = f"attribute '{target.attr}': {wrong}"
-                yield CodeProblem(Kind.VALUE, problem, self._span(value))
+                place = problem_place(value, expected, self.scope.type_of)
+                yield CodeProblem(Kind.VALUE, problem, self._span(place))
             return
         message = owner if isinstance(owner, Message) else None
         field = message.field(target.attr) if message is not None else None
@@ -330,8 +332,10 @@ class _FunctionChecker:
         expected = self.scope.annotated(annotation, self.scope.home)
         found = self.scope.type_of(value)
         wrong = argument_problem(value, found, expected, self.scope.type_of)
+        wrong = wrong or default_problem(value, expected, self.scope)
         if wrong is not None:
-            yield CodeProblem(Kind.VALUE, wrong, self._span(value))
+            place = problem_place(value, expected, self.scope.type_of)
+            yield CodeProblem(Kind.VALUE, wrong, self._span(place))
 
     def _returned(self) -> Iterator[CodeProblem]:
         """Check what a function returns; None has a rule of its own in handlers of services."""

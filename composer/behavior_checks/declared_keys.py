@@ -6,14 +6,14 @@ import ast
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
-from composer.behavior_checks.parts import possible_values
+from composer.behavior_checks.parts import possible_values, stored_in
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module, helper_named
-from composer.behavior_source.method_body import catches
+from composer.behavior_source.method_body import catches, dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import Binding, bindings_of, nodes_of
+from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.names import value_named
 from composer.behavior_types.syntax.own_classes import fields_of_class, is_record, updated_targets
@@ -34,6 +34,11 @@ def key_problems_of(
         return
     declared = _of_record(node, scope) or _declared(node, scope)
     if declared is None or expects_missing(function, node.value):
+        return
+    if not declared:
+        message = f"'{ast.unparse(node.value)}' has no keys: nothing is stored in it"
+        span, about = span_of(node.slice, scope.home.source), dotted(node.value)
+        yield CodeProblem(Kind.VALUE, message, span, about=about)
         return
     from composer.behavior_checks.possible_constants import (  # noqa: PLC0415 (start-up time)
         possible_constants,
@@ -132,10 +137,10 @@ def _declared(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int]
     object_ = scope.type_of(owner.value) if isinstance(owner, ast.Attribute) else ANYTHING
     if isinstance(owner, ast.Attribute) and isinstance(object_, Self | OwnObject):
         is_read = isinstance(node.ctx, ast.Load)
-        places = _places(object_, owner.attr, scope)
+        places = stored_in(object_, owner.attr, scope)
         if len(places) != 1 or (not is_read and not _is_updated(node, modules)):
             return None
-        return _keys_of(places[0].expression, owner.attr, modules)
+        return _keys_of(places[0].stored, owner.attr, modules)
     constant = constant_read(owner, scope) if isinstance(node.ctx, ast.Load) else None
     return _keys_of(constant[0], constant[1], modules) if constant is not None else None
 
@@ -153,20 +158,6 @@ def constant_read(node: ast.expr, scope: FunctionTypes) -> tuple[ast.expr, str, 
         return None
     written = value_named(found.name, found.module)
     return (written, name, found.module) if written is not None else None
-
-
-def _places(object_: Self | OwnObject, name: str, scope: FunctionTypes) -> list[Binding]:
-    """Return what an attribute of an object is assigned."""
-    if isinstance(object_, Self):
-        return [binding for _, binding in scope.owner.assigned.get(name, ())]
-    of = object_.of
-    return [
-        binding
-        for own in (*lineage(of).classes, *scope.owner.project_classes.derived(of))
-        for method in own.definition.methods
-        if method.node is not None
-        for binding in bindings_of(method.node).attributes.get(name, ())
-    ]
 
 
 def _is_updated(node: ast.Subscript, modules: Sequence[Module]) -> bool:
@@ -187,7 +178,7 @@ def _keys_of(
         case _:
             return None
     known = frozenset(item for item in found if item is not None)
-    if len(known) != len(found) or not found:
+    if len(known) != len(found):
         return None
     for module in modules:
         stored = stored_keys(module, name)
@@ -226,6 +217,8 @@ def stored_keys(module: Module, name: str) -> frozenset[str | int] | None:
                 safe.add(id(iterated))
             case ast.Call(func=ast.Name(id=called), args=arguments) if called in _TAKING:
                 safe.update(map(id, arguments))
+            case ast.Assign(targets=[_, _, *_]):
+                pass  # what has two names may change by either
             case ast.Assign(targets=targets):
                 safe.update(id(item) for item in targets if not isinstance(item, ast.Subscript))
             case ast.AnnAssign(target=target):

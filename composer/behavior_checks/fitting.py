@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from inspect import isabstract
 
 from composer.behavior_types.functions import function_name, is_function
@@ -26,6 +26,7 @@ from composer.behavior_types.values import (
     Collection,
     InterfaceClass,
     OwnObject,
+    Pending,
     Value,
 )
 from composer.field_types import (
@@ -137,10 +138,13 @@ def argument_problem(
     Numbers fit numbers and bools, as they do in Python. ``type_of`` gives the types of the items of
     a list.
     """
-    if isinstance(node, ast.IfExp):
-        first = argument_problem(node.body, type_of(node.body), expected, type_of)
-        return first or argument_problem(node.orelse, type_of(node.orelse), expected, type_of)
+    if isinstance(node, ast.IfExp) or (
+        isinstance(node, ast.BoolOp) and isinstance(node.op, ast.Or)
+    ):
+        return _first_problem(_parts(node, expected), type_of)
     kind, wanted = kind_of(found), kind_of(expected)
+    if isinstance(expected, AnyFunction) and isinstance(found, Pending):
+        return f"what '{found.name}' returns where a function is expected"
     if isinstance(expected, AnyFunction) and isinstance(found, OwnObject):
         known = known_attributes(found.of)
         if known is None or "__call__" in known:
@@ -149,6 +153,7 @@ def argument_problem(
         # a tuple may take the place of a named tuple
         kinds = {kind, wanted} - {"tuple", "collection"}
         is_same = isinstance(found, OwnObject) and isinstance(expected, OwnObject)
+        is_same = is_same and not any(map(_is_enumeration, (found, expected)))
         if None in kinds or not kinds or is_same:
             return None
         return f"{shown(found)} where {shown(expected)} is expected"
@@ -161,16 +166,66 @@ def argument_problem(
         return f"{shown(found)} where {shown(expected)} is expected"
     if not isinstance(expected, Collection):
         return None
-    if isinstance(node, ast.List | ast.Tuple) and expected.items is None:
-        for item in node.elts:
-            wrong = argument_problem(item, type_of(item), expected.element, type_of)
-            if wrong is not None:
-                return wrong
+    wrong = _first_problem(_elements(node, expected), type_of)
+    if wrong is not None:
+        return wrong
     if expected.items is not None and isinstance(found, Collection) and found.python is list:
         return f"a list where {shown(expected)} is expected"
     if expected.python is tuple and isinstance(found, Collection):
         return _tuple_problem(node, found, expected, type_of)
     return None
+
+
+def _elements(node: ast.expr | None, expected: Collection) -> Iterator[tuple[ast.expr, Value]]:
+    """Yield the elements that are written down, with the types that an annotation expects."""
+    is_dict = issubclass(expected.python, dict)
+    match node:
+        case ast.List(elts=items) | ast.Tuple(elts=items) | ast.Set(elts=items):
+            if expected.items is None and not is_dict:
+                yield from ((item, expected.element) for item in items)
+        case ast.ListComp(elt=item) | ast.SetComp(elt=item) if not is_dict:
+            yield item, expected.element
+        case ast.Dict(keys=keys, values=values) if is_dict:
+            for key, value in zip(keys, values, strict=True):
+                if key is not None:
+                    yield key, expected.key
+                    yield value, expected.element
+        case ast.DictComp(key=key, value=value) if is_dict:
+            yield key, expected.key
+            yield value, expected.element
+
+
+def _first_problem(
+    items: Iterable[tuple[ast.expr, Value]], type_of: Callable[[ast.expr], Value]
+) -> str | None:
+    """Return why the first of several expressions contradicts what is expected of it."""
+    found = (argument_problem(item, type_of(item), wanted, type_of) for item, wanted in items)
+    return next((wrong for wrong in found if wrong is not None), None)
+
+
+def _is_enumeration(type_: Value) -> bool:
+    return isinstance(type_, OwnObject) and is_enumeration(type_.of)
+
+
+def problem_place(
+    node: ast.expr, expected: Value, type_of: Callable[[ast.expr], Value]
+) -> ast.expr:
+    """Return the part of an expression with a problem that contradicts what is expected of it."""
+    for part, wanted in _parts(node, expected):
+        if argument_problem(part, type_of(part), wanted, type_of) is not None:
+            return problem_place(part, wanted, type_of)
+    return node
+
+
+def _parts(node: ast.expr | None, expected: Value) -> Iterator[tuple[ast.expr, Value]]:
+    """Yield the values that an expression chooses from, or else the elements that it shows."""
+    match node:
+        case ast.IfExp(body=first, orelse=second):
+            yield from ((first, expected), (second, expected))
+        case ast.BoolOp(op=ast.Or(), values=values):
+            yield from ((value, expected) for value in values)
+        case _ if isinstance(expected, Collection):
+            yield from _elements(node, expected)
 
 
 def _are_related(found: Value, expected: Value) -> bool:
@@ -221,6 +276,8 @@ def kind_of(type_: Value) -> str | None:
         type_.of, "enum.IntEnum", "enum.IntFlag", "int"
     ):
         kind = "number"
+    elif isinstance(type_, OwnObject) and is_enumeration(type_.of, "enum.StrEnum", "str"):
+        kind = "text"
     elif isinstance(type_, OwnObject) and is_named_tuple(type_.of):
         kind = "tuple"
     elif isinstance(type_, OwnObject) and is_plain(type_.of):

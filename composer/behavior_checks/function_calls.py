@@ -14,12 +14,12 @@ from composer.behavior_checks.calls.arguments import (
     method_signature,
     signature_of,
 )
-from composer.behavior_checks.calls.call import call_problems
+from composer.behavior_checks.calls.call import call_problems, uncallable
 from composer.behavior_checks.calls.collection_calls import method_problems
 from composer.behavior_checks.calls.rclpy_calls import rclpy_call
 from composer.behavior_checks.messages.message_values import ValueChecker
 from composer.behavior_checks.operations.membership import enumeration_problems
-from composer.behavior_checks.operations.operations import annotations_by_name, uncallable
+from composer.behavior_checks.operations.operations import annotations_by_name
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.receivers import lacks_self

@@ -1,4 +1,4 @@
-"""The code of a file outside functions, and the parts of an expression that may be its value."""
+"""What expressions and attributes may have the value of, and the code outside functions."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from functools import lru_cache
 from types import GeneratorType
 
 from composer.behavior_source import Module
+from composer.behavior_source.method_body import is_none
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import How
-from composer.behavior_types.values import Collection, Value
-from composer.interfaces import FieldType
+from composer.behavior_types.inference import BehaviorTypes
+from composer.behavior_types.outside_assignments import functions_of
+from composer.behavior_types.syntax.bindings import Binding, How, bindings_of, nodes_of
+from composer.behavior_types.syntax.lineage import lineage
+from composer.behavior_types.syntax.own_classes import known_attributes
+from composer.behavior_types.values import Collection, OwnObject, Self, Value
+from composer.interfaces import FieldType, Message
 
 
 @lru_cache(maxsize=128)
@@ -51,6 +56,46 @@ def possible_values(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
                 yield node
         case _:
             yield node
+
+
+def stored_in(owner: Self | OwnObject, name: str, scope: FunctionTypes) -> list[Binding]:
+    """Return what the methods of the class of an object store in an attribute of it."""
+    if isinstance(owner, Self):
+        return [binding for _, binding in scope.owner.assigned.get(name, ())]
+    return [
+        binding
+        for own in (*lineage(owner.of).classes, *scope.owner.project_classes.derived(owner.of))
+        for method in own.definition.methods
+        if method.node is not None
+        for binding in bindings_of(method.node).attributes.get(name, ())
+    ]
+
+
+def is_only_none(node: ast.Attribute, scope: FunctionTypes) -> bool:
+    """Return whether nothing but None is stored in an attribute of an object of the project."""
+    owner, types = scope.type_of(node.value), scope.owner
+    if isinstance(owner, Self):
+        is_known = types.source.complete and not types.self_escapes
+    else:
+        is_known = isinstance(owner, OwnObject) and known_attributes(owner.of) is not None
+    if not is_known or not isinstance(owner, Self | OwnObject):
+        return False
+    if node.attr in types.project_classes.assigned_outside:
+        return False
+    stored = [binding.stored for binding in stored_in(owner, node.attr, scope)]
+    return bool(stored) and all(map(is_none, stored)) and not _sets_by_name(types)
+
+
+def _sets_by_name(types: BehaviorTypes) -> bool:
+    """Return whether the files call ``setattr`` for anything but a message."""
+    return any(
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "setattr"
+        and not (node.args and isinstance(scope.type_of(node.args[0]), Message))
+        for scope, function in functions_of(types)
+        for node in nodes_of(function)
+    )
 
 
 def _may_be_empty(type_: Value) -> bool:

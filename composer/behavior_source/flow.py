@@ -112,28 +112,68 @@ def always_executed(
     ``is_false`` says which conditions to regard as false.
     """
     found: set[int] = set()
-    pending: list[ast.stmt] = [*function.body][::-1]
-    while pending:
-        statement = pending.pop()
-        head: ast.AST = statement
-        match statement:
-            case ast.For(body=body, iter=iterated):
-                head = iterated
-                if any(isinstance(node, ast.If | ast.Break | ast.Return) for node in walk(body)):
-                    return frozenset(found)
-                pending += body[::-1]
-            case ast.With(body=body, items=[ast.withitem(context_expr=context), *_]):
-                head = context
-                pending += body[::-1]
-            case ast.If(test=test, orelse=[]) if is_false(test):
-                head = test
-            case ast.If() | ast.Try() | ast.Match() | ast.While() | ast.FunctionDef():
-                return frozenset(found)
+    for statement, head in _certain_heads(function.body, is_false):
         found.update(_lines(statement.lineno, head))
         for node in walk([head]):
             if isinstance(node, ast.IfExp | ast.BoolOp | ast.Lambda | ast.ListComp):
                 found.difference_update(_lines(node.lineno, node))
     return frozenset(found)
+
+
+def always_evaluated(function: Function) -> Iterator[ast.AST]:
+    """Yield the nodes that each call of a function evaluates, if no statement raises."""
+    for _, head in _certain_heads(function.body, lambda _: False):
+        yield from evaluated(head)
+
+
+def evaluated(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes that are evaluated with a statement or an expression, whatever they give."""
+    pending = [node]
+    while pending:
+        node = pending.pop()
+        yield node
+        match node:
+            case ast.BoolOp(values=[first, *_]) | ast.IfExp(test=first):
+                pending.append(first)
+            case ast.Compare(left=left, comparators=[first, *_]):
+                pending += (left, first)
+            case ast.Assert(test=test):
+                pending.append(test)
+            case ast.Lambda() | ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+                pass
+            case (
+                ast.ListComp(generators=[first, *_])
+                | ast.SetComp(generators=[first, *_])
+                | ast.DictComp(generators=[first, *_])
+                | ast.GeneratorExp(generators=[first, *_])
+            ):
+                pending.append(first.iter)
+            case _:
+                pending += children(node)
+
+
+def _certain_heads(
+    body: Sequence[ast.stmt], is_false: Callable[[ast.expr], bool]
+) -> Iterator[tuple[ast.stmt, ast.AST]]:
+    """Yield the statements that are always executed, each with the part that is."""
+    pending: list[ast.stmt] = [*body][::-1]
+    while pending:
+        statement = pending.pop()
+        head: ast.AST = statement
+        match statement:
+            case ast.For(body=inner, iter=iterated):
+                head = iterated
+                if any(isinstance(node, ast.If | ast.Break | ast.Return) for node in walk(inner)):
+                    return
+                pending += inner[::-1]
+            case ast.With(body=inner, items=[ast.withitem(context_expr=context), *_]):
+                head = context
+                pending += inner[::-1]
+            case ast.If(test=test, orelse=[]) if is_false(test):
+                head = test
+            case ast.If() | ast.Try() | ast.Match() | ast.While() | ast.FunctionDef():
+                return
+        yield statement, head
 
 
 def _lines(first: int, node: ast.AST) -> range:

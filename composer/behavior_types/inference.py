@@ -393,4 +393,5 @@ def _of_class(node: ast.ClassDef) -> Iterator[tuple[str, Binding]]:
                     if isinstance(target, ast.Name):
                         yield target.id, Binding(value)
             case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation, value=value):
-                yield name, Binding(annotation, How.ANNOTATION, creates=value is not None)
+                is_set = value is not None
+                yield name, Binding(annotation, How.ANNOTATION, creates=is_set, value=value)

@@ -21,7 +21,7 @@ from composer.behavior_types.syntax.own_classes import (
     is_record,
     known_attributes,
 )
-from composer.behavior_types.syntax.self_attributes import escapes_from
+from composer.behavior_types.syntax.self_attributes import escapes_from, sets_computed_names
 from composer.behavior_types.values import (
     ApiValue,
     BuiltinObject,
@@ -148,7 +148,7 @@ def _missing_attribute(types: BehaviorTypes, name: str) -> Found | None:
         return None
     public = [other for other in types.self_attributes if not other.startswith("__")]
     close = nearest(name, public)
-    if close is None and types.self_escapes:
+    if (close is None and types.self_escapes) or sets_computed_names(types.source):
         return None
     message = f"'{types.source.reference.class_name}' has no attribute '{name}'"
     hint = f"did you mean '{close}'?" if close else "no method of the class sets it"

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Mapping
 
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
-from composer.behavior_source.flow import always_executed
+from composer.behavior_source.flow import always_evaluated, evaluated
 from composer.behavior_source.method_body import is_none
 from composer.behavior_source.spans import attribute_span, span_of
+from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.syntax.bindings import nodes_of
@@ -43,17 +44,26 @@ def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
     yield from _perhaps_none(types, methods, at_first)
     by_handlers = _reached(tuple(types.handlers), methods)  # others may be called from outside
     own = {name for _, scope in methods.values() for name in scope.bindings.attributes}
+    own -= self_attributes(types.source, ()) | _in_texts(methods) | none.keys()
+    own &= values.keys()
     missing = {
-        name: setters
-        for name, setters in later.items()
-        if name in own and name not in none and setters <= by_handlers
+        name: setters for name, setters in later.items() if name in own and setters <= by_handlers
     }
-    if not missing:
-        return
-    known_names = self_attributes(types.source, ()) | _in_texts(methods)
-    missing = {name: setters for name, setters in missing.items() if name not in known_names}
     has_start = any(first & setters for setters in values.values())
-    yield from _missing(types, methods, missing, has_start=has_start)
+    found = [
+        *_never_set(methods, {name: values[name] for name in own & types.self_attributes}),
+        *_before_goals(types, methods, missing),
+        *_missing(types, methods, missing, has_start=has_start),
+    ]
+    names: set[str] = set()
+    for name, problem in found:
+        if name not in names:
+            yield problem
+        names.add(name)
+
+
+#: An attribute with its problem.
+_Found = tuple[str, CodeProblem]
 
 
 def _perhaps_none(
@@ -65,13 +75,12 @@ def _perhaps_none(
             continue
         function, scope = methods[handler]
         reached = _reached((handler,), methods)
-        lines = always_executed(function)
-        for node in nodes_of(function):
+        for node in always_evaluated(function):
             match node:
                 case (
                     ast.Attribute(value=ast.Attribute(attr=name) as owner)
                     | ast.Subscript(value=ast.Attribute(attr=name) as owner)
-                ) if name in unset and owner.lineno in lines:
+                ) if name in unset:
                     setters = unset[name]
                     is_accepted = any(item.startswith("accept_") for item in setters)
                     is_own = isinstance(scope.type_of(owner.value), Self)
@@ -86,12 +95,13 @@ def _perhaps_none(
 
 def _missing(
     types: BehaviorTypes, methods: _Methods, unset: dict[str, set[str]], *, has_start: bool
-) -> Iterator[CodeProblem]:
+) -> Iterator[_Found]:
     """Yield the attributes that no method has set when the first ones, or a handler, read them.
 
     A class whose first methods set no attributes, so that ``has_start`` is false, may rely on the
     order of its messages.
     """
+    unset = dict(unset)
     starts = [name for name in _FIRST if name in methods]
     handlers = [name for name in types.handlers if not name.startswith("accept_")]
     for start in (*starts, *(name for name in handlers if name in methods)):
@@ -111,14 +121,38 @@ def _missing(
                 continue
             del unset[name]
             setter = min(others or setters)
-            span = attribute_span(node, scope.home.source)
-            hint = f"set self.{name} in 'on_configure'"
             if is_first or is_own:
-                message = f"'{name}' is not set yet: only '{setter}' sets it, later"
-                yield CodeProblem(Kind.ATTRIBUTE, message, span, hint)
+                yield _not_set(node, setter, scope)
             else:
                 message = f"'{name}' may not be set yet: '{setter}' sets it, perhaps later"
-                yield CodeProblem(Kind.NONE, message, span, hint)
+                span = attribute_span(node, scope.home.source)
+                yield name, CodeProblem(Kind.NONE, message, span, _hint(name))
+
+
+def _not_set(node: ast.Attribute, setter: str, scope: FunctionTypes) -> _Found:
+    message = f"'{node.attr}' is not set yet: only '{setter}' sets it, later"
+    span = attribute_span(node, scope.home.source)
+    return node.attr, CodeProblem(Kind.ATTRIBUTE, message, span, _hint(node.attr))
+
+
+def _hint(name: str) -> str:
+    return f"set self.{name} in 'on_configure'"
+
+
+def _before_goals(
+    types: BehaviorTypes, methods: _Methods, unset: Mapping[str, set[str]]
+) -> Iterator[_Found]:
+    """Yield what is read to accept a goal, and is set only when one is executed."""
+    for start in types.handlers:
+        executing = f"on_{start.removeprefix('accept_')}"
+        if not start.startswith("accept_") or not {start, executing} <= methods.keys():
+            continue
+        handlers = {*types.handlers, *_FIRST} - {executing}
+        others = _reached(tuple(handlers), methods)
+        for node, scope in _reads(start, methods):
+            setters = unset.get(node.attr, set())
+            if setters and not setters & others:
+                yield _not_set(node, min(setters), scope)
 
 
 def _reads(start: str, methods: _Methods) -> Iterator[tuple[ast.Attribute, FunctionTypes]]:
@@ -126,19 +160,68 @@ def _reads(start: str, methods: _Methods) -> Iterator[tuple[ast.Attribute, Funct
     pending, seen = [start], {start}
     while pending:
         function, scope = methods[pending.pop()]
-        lines = always_executed(function)
-        for node in nodes_of(function):
+        for node in sorted(always_evaluated(function), key=_place):
             match node:
                 case ast.Attribute(value=ast.Name(id=owner), ctx=ast.Load()) if (
-                    node.lineno in lines and owner == scope.bindings.receiver
+                    owner == scope.bindings.receiver
                 ):
                     yield node, scope
                 case ast.Call(func=ast.Attribute(value=ast.Name(id=owner), attr=name)) if (
-                    node.lineno in lines and owner == scope.bindings.receiver
+                    owner == scope.bindings.receiver
                 ):
                     if name in methods and name not in seen:
                         seen.add(name)
                         pending.append(name)
+
+
+def _place(node: ast.AST) -> tuple[int, int]:
+    return getattr(node, "lineno", 0), getattr(node, "col_offset", 0)
+
+
+def _never_set(methods: _Methods, values: Mapping[str, set[str]]) -> Iterator[_Found]:
+    """Yield the attributes that only one method sets, after it has read them."""
+    for name, setters in values.items():
+        setter = next(iter(setters))
+        function, scope = methods[setter]
+        read = _read_before(name, function, scope) if len(setters) == 1 else None
+        if read is not None:
+            yield _not_set(read, setter, scope)
+
+
+def _read_before(name: str, function: Function, scope: FunctionTypes) -> ast.Attribute | None:
+    """Return where a method reads an attribute in any case before it sets it, or None."""
+    for statement in function.body:
+        for node in sorted(_before_body(statement), key=_place):
+            match node:
+                case ast.Attribute(value=ast.Name(id=owner), attr=attr, ctx=ast.Load()) if (
+                    attr == name and owner == scope.bindings.receiver
+                ):
+                    return node
+        if _stores(statement, name):
+            return None
+    return None
+
+
+def _before_body(statement: ast.stmt) -> Iterator[ast.AST]:
+    """Yield what a statement evaluates before the statements within it."""
+    match statement:
+        case ast.If(test=head) | ast.While(test=head) | ast.Match(subject=head):
+            yield from evaluated(head)
+        case ast.For(iter=head) | ast.AsyncFor(iter=head):
+            yield from evaluated(head)
+        case ast.With(items=[first, *_]) | ast.AsyncWith(items=[first, *_]):
+            yield from evaluated(first.context_expr)
+        case ast.Try() | ast.TryStar():
+            pass  # it may expect that the attribute is missing
+        case _:
+            yield from evaluated(statement)
+
+
+def _stores(statement: ast.stmt, name: str) -> bool:
+    return any(
+        isinstance(node, ast.Attribute) and node.attr == name and isinstance(node.ctx, ast.Store)
+        for node in walk([statement])
+    )
 
 
 def _stored_at(name: str, function: Function) -> int:

@@ -12,6 +12,7 @@ from composer.behavior_checks.fitting import argument_problem, kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.libraries.standard_types import called
 from composer.behavior_types.scalars import is_text
 from composer.behavior_types.syntax.own_classes import defines
 from composer.behavior_types.values import Collection, OwnObject, Parameters, Ports, Value
@@ -105,6 +106,22 @@ def stored_problems(
         return
     if isinstance(owner, Collection) and not isinstance(target.slice, ast.Slice):
         yield from _stored(value, owner.element, "this item", scope)
+
+
+def default_problem(node: ast.expr, expected: Value, scope: FunctionTypes) -> str | None:
+    """Return why the values that ``defaultdict(...)`` makes contradict an annotation."""
+    match node:
+        case ast.Call(func=function, args=[factory]) if scope.called_name(
+            function
+        ) == "collections.defaultdict" and isinstance(expected, Collection):
+            if isinstance(factory, ast.Lambda):
+                made = scope.type_of(factory.body)
+            else:
+                made = called(scope.called_name(factory), (), {})
+            wrong = argument_problem(None, made, expected.element, scope.type_of)
+            return f"a new value: {wrong}" if wrong is not None else None
+        case _:
+            return None
 
 
 def _is_record(target: ast.Subscript, scope: FunctionTypes) -> bool:

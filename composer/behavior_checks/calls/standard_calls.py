@@ -12,9 +12,10 @@ from composer.behavior_checks.calls.arguments import (
     library_signature,
     signature_of_function,
 )
-from composer.behavior_checks.calls.call import call_problems, function_problems
+from composer.behavior_checks.calls.call import call_problems, function_problems, uncallable
 from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
+from composer.behavior_source.method_body import argument
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.expressions.objects import fields_expected
@@ -23,7 +24,7 @@ from composer.behavior_types.scalars import is_float
 from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.own_classes import is_dataclass
 from composer.behavior_types.values import OwnObject
-from composer.field_types import INTEGER
+from composer.field_types import ANYTHING, INTEGER
 
 #: Functions of math that do not take numbers only.
 _OF_ITERABLES = frozenset({"math.dist", "math.fsum", "math.prod", "math.sumprod"})
@@ -40,6 +41,8 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
     if name in {"functools.partial", "functools.partialmethod"}:
         yield from _partial(call, scope)
         return
+    if name == "collections.deque":
+        yield from _longest(call, scope)
     if name == "dataclasses.replace":
         yield from _replaced(call, scope)
         return
@@ -57,15 +60,15 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
             yield from library_argument_problems(call, signature, scope)
     if name == "time.sleep" or name in _OF_NUMBERS:
         takes_numbers = name not in _OF_ITERABLES
-        for argument in call.args:
-            found = scope.type_of(argument)
+        for item in call.args:
+            found = scope.type_of(item)
             kind = kind_of(found)
             if takes_numbers and kind not in (None, "number"):
                 message = f"{shown(found)} where a number is expected"
-                yield CodeProblem(Kind.VALUE, message, span_of(argument, scope.home.source))
+                yield CodeProblem(Kind.VALUE, message, span_of(item, scope.home.source))
             elif name == "math.dist" and kind == "number":
                 message = f"{shown(found)} where the coordinates of a point are expected"
-                yield CodeProblem(Kind.VALUE, message, span_of(argument, scope.home.source))
+                yield CodeProblem(Kind.VALUE, message, span_of(item, scope.home.source))
                 return  # the other point has the same cause
     yield from _called_functions(call, name, scope)
     if name == "sum" and len(call.args) == 1:
@@ -95,9 +98,9 @@ def _called_functions(call: ast.Call, name: str, scope: FunctionTypes) -> Iterat
 
 
 def _range(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
-    for argument in call.args:
-        found = scope.type_of(argument)
-        span = span_of(argument, scope.home.source)
+    for item in call.args:
+        found = scope.type_of(item)
+        span = span_of(item, scope.home.source)
         if is_float(found):
             problem = "'range' takes integers, not a float"
             yield CodeProblem(Kind.VALUE, problem, span, "write int(...)")
@@ -105,6 +108,15 @@ def _range(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
             problem = f"'range' takes integers, not {shown(found)}"
             hint = None if kind_of(found) == "function" else "write range(len(...))"
             yield CodeProblem(Kind.VALUE, problem, span, hint)
+
+
+def _longest(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check the length that ``deque`` is limited to."""
+    limit = argument(call, 1, "maxlen")
+    found = scope.type_of(limit) if limit is not None else ANYTHING
+    if limit is not None and (is_float(found) or kind_of(found) not in (None, "number")):
+        problem = f"'maxlen' is an integer, not {shown(found)}"
+        yield CodeProblem(Kind.VALUE, problem, span_of(limit, scope.home.source))
 
 
 def _replaced(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -129,6 +141,10 @@ def _converted(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
 def _partial(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:
     """Check what ``functools.partial`` sets against the function; it may leave out arguments."""
     if not call.args or isinstance(call.args[0], ast.Starred):
+        return
+    reason = uncallable(scope.type_of(call.args[0]))
+    if reason is not None:
+        yield CodeProblem(Kind.CALL, reason[0], span_of(call.args[0], scope.home.source))
         return
     signature = signature_of_function(call.args[0], scope.type_of(call.args[0]))
     if signature is not None:

@@ -27,11 +27,12 @@ from composer.behavior_types.values import (
 from composer.field_types import ANYTHING, BOOL
 from composer.interfaces import FieldType, Message
 
-#: Built-in functions whose first argument is iterated over.
 #: In how many lines after an assignment a name may be missing because of it.
 _REACH = 20
+#: Functions whose first argument is iterated over.
 _ITERATING = frozenset(
-    {"all", "any", "enumerate", "list", "reversed", "set", "sorted", "sum", "tuple"}
+    {"all", "any", "collections.deque", "enumerate", "frozenset", "itertools.pairwise", "list"}
+    | {"reversed", "set", "sorted", "sum", "tuple"}
 )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
-from inspect import isabstract
 from itertools import pairwise
 
 from composer.behavior_checks.calls.standard_calls import library_call_problems
@@ -12,6 +11,7 @@ from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.operations.caught import exception_class, unreachable_handlers
 from composer.behavior_checks.operations.formats import percent_problem
 from composer.behavior_checks.operations.membership import CONVERSIONS, conversion_problems
+from composer.behavior_checks.parts import is_only_none
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.flow import returned_values
@@ -32,13 +32,9 @@ from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.standard_types import ITERATORS
 from composer.behavior_types.scalars import is_float, is_integer, is_number, is_scalar, is_text
 from composer.behavior_types.syntax.literals import integer_constant
-from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
-    ApiValue,
     Collection,
-    OwnObject,
     Parameters,
-    Ports,
     Self,
     Value,
 )
@@ -66,29 +62,6 @@ def annotations_of(function: Function) -> Iterator[ast.expr]:
             yield argument.annotation
     if function.returns is not None:
         yield function.returns
-
-
-def uncallable(value: Value) -> tuple[str, str | None] | None:
-    """Return why a value cannot be called, and a hint; None if it may be."""
-    match value:
-        case ApiValue(class_name="Publisher"):
-            return "a Publisher is not a function", "call its method 'publish'"
-        case ApiValue(class_name=name):
-            return f"a {name} is not a function", None
-        case Ports() | Parameters():
-            return "this is not a function", None
-        case Message(name=name):
-            return f"{name} is not a function", None
-        case OwnObject(of=of):
-            known = known_attributes(of)
-            is_callable = known is None or "__call__" in known
-            return None if is_callable else (f"a {of.definition.name} is not a function", None)
-        case Collection(python=python) if not isabstract(python):
-            return f"a {python.__name__} is not a function", None
-        case FieldType() if is_scalar(value) or value.is_array:
-            return f"{described(value)} is not a function", None
-        case _:
-            return None
 
 
 def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -155,7 +128,7 @@ def _calculation(node: ast.BinOp, scope: FunctionTypes) -> Iterator[CodeProblem]
     problem = problem or percent_problem(left, operator, right, scope)
     problem = problem or _problem_of_array(left, operator, right, scope)
     if isinstance(operator, ast.MatMult):
-        problem = _product_problem(left, right, scope)
+        problem = problem or _product_problem(left, right, scope)
     if problem is not None:
         about = blamed_name((left, right), scope)
         place = uncalled(left, scope) or uncalled(right, scope) or node
@@ -197,6 +170,10 @@ def _is_plain_number(node: ast.expr, scope: FunctionTypes) -> bool:
 
 def _changed(node: ast.AugAssign, scope: FunctionTypes) -> Iterator[CodeProblem]:
     """Yield why '+=' and the like fail."""
+    if isinstance(node.target, ast.Attribute) and is_only_none(node.target, scope):
+        message = f"'{ast.unparse(node.target)}' is None: nothing else is assigned to it"
+        yield CodeProblem(Kind.NONE, message, span_of(node.target, scope.home.source))
+        return
     changed = scope.type_of(node.target)
     if changed is ANYTHING:
         before = before_changes(node.target, scope)

@@ -25,6 +25,7 @@ from composer.behavior_types.syntax.own_classes import (
 )
 from composer.behavior_types.values import (
     NONE,
+    AnyFunction,
     ApiMethod,
     Collection,
     ModuleFunction,
@@ -78,17 +79,19 @@ def _awaited(node: ast.expr, scope: FunctionTypes) -> Iterator[CodeProblem]:
         yield CodeProblem(Kind.VALUE, message, span, "write 'async for'")
     elif isinstance(node, ast.Call):
         function = scope.type_of(node.func)
-        name = _plain_function(function, found, scope)
+        name = _plain_function(node, function, found, scope)
         if name:
             message = f"'{name}' is not asynchronous, so that it cannot be awaited"
             span = span_of(node.func, scope.home.source)
             yield CodeProblem(Kind.VALUE, message, span, "remove 'await'")
 
 
-def _plain_function(function: Value, result: Value, scope: FunctionTypes) -> str:
+def _plain_function(node: ast.Call, function: Value, result: Value, scope: FunctionTypes) -> str:
     """Return the name of a function that returns nothing awaitable, "" if it may."""
     if isinstance(function, ApiMethod):
         return "" if function.member.is_async else function.member.name
+    if isinstance(function, AnyFunction):
+        return ast.unparse(node.func) if _kind(result, "__await__", scope) is not None else ""
     called = definition_of(function)
     if called is None or isinstance(called, ast.AsyncFunctionDef) or called.decorator_list:
         return ""
@@ -160,6 +163,10 @@ def _kind(found: Value, method: str, scope: FunctionTypes) -> str | None:
             return shown(found)
         case FieldType() if is_scalar(found):
             return shown(found)
+        case OwnObject(of=of) if is_named_tuple(of):
+            known_names = known_attributes(of)
+            may_have = known_names is None or method in known_names or hasattr(tuple, method)
+            return None if may_have else shown(found)
         case OwnObject(of=of) if is_plain(of) and not is_rclpy(of.home):
             classes = (of, *scope.owner.project_classes.derived(of))
             known = [known_attributes(item) for item in classes]

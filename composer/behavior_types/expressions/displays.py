@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from types import GeneratorType
 from typing import TYPE_CHECKING
 
-from composer.behavior_types.expressions.operators import binary, both, comparison, unary
+from composer.behavior_types.expressions.operators import both, comparison, unary
+from composer.behavior_types.expressions.protocols import calculated
 from composer.behavior_types.values import NONE, Collection, Value, join_all
 from composer.field_types import ANYTHING
 
@@ -19,7 +20,7 @@ def computed(scope: FunctionTypes, node: ast.expr) -> Value:
     """Return the type of an operation, or of a collection."""
     match node:
         case ast.BinOp(left=left, op=operator, right=right):
-            return binary(scope.type_of(left), operator, scope.type_of(right))
+            return calculated(scope, scope.type_of(left), operator, scope.type_of(right))
         case ast.UnaryOp(op=operator, operand=operand):
             return unary(operator, scope.type_of(operand))
         case ast.Compare(left=left, ops=operators, comparators=others):

@@ -138,7 +138,7 @@ def operation_problem(left: Value, operator: ast.operator, right: Value) -> str 
             return f"a function has no operator '{sign}'"
     if is_time(left) or is_time(right):
         return _problem_of_times(left, sign, right)
-    name = _NAMES[type(operator)]
+    name = NAMES[type(operator)]
     is_defined = _defines(left, f"__{name}__") or _defines(right, f"__r{name}__")
     for value in (left, right):
         if isinstance(value, OwnObject) and not is_defined and is_plain(value.of):
@@ -300,9 +300,11 @@ def _may_order(type_: OwnObject) -> bool:
 
 #: What tuples and numbers have in common; numpy takes tuples for arrays.
 _OF_TUPLES = frozenset({"+", "*", "%"})
-_NAMES: dict[type[ast.operator], str] = {
+#: The names of the special methods of operators, without what is around them.
+NAMES: dict[type[ast.operator], str] = {
     ast.Add: "add",
     ast.Sub: "sub",
+    ast.MatMult: "matmul",
     ast.Mult: "mul",
     ast.Div: "truediv",
     ast.FloorDiv: "floordiv",
@@ -317,6 +319,7 @@ _NAMES: dict[type[ast.operator], str] = {
 _SIGNS: dict[type[ast.operator], str] = {
     ast.Add: "+",
     ast.Sub: "-",
+    ast.MatMult: "@",
     ast.Mult: "*",
     ast.Div: "/",
     ast.FloorDiv: "//",
@@ -331,6 +334,7 @@ _SIGNS: dict[type[ast.operator], str] = {
 _FUNCTIONS: dict[type[ast.operator], Callable[[Any, Any], object]] = {
     ast.Add: calculation.add,
     ast.Sub: calculation.sub,
+    ast.MatMult: calculation.matmul,
     ast.Mult: calculation.mul,
     ast.Div: calculation.truediv,
     ast.FloorDiv: calculation.floordiv,

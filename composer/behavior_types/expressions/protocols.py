@@ -1,18 +1,26 @@
-"""The types of what objects give that are called, iterated over, or entered by ``with``."""
+"""The types of what objects give by special methods: called, iterated over, calculated with."""
 
 from __future__ import annotations
 
 import ast
+from types import GeneratorType
 from typing import TYPE_CHECKING
 
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.expressions.inferred import inferred_result
 from composer.behavior_types.expressions.objects import attribute_of_object, returned_by
+from composer.behavior_types.expressions.operators import NAMES, binary
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
 from composer.behavior_types.libraries.standard_types import element_of
 from composer.behavior_types.syntax.bindings import CONTEXTS
 from composer.behavior_types.syntax.own_classes import known_attributes
-from composer.behavior_types.values import ModuleFunction, OwnMethod, OwnObject, Value
+from composer.behavior_types.values import (
+    Collection,
+    ModuleFunction,
+    OwnMethod,
+    OwnObject,
+    Value,
+)
 from composer.field_types import ANYTHING
 
 if TYPE_CHECKING:
@@ -35,6 +43,24 @@ def iterated(scope: FunctionTypes, owner: Value) -> Value:
     if method is None or method.of is None:
         return element_of(owner)
     return element_of(_result(scope, method))
+
+
+def iterable(scope: FunctionTypes, owner: Value) -> Value:
+    """Return an iterator in place of an object whose class says how it is iterated over."""
+    method = special_method(scope, owner, "__iter__")
+    if method is None or method.of is None:
+        return owner
+    return Collection(GeneratorType, element_of(_result(scope, method)))
+
+
+def calculated(scope: FunctionTypes, left: Value, operator: ast.operator, right: Value) -> Value:
+    """Return the type of an operation, also of one that a class of the project defines."""
+    name = NAMES[type(operator)]
+    for owner, special in ((left, f"__{name}__"), (right, f"__r{name}__")):
+        method = special_method(scope, owner, special)
+        if method is not None:
+            return _result(scope, method) if method.of is not None else ANYTHING
+    return binary(left, operator, right)
 
 
 def entered(scope: FunctionTypes, node: ast.expr) -> Value:

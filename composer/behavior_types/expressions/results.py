@@ -6,10 +6,15 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.behavior_types.expressions.objects import created_object, given_class, returned_by
-from composer.behavior_types.expressions.protocols import called_object
+from composer.behavior_types.expressions.protocols import called_object, iterable
 from composer.behavior_types.libraries.api_values import api_result
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
-from composer.behavior_types.libraries.standard_types import builtin_result, called, method_result
+from composer.behavior_types.libraries.standard_types import (
+    ITERATING,
+    builtin_result,
+    called,
+    method_result,
+)
 from composer.behavior_types.syntax.own_classes import is_named_tuple
 from composer.behavior_types.values import (
     AnyFunction,
@@ -74,7 +79,10 @@ def result_of(scope: FunctionTypes, node: ast.Call) -> Value:
     if not full or any(isinstance(item, ast.Starred) for item in node.args):
         return ANYTHING
     named = {item.arg: scope.type_of(item.value) for item in node.keywords if item.arg}
-    found = called(full, [scope.type_of(item) for item in node.args], named)
+    arguments = [scope.type_of(item) for item in node.args]
+    if full in ITERATING or (full in {"max", "min"} and len(arguments) == 1):
+        arguments = [iterable(scope, item) for item in arguments]
+    found = called(full, arguments, named)
     return scope.normal(found) if isinstance(found, FieldType) else found
 
 

@@ -77,6 +77,12 @@ _COLLECTIONS: Mapping[str, type] = {
     "collections.deque": deque,
     "itertools.cycle": itertools.cycle,
 }
+#: Functions that iterate over each of their arguments.
+ITERATING = frozenset(
+    {"enumerate", "filter", "frozenset", "iter", "itertools.chain", "itertools.dropwhile"}
+    | {"itertools.islice", "itertools.pairwise", "itertools.takewhile", "list", "set", "sorted"}
+    | {"sum", "tuple", "zip"}
+)
 _COPYING = frozenset({"copy.copy", "copy.deepcopy", "dataclasses.replace"})
 _TEXTS = Collection(list, STRING)
 _OF_TEXT: Mapping[str, Value] = {
@@ -211,6 +217,26 @@ def _zip(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     return Collection(zip, pair(*map(element_of, arguments))) if arguments else ANYTHING
 
 
+def _pairwise(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    element = element_of(arguments[0]) if arguments else ANYTHING
+    return Collection(GeneratorType, pair(element, element))
+
+
+def _chain(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    return Collection(GeneratorType, join_all(map(element_of, arguments)))
+
+
+def _part(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    """Return the type of a call of ``islice``, which gives elements of its first argument."""
+    return Collection(GeneratorType, element_of(arguments[0]) if arguments else ANYTHING)
+
+
+def _chosen(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
+    """Return the type of a call of ``takewhile`` or ``dropwhile``."""
+    is_known = len(arguments) == _PAIR
+    return Collection(GeneratorType, element_of(arguments[1]) if is_known else ANYTHING)
+
+
 def _next(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     found = element_of(arguments[0]) if arguments else ANYTHING
     return join(found, arguments[1]) if len(arguments) > 1 else found
@@ -310,6 +336,11 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
     "heapq.heapreplace": _from_heap,
     "heapq.nlargest": _of_heap,
     "heapq.nsmallest": _of_heap,
+    "itertools.chain": _chain,
+    "itertools.dropwhile": _chosen,
+    "itertools.islice": _part,
+    "itertools.pairwise": _pairwise,
+    "itertools.takewhile": _chosen,
     "map": _map,
     "max": _least,
     "min": _least,

@@ -36,6 +36,14 @@ class Binding:
     creates: bool = True
     positions: tuple[int, ...] = ()
     is_inner: bool = False  # of a comprehension, which has names of its own
+    value: ast.expr | None = None  # with an annotation
+
+    @property
+    def stored(self) -> ast.expr | None:
+        """The whole value that is stored, None if it is not known."""
+        if self.how is How.ANNOTATION:
+            return self.value
+        return self.expression if self.how is How.VALUE and not self.positions else None
 
 
 @dataclass(slots=True)
@@ -113,14 +121,19 @@ class Bindings:
         expression: ast.expr | None,
         how: How = How.VALUE,
         positions: tuple[int, ...] = (),
+        *,
+        value: ast.expr | None = None,
     ) -> None:
-        """Record that ``target`` is bound to ``expression``, or to an item within it."""
+        """Record that ``target`` is bound to ``expression``, or to an item within it.
+
+        ``value`` is the value of a target with an annotation.
+        """
         match target:
             case ast.Name(id=name):
-                found = Binding(expression, how, positions=positions)
+                found = Binding(expression, how, positions=positions, value=value)
                 self.names.setdefault(name, []).append(found)
             case ast.Attribute(value=ast.Name(id=name), attr=attribute) if name == self.receiver:
-                found = Binding(expression, how, positions=positions)
+                found = Binding(expression, how, positions=positions, value=value)
                 self.attributes.setdefault(attribute, []).append(found)
             case ast.Tuple(elts=targets) | ast.List(elts=targets):
                 plain = how is How.VALUE and not positions
@@ -130,8 +143,8 @@ class Bindings:
                         self.bind(item, values[position])
                     else:
                         self.bind(item, expression, how, (*positions, position))
-            case ast.Starred(value=value):
-                self.bind(value, None)
+            case ast.Starred(value=inner):
+                self.bind(inner, None)
 
     def name(self, name: str | None) -> None:
         """Record that ``name`` is bound to something unknown."""
@@ -241,8 +254,8 @@ def _bind(node: ast.AST, found: Bindings) -> None:
         case ast.Assign(targets=targets, value=value):
             for target in targets:
                 found.bind(target, value)
-        case ast.AnnAssign(target=target, annotation=annotation):
-            found.bind(target, annotation, How.ANNOTATION)
+        case ast.AnnAssign(target=target, annotation=annotation, value=annotated):
+            found.bind(target, annotation, How.ANNOTATION, value=annotated)
         case ast.NamedExpr(target=target, value=value):
             found.bind(target, value)
         case ast.AugAssign(target=ast.Attribute(attr=attribute), op=operator, value=value):

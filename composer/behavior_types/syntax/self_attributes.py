@@ -47,6 +47,21 @@ def escapes(source: BehaviorSource, is_harmless: Callable[[str], bool] = lambda 
     )
 
 
+def sets_computed_names(source: BehaviorSource) -> bool:
+    """Return whether a class sets attributes whose names it computes, so that any may exist."""
+    return any(
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "setattr"
+        and len(node.args) > 1
+        and isinstance(node.args[0], ast.Name)
+        and node.args[0].id == "self"
+        and not isinstance(node.args[1], ast.Constant)
+        for _, known in source.classes
+        for node in walk(known.node.body)
+    )
+
+
 def defined_names(statement: ast.stmt, *, declared: bool = False) -> Iterator[str]:
     """Yield the names that a statement of a class may define.
 
@@ -69,9 +84,9 @@ def defined_names(statement: ast.stmt, *, declared: bool = False) -> Iterator[st
 
 
 def _sets_by_name(statement: ast.stmt) -> bool:
-    """Return whether a function calls ``setattr`` or ``vars``, or passes names on to what may."""
+    """Return whether a function sets attributes by name, or asks for them, or may do so."""
     return any(
-        (isinstance(node, ast.Name) and node.id in {"setattr", "vars"})
+        (isinstance(node, ast.Name) and node.id in {"hasattr", "setattr", "vars"})
         or (isinstance(node, ast.Attribute) and node.attr in {"__dict__", "__setattr__"})
         for node in walk([statement])
     )

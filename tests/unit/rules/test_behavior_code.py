@@ -118,7 +118,7 @@ MISTAKES = [
     ("odometry", "self.scale(1.0, nam='a')", "call-arguments", "nam", "'name'"),
     ("odometry", "self.scale(message)", "call-arguments", "message", None),
     ("odometry", "self.scale('fast')", "call-arguments", "'fast'", None),
-    ("odometry", "self.keep_rates([0.1, '0.2'])", "call-arguments", "[0.1, '0.2']", None),
+    ("odometry", "self.keep_rates([0.1, '0.2'])", "call-arguments", "'0.2'", None),
     ("odometry", "self.statistics.mean(1)", "call-arguments", "1", None),
     ("odometry", "self.publishers.text.publish()", "call-arguments", None, None),
     ("configure", "await self.action_clients.turn.send_goal(Navigate.Goal(), feedback=print)",
