@@ -23,8 +23,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from benchmarks.processes import RESULT_MARK
-from composer.runtime.children.member_report import parse_report
 from composer.runtime.manager.status_messages import status_message
+from composer.runtime.members.report import parse_report
 from composer.runtime.ros.diagnostic_arrays import write_array
 from composer.runtime.supervision.status import NodeStatus, SystemStatus
 from tests.ros.network.namespaces import Computer, network

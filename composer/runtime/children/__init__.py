@@ -1,1 +1,1 @@
-"""Nodes outside the process: child processes and external nodes, and how they are driven."""
+"""Child processes and their launcher, and the discovery servers among them."""

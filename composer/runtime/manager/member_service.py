@@ -13,7 +13,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 
-from composer.runtime.children.remote_lifecycle import DONE_IN
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Reply, unused_callback
@@ -22,6 +21,7 @@ from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, 
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN
 from composer.runtime.ros.limited_requests import TooLarge, limited
 from composer.runtime.ros.manager_protocol import (
     CHANGE_STATES,

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from composer.runtime.children.member_report import REPORTS_WITHIN_S
+from composer.runtime.members.report import REPORTS_WITHIN_S
 
 T = TypeVar("T")
 

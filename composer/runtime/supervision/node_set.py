@@ -22,11 +22,6 @@ from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.log import Write
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.children.executable_node import ExecutableNode
-from composer.runtime.children.external_node import ExternalNode
-from composer.runtime.children.member_node import MemberNode
-from composer.runtime.children.other_processes import OtherProcesses
-from composer.runtime.children.outside_node import OutsideContext, OutsideNode
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.futures import Future
@@ -35,6 +30,8 @@ from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode
 from composer.runtime.intra_process.eligibility import shared_channels
 from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.members.node import MemberNode
+from composer.runtime.members.other_processes import OtherProcesses
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
@@ -42,6 +39,9 @@ from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.node.parameters import ParameterError
+from composer.runtime.outside_nodes.executable_node import ExecutableNode
+from composer.runtime.outside_nodes.external_node import ExternalNode
+from composer.runtime.outside_nodes.outside_node import OutsideContext, OutsideNode
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.source import Located

@@ -13,7 +13,7 @@ import pytest
 from tests.ros.network.namespaces import PATIENCE_S, Computer, network
 from tests.ros.support.observers import Observer, observing
 
-pytestmark = pytest.mark.soak  # what one computer can show is in children/test_discovery_server.py
+pytestmark = pytest.mark.soak  # what one computer can show is in tests/ros/children
 COMPOSE = (sys.executable, "-m", "composer")
 SYSTEM = """
 system: robot

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.children.requested_steps import MemberRequest, RequestedStep
+from composer.runtime.members.requested_steps import MemberRequest, RequestedStep
 
 RESULT: Any = "done"
 

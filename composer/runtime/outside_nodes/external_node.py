@@ -6,7 +6,7 @@ from functools import partial
 from time import monotonic
 
 from composer.model import External, LifecycleKind, Node
-from composer.runtime.children.outside_node import (
+from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
     INACTIVE,
     UNCONFIGURED,
@@ -15,8 +15,8 @@ from composer.runtime.children.outside_node import (
     TransitionRefused,
     missing_text,
 )
-from composer.runtime.children.presence import NodePresence
-from composer.runtime.children.remote_lifecycle import NotAnswered, RemoteLifecycle
+from composer.runtime.outside_nodes.presence import NodePresence
+from composer.runtime.outside_nodes.remote_lifecycle import NotAnswered, RemoteLifecycle
 
 _PERIOD_S = 0.5
 _NOTHING_EARLIER: frozenset[bytes] = frozenset()

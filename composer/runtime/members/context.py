@@ -11,9 +11,9 @@ from rclpy.node import Node as RosNode
 
 from composer.model import LogLevel, Process
 from composer.runtime.children.child_processes import ChildProcesses, Command
-from composer.runtime.children.kept_goals import KeptGoals
-from composer.runtime.children.member_report import MemberState
 from composer.runtime.executors.loop import Loop
+from composer.runtime.members.kept_goals import KeptGoals
+from composer.runtime.members.report import MemberState
 from composer.runtime.process.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
 

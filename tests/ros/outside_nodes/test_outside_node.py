@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from composer.model import LogLevel
-from composer.runtime.children.outside_node import OutsideContext, OutsideNode
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.outside_nodes.outside_node import OutsideContext, OutsideNode
 from tests.ros.support.in_process import system_of
 
 TEXT = """

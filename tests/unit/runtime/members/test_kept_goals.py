@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from composer.model import PrimaryState, System
-from composer.runtime.children.kept_goals import KeptGoals
+from composer.runtime.members.kept_goals import KeptGoals
 from tests.unit.support.resolving import system_of
 
 ACTIVE, INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE

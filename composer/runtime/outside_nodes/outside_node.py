@@ -16,7 +16,6 @@ from rclpy.node import Node as RosNode
 
 from composer.model import LogLevel, Node, Port
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.children.remote_lifecycle import GOALS, PRIMARY_STATES
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
@@ -24,6 +23,7 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.outside_nodes.remote_lifecycle import GOALS, PRIMARY_STATES
 
 UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
 _DURING = {

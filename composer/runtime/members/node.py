@@ -12,10 +12,13 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import Node
-from composer.runtime.children.member_context import ProcessUnavailable
-from composer.runtime.children.member_process import STARTS_WITHIN_S, MemberProcess
-from composer.runtime.children.member_report import MemberState
-from composer.runtime.children.outside_node import (
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.tasks import within
+from composer.runtime.members.context import ProcessUnavailable
+from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
+from composer.runtime.members.report import MemberState
+from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
     INACTIVE,
     UNCONFIGURED,
@@ -23,10 +26,7 @@ from composer.runtime.children.outside_node import (
     OutsideNode,
     TransitionRefused,
 )
-from composer.runtime.children.remote_lifecycle import DONE_IN, GOALS, PRIMARY_STATES
-from composer.runtime.executors.futures import Future
-from composer.runtime.executors.tasks import within
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN, GOALS, PRIMARY_STATES
 from composer.runtime.ros.manager_protocol import CREATE
 
 #: A report follows a successful response soon; each second there is one in any case.

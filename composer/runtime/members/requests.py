@@ -22,10 +22,10 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetPara
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node as RosNode
 
-from composer.runtime.children.member_report import MemberReport
-from composer.runtime.children.requested_steps import AGAIN_AFTER_S, MemberRequest, RequestedStep
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.members.report import MemberReport
+from composer.runtime.members.requested_steps import AGAIN_AFTER_S, MemberRequest, RequestedStep
 from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import (
     FIGURES,

@@ -17,7 +17,7 @@ from composer.runtime.manager.other_instances import Instance
 from composer.runtime.process.instance_lock import hold_instance_lock, local_systems
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
-from tests.ros.children.split_robot import DETECTOR, TEXT, command_of, split, states
+from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, split, states
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system_of, wait_until
 from tests.ros.support.system_process import RunningSystem as CommandProcess
 

@@ -11,10 +11,10 @@ from composer.model import PrimaryState, System
 from composer.plan import SystemGoals
 from composer.runtime.callbacks.log import Write
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.children.kept_goals import KeptGoals
-from composer.runtime.children.member_context import MemberContext
-from composer.runtime.children.member_process import MemberProcess
 from composer.runtime.executors.loop import Loop
+from composer.runtime.members.context import MemberContext
+from composer.runtime.members.kept_goals import KeptGoals
+from composer.runtime.members.process import MemberProcess
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.addresses import is_this_computer

@@ -14,16 +14,17 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 
 from composer.model import ExecutorKind
-from composer.runtime.children import member_process, member_requests
 from composer.runtime.children.child_processes import Child, ChildProcesses
-from composer.runtime.children.kept_goals import KeptGoals
-from composer.runtime.children.member_context import MemberContext, ProcessUnavailable
-from composer.runtime.children.member_life import MemberLife
-from composer.runtime.children.member_process import MemberProcess
-from composer.runtime.children.member_report import MemberReport
-from composer.runtime.children.member_requests import MemberRequests
 from composer.runtime.executors.loop import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
+from composer.runtime.members import process as member_process
+from composer.runtime.members import requests as member_requests
+from composer.runtime.members.context import MemberContext, ProcessUnavailable
+from composer.runtime.members.kept_goals import KeptGoals
+from composer.runtime.members.life import MemberLife
+from composer.runtime.members.process import MemberProcess
+from composer.runtime.members.report import MemberReport
+from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import (

@@ -23,23 +23,23 @@ from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import LogLevel, Process
 from composer.runtime.children.child_processes import Child, StartFailed
-from composer.runtime.children.member_context import Member, MemberContext, ProcessUnavailable
-from composer.runtime.children.member_life import MemberLife
-from composer.runtime.children.member_report import (
+from composer.runtime.children.output import parse_line
+from composer.runtime.executors.exceptions import printable
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.tasks import sleep
+from composer.runtime.members.context import Member, MemberContext, ProcessUnavailable
+from composer.runtime.members.life import MemberLife
+from composer.runtime.members.report import (
     REPORTS_WITHIN_S,
     MemberReport,
     NodeFigures,
     parse_report,
 )
-from composer.runtime.children.member_requests import MemberRequests
-from composer.runtime.children.output import parse_line
-from composer.runtime.children.remote_lifecycle import PRIMARY_STATES
-from composer.runtime.executors.exceptions import printable
-from composer.runtime.executors.futures import Future
-from composer.runtime.executors.tasks import sleep
+from composer.runtime.members.requests import MemberRequests
 from composer.runtime.metrics.diagnostics import from_text
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.outcome import FINALIZED
+from composer.runtime.outside_nodes.remote_lifecycle import PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
 from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
 

@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.ros.manager_protocol import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
-from tests.ros.children.split_robot import command_of, split
+from tests.ros.members.split_robot import command_of, split
 from tests.ros.support.in_process import Peer, finished, wait_until
 
 #: What a service keeps of requests that it has not taken yet.

@@ -11,15 +11,15 @@ import pytest
 from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import ExecutorKind, LogLevel
-from composer.runtime.children import member_node
-from composer.runtime.children.member_context import ProcessUnavailable
-from composer.runtime.children.member_node import MemberNode
-from composer.runtime.children.member_report import MemberState
-from composer.runtime.children.outside_node import OutsideContext
 from composer.runtime.executors.futures import Future
+from composer.runtime.members import node as member_node
+from composer.runtime.members.context import ProcessUnavailable
+from composer.runtime.members.node import MemberNode
+from composer.runtime.members.report import MemberState
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.outcome import TransitionOutcome
-from tests.ros.children.split_robot import DETECTOR, TEXT
+from composer.runtime.outside_nodes.outside_node import OutsideContext
+from tests.ros.members.split_robot import DETECTOR, TEXT
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
 

@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.supervision.events import NodeFailed, Restarted, RollingBack
-from tests.ros.children.split_robot import TEXT, split, states
+from tests.ros.members.split_robot import TEXT, split, states
 from tests.ros.support.in_process import Peer, RunningSystem, wait_until
 
 SHAKY = """

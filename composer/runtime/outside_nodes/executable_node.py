@@ -20,7 +20,8 @@ from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
 from composer.runtime.children.output import parse_line
-from composer.runtime.children.outside_node import (
+from composer.runtime.executors.exceptions import printable
+from composer.runtime.outside_nodes.outside_node import (
     INACTIVE,
     UNCONFIGURED,
     OutsideContext,
@@ -28,9 +29,8 @@ from composer.runtime.children.outside_node import (
     TransitionRefused,
     missing_text,
 )
-from composer.runtime.children.presence import NodePresence
-from composer.runtime.children.remote_lifecycle import NotAnswered, RemoteLifecycle
-from composer.runtime.executors.exceptions import printable
+from composer.runtime.outside_nodes.presence import NodePresence
+from composer.runtime.outside_nodes.remote_lifecycle import NotAnswered, RemoteLifecycle
 
 #: How long a killed process may take to disappear.
 _KILLED_WITHIN_S = 1.0

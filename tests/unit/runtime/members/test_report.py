@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.children.member_report import NodeFigures, parse_report
+from composer.runtime.members.report import NodeFigures, parse_report
 from composer.runtime.ros.diagnostic_arrays import Level, Status, write_array
 
 SYSTEM = {

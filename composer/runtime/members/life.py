@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from composer.runtime.children.child_processes import Child
-from composer.runtime.children.member_report import MemberReport, MemberState
+from composer.runtime.members.report import MemberReport, MemberState
 
 
 @dataclass(slots=True)

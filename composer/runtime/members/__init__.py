@@ -1,0 +1,1 @@
+"""Other processes of the system: their reports, requests to them, and the nodes in them."""

@@ -1,0 +1,1 @@
+"""Nodes outside the process: external nodes and executables, and the clients of their lifecycle."""
