@@ -11,7 +11,7 @@ from pathlib import Path
 
 from composer.behavior_checks.attributes.module_attributes import module_attributes
 from composer.behavior_checks.problems import CodeProblem, Kind
-from composer.behavior_source import Module
+from composer.behavior_source import Module, nearby_modules
 from composer.behavior_source.library import is_standard, standard_names
 from composer.behavior_source.method_body import catches, dotted
 from composer.behavior_source.modules import (
@@ -157,6 +157,9 @@ class _Imports:
             return None
         if is_installed(top) or top in _USUAL:
             return None
+        nearby = nearby_modules(name, *self._place)
+        if nearby.package:
+            return _Missing(f"no module named '{name}'", nearby.hint, nearby.missing)
         close = nearest(top, self._modules)
         if close is None:
             hint = "install it, or correct the name"

@@ -22,6 +22,9 @@ from composer.interfaces.sources import (
 )
 from composer.source import SourceFile, Span, shown_path
 
+#: A type as descriptions of interfaces name it.
+_LONG_TYPE = re.compile(r"(?m)^[ \t]*(?P<package>[a-z]\w*)/msg/(?P<name>[A-Z]\w*)")
+
 
 @dataclass(frozen=True, slots=True)
 class InvalidDefinition:
@@ -188,12 +191,19 @@ class Interfaces:
     ) -> InvalidDefinition | None:
         """Return an error if a field of a project's interface has a type that cannot be used.
 
-        Such a type does not exist, contains the interface itself, or has an error in its own
-        definition. Types of unknown packages are not errors unless their name is misspelled: their
-        definitions may be installed elsewhere.
+        Such a type does not exist, contains the interface itself, has an error in its own
+        definition, or is named as only descriptions name it. Types of unknown packages are not
+        errors unless their name is misspelled: their definitions may be installed elsewhere.
         """
         if isinstance(interface, InvalidDefinition) or not self._is_of_project(interface.name):
             return None
+        long = _LONG_TYPE.search(definition.text)
+        if long is not None:
+            message = f"types are named without 'msg': '{long['package']}/{long['name']}'"
+            line = definition.text.count("\n", 0, long.start("package")) + 1
+            return InvalidDefinition(
+                interface.name, definition.path, line, message, definition.text
+            )
         for field in (field for part in parts(interface).values() for field in part.fields):
             if field.type.is_primitive:
                 continue

@@ -27,7 +27,7 @@ class RestartBudget:
     The first restart within ``window_ms`` waits ``backoff_ms``, each further one twice as long as
     the one before, at most ``backoff_max_ms``. If a node fails again after ``max_attempts``
     restarts, the system shuts down. ``span`` is the location of the declaration, ``backoff_span``
-    that of the backoff.
+    that of the backoff; ``has_window``: it sets ``window_ms``.
     """
 
     max_attempts: int = 5
@@ -36,6 +36,7 @@ class RestartBudget:
     backoff_max_ms: float = 10_000.0
     span: Span | None = field(default=None, compare=False)
     backoff_span: Span | None = field(default=None, compare=False)
+    has_window: bool = field(default=False, compare=False)
 
     def backoff_s(self, attempts: int) -> float:
         """Return the backoff in seconds after ``attempts`` earlier restarts."""

@@ -48,6 +48,7 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
         backoff_max_ms=milliseconds("backoff_max_ms", default.backoff_max_ms),
         span=entry.key.span,
         backoff_span=None if backoff is None else backoff.span,
+        has_window=tree.get("window_ms") is not None,
     )
 
 

@@ -64,9 +64,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _republishes(channel: Channel, end: PortOfNode) -> bool:
-    """Return whether the subscription publishes to its own topic; another rule reports that."""
+    """Return whether each message is published to its own topic; topic-loop reports that."""
     reaction = end.port.reaction(Event.MESSAGE)
-    sent = {send.port.value for send in reaction.publish} if reaction is not None else set()
+    is_always = reaction is not None and reaction.when is None
+    sent = {send.port.value for send in reaction.publish} if reaction and is_always else set()
     return any(
         source.node is end.node and source.port.name.value in sent for source in channel.sources
     )

@@ -59,5 +59,5 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 def _uses(supervision: Supervision) -> bool:
     """Return whether the settings have an effect; errors are counted within their window, too."""
-    counts_errors = supervision.watch.max_errors is not None
+    counts_errors = supervision.watch.max_errors is not None and supervision.restart.has_window
     return supervision.policy is OnFailure.RESTART or counts_errors

@@ -244,6 +244,7 @@ def test_packages_that_are_not_on_pypi_are_known_without_ros(name: str) -> None:
         ({"msg_Demo": "bool on\nint33 x\n"}, "'int33' is neither a primitive type", 2),
         ({"msg_Demo": "bool on\nOther other\n", "msg_Other": ""}, None, 0),
         ({"msg_Demo": "elsewhere_msgs/Other other\n"}, None, 0),
+        ({"msg_Demo": "bool on\nstd_msgs/msg/Header h\n"}, "types are named without 'msg'", 2),
         ({"msg_Demo": "std_msg/Header header\n"}, "field 'header' has the unknown type", 1),
         ({"msg_Demo": "std_msg/Elsewhere header\n"}, None, 0),
         ({"msg_Demo": "bool on\n---\nbool off\n"}, "a .msg file has 0 lines with '---'", 2),
