@@ -18,8 +18,8 @@ from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
 from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
 from composer.runtime.process.environment import ROS_ARGUMENTS
-from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo
 from composer.runtime.ros.messages import MessageError, interface_class
+from composer.runtime.ros_graph.endpoints import EndpointInfo, TopicInfo
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
 #: Fast DDS repeats the announcement of a participant every 3 s.

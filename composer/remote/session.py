@@ -25,13 +25,13 @@ from composer.runtime.process import dds_profiles, start_refused
 from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
 from composer.runtime.process.environment import ROS_ARGUMENTS
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.graph import (
+from composer.runtime.ros.manager_protocol import NAME
+from composer.runtime.ros_graph.graph import (
     COMMAND_PREFIX,
     SETTLE_S,
     NodeName,
     RosGraph,
 )
-from composer.runtime.ros.manager_protocol import NAME
 
 T = TypeVar("T")
 H = TypeVar("H", bound=Hashable)

@@ -22,8 +22,8 @@ from composer.remote.messages.values import class_of
 from composer.remote.session import Deadline, Session
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.loop import Taken
-from composer.runtime.ros.graph_changes import GraphChanges
 from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros_graph.changes import GraphChanges
 
 InvalidHandle = rclpy_implementation.InvalidHandle
 _WAIT_S = 0.02

@@ -17,8 +17,8 @@ from composer.remote.graph_names import GraphNames, type_mismatch_hint
 from composer.remote.messages.values import Build, class_of
 from composer.remote.name_matching import full_name
 from composer.remote.session import Deadline, NoResponseError, RosError, Session
-from composer.runtime.ros.endpoints import TopicInfo
 from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros_graph.endpoints import TopicInfo
 
 _SUBSCRIPTION_DEPTH = 1000
 _ACKNOWLEDGED_WITHIN_S = 1

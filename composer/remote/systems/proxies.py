@@ -19,8 +19,8 @@ from composer.remote.systems.system_reports import (
     reported_node,
     reported_statuses,
 )
-from composer.runtime.ros.graph import is_valid_name
 from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
+from composer.runtime.ros_graph.graph import is_valid_name
 
 LIFECYCLE, PARAMETERS = "lifecycle", "parameters"
 _SERVICE = f"/{NAME}/{CHANGE_STATE}"

@@ -23,8 +23,8 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.loop import Reply, unused_callback
-from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
+from composer.runtime.ros_graph.graph import participant, servers_of
 
 #: Discovery of another participant takes up to three seconds; later, this system is not refused.
 START_S = 5.0

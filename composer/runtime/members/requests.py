@@ -26,7 +26,6 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.report import MemberReport
 from composer.runtime.members.requested_steps import AGAIN_AFTER_S, MemberRequest, RequestedStep
-from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import (
     FIGURES,
     GOALS,
@@ -37,6 +36,7 @@ from composer.runtime.ros.manager_protocol import (
     SENDER,
     STEPS,
 )
+from composer.runtime.ros_graph.graph import participant, servers_of
 
 _MAX_STEPS = 500  # per request; a service takes up to 1000
 _MAX_REQUESTS = 8

@@ -8,7 +8,7 @@ from rclpy.node import Node as RosNode
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.model import Node, Port, PortKind
-from composer.runtime.ros.graph import RosGraph, clients_of, participant, servers_of
+from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.
 _COMMON_TOPICS = ("/rosout", "/parameter_events")

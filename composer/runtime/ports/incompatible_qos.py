@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.model import Port, PortKind
 from composer.qos import incompatibilities
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.ros.endpoints import EndpointInfo, topic_info
+from composer.runtime.ros_graph.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
 _CHECKS = 20

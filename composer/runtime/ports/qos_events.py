@@ -26,7 +26,7 @@ from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import RepeatedWarning
 from composer.runtime.ports.incompatible_qos import IncompatibleQos
-from composer.runtime.ros.endpoints import topic_info
+from composer.runtime.ros_graph.endpoints import topic_info
 
 _PUBLISHER = QoSPublisherEventType
 _SUBSCRIPTION = QoSSubscriptionEventType

@@ -26,7 +26,6 @@ from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.report import MemberReport
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import hold_instance_lock
-from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.manager_protocol import (
     CHANGE_STATES,
     FIGURES,
@@ -36,6 +35,7 @@ from composer.runtime.ros.manager_protocol import (
     SENDER,
     STATE_QOS,
 )
+from composer.runtime.ros_graph.graph import participant, servers_of
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
 

@@ -11,7 +11,7 @@ import pytest
 from lifecycle_msgs.srv import GetState
 from std_srvs.srv import Trigger
 
-from composer.runtime.ros.graph import participant, servers_of
+from composer.runtime.ros_graph.graph import participant, servers_of
 from composer.runtime.supervision.events import NodeFailed, Restarted, RollingBack
 from tests.ros.members.split_robot import TEXT, split, states
 from tests.ros.support.in_process import Peer, RunningSystem, wait_until

@@ -15,9 +15,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Empty
 
 from composer.runtime.process.dds_participants import count_participants
-from composer.runtime.ros.ended_participants import ended_participants
-from composer.runtime.ros.endpoints import UNKNOWN_NODE
-from composer.runtime.ros.graph import RosGraph, participant
+from composer.runtime.ros_graph.ended_participants import ended_participants
+from composer.runtime.ros_graph.endpoints import UNKNOWN_NODE
+from composer.runtime.ros_graph.graph import RosGraph, participant
 from tests.ros.support.commands import PYTHON, hand_written
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.raw_rmw import NodeNames, own_prefix

@@ -35,7 +35,7 @@ from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.node.node import RunningNode
 from composer.runtime.process.shared_memory import remove_incomplete_ports
-from composer.runtime.ros.graph import servers_of
+from composer.runtime.ros_graph.graph import servers_of
 from composer.runtime.supervision.events import (
     BroughtUp,
     Event,

@@ -16,7 +16,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from composer.runtime.ros.graph import participant, servers_of
+from composer.runtime.ros_graph.graph import participant, servers_of
 
 _REPEAT_AFTER_S = 0.5
 #: Names of service types that change nothing begin with these.

@@ -24,8 +24,13 @@ from rclpy.validate_node_name import validate_node_name
 
 from composer.names import join_node_name
 from composer.runtime.process.query_socket import NameAndTypes
-from composer.runtime.ros.ended_participants import ended_participants
-from composer.runtime.ros.endpoints import PARTICIPANT_BYTES, UNKNOWN_NODE, TopicInfo, topic_info
+from composer.runtime.ros_graph.ended_participants import ended_participants
+from composer.runtime.ros_graph.endpoints import (
+    PARTICIPANT_BYTES,
+    UNKNOWN_NODE,
+    TopicInfo,
+    topic_info,
+)
 
 #: The name and the namespace of a node.
 NodeName: TypeAlias = tuple[str, str]

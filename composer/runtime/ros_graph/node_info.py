@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from composer.names import split_node_name
 from composer.runtime.process.query_socket import NameAndTypes, visible
-from composer.runtime.ros.graph import RosGraph
+from composer.runtime.ros_graph.graph import RosGraph
 
 
 @dataclass(frozen=True, slots=True)

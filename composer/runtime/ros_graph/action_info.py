@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from composer.names import split_node_name
-from composer.runtime.ros.graph import RosGraph
+from composer.runtime.ros_graph.graph import RosGraph
 
 
 @dataclass(frozen=True, slots=True)

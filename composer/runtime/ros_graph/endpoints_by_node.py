@@ -8,7 +8,7 @@ from typing import TypeAlias
 from composer.drift import ObservedEndpoint
 from composer.model import PortKind
 from composer.names import is_hidden, join_node_name, split_node_name
-from composer.runtime.ros.graph import RosGraph
+from composer.runtime.ros_graph.graph import RosGraph
 
 #: The order of endpoints of a node.
 _ORDER = {kind: number for number, kind in enumerate(PortKind)}

@@ -1,0 +1,1 @@
+"""The ROS graph as a node has discovered it: nodes, endpoints, and changes of them."""
