@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from composer.doctor.result import CheckResult, error, ok, warning
 from composer.model import Discovery, DiscoveryKind
+from composer.runtime.middleware.discovery import discovery_conflict
 from composer.runtime.process.addresses import (
     PortState,
     has_interface,
@@ -17,7 +18,6 @@ from composer.runtime.process.addresses import (
     port_state,
     resolve,
 )
-from composer.runtime.process.discovery import discovery_conflict
 
 AREA = "discovery"
 #: A datagram to this port is for no program (RFC 863).

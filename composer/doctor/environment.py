@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from composer.doctor.result import CheckResult, error, note, ok, warning
-from composer.runtime.process.environment import refusals
+from composer.runtime.middleware.environment import refusals
 
 AREA = "environment"
 DISTRIBUTION = "jazzy"

@@ -17,7 +17,7 @@ from composer.qos import incompatibilities
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
 from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
-from composer.runtime.process.environment import ROS_ARGUMENTS
+from composer.runtime.middleware.environment import ROS_ARGUMENTS
 from composer.runtime.ros.messages import MessageError, interface_class
 from composer.runtime.ros_graph.endpoints import EndpointInfo, TopicInfo
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from composer.doctor.result import CheckResult, note, ok, warning
-from composer.runtime.process.shared_memory import (
+from composer.runtime.middleware.shared_memory import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,
     MIN_FREE_BYTES,

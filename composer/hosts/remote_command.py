@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 
 from composer.model import Host
-from composer.runtime.process.environment import CONSOLE_FORMAT
+from composer.runtime.middleware.environment import CONSOLE_FORMAT
 
 #: Exit codes of the commands: what kept them from starting Python.
 NO_WORKSPACE, NO_SETUP, NO_PYTHON = 71, 72, 73

@@ -21,8 +21,8 @@ from rclpy.qos import QoSProfile
 from composer.model import BehaviorReference
 from composer.project import Project
 from composer.remote.parameter_descriptions import settings_of
+from composer.runtime.middleware.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.node.behavior_loader import behavior_class
-from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.ros.parameter_values import description
 from composer.source import Located, SourceFile, Span
 

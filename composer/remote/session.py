@@ -21,9 +21,10 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from composer.runtime.process import dds_profiles, start_refused
-from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
-from composer.runtime.process.environment import ROS_ARGUMENTS
+from composer.runtime.middleware import dds_profiles
+from composer.runtime.middleware.dds_participants import count_participants, enlarge_receive_buffers
+from composer.runtime.middleware.environment import ROS_ARGUMENTS
+from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros.manager_protocol import NAME
 from composer.runtime.ros_graph.graph import (
@@ -74,7 +75,7 @@ class Deadline:
 
 
 def use_command_profile() -> None:
-    """Disable shared memory in this process: see :mod:`composer.runtime.process.dds_profiles`.
+    """Disable shared memory in this process: see :mod:`composer.runtime.middleware.dds_profiles`.
 
     For commands that carry no large messages. Call it before joining the ROS graph.
     """

@@ -46,14 +46,14 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
 from composer.runtime.metrics.figures import merged_chains
+from composer.runtime.middleware.dds_interfaces import use_interfaces
+from composer.runtime.middleware.dds_profiles import use_large_system_profile
+from composer.runtime.middleware.dds_segment import segment_for_large_messages
+from composer.runtime.middleware.discovery import active_variables
+from composer.runtime.middleware.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
-from composer.runtime.process.dds_interfaces import use_interfaces
-from composer.runtime.process.dds_profiles import use_large_system_profile
-from composer.runtime.process.dds_segment import segment_for_large_messages
-from composer.runtime.process.discovery import active_variables
-from composer.runtime.process.environment import ROS_ARGUMENTS, prepare_environment
 from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.signals import stop_signals

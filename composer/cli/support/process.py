@@ -137,7 +137,7 @@ def _start_error(message: str, log: Path) -> CommandError:
 
 def _log_path(system: str) -> Path:
     """Return a new file name in the ROS log folder."""
-    from composer.runtime.process.environment import log_folder
+    from composer.runtime.middleware.environment import log_folder
 
     try:
         folder = log_folder(os.environ) or Path.home() / ".ros" / "log"

@@ -31,9 +31,9 @@ def require_ros(command: str, system: System | None = None) -> None:
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
     keep_stdout_for_data()
+    from composer.runtime.middleware.discovery import adopt_discovery
+    from composer.runtime.middleware.environment import prepare_environment
     from composer.runtime.process import StartRefused
-    from composer.runtime.process.discovery import adopt_discovery
-    from composer.runtime.process.environment import prepare_environment
 
     try:
         prepare_environment(None if system is None else system.discovery)
@@ -46,7 +46,7 @@ def require_ros(command: str, system: System | None = None) -> None:
 
 def announce_discovery(system: System) -> None:
     """Print what other tools of ROS need to discover the system, if that is not the default."""
-    from composer.runtime.process.discovery import as_assignments, discovery_conflict
+    from composer.runtime.middleware.discovery import as_assignments, discovery_conflict
 
     if system.discovery is None:
         return

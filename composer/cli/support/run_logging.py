@@ -11,7 +11,7 @@ from composer.cli.support.output.output_queue import OutputQueue
 from composer.cli.support.output.progress import logger_and_text, severity_of
 from composer.cli.support.output.terminal import say
 from composer.run_log import Record, RotatingFile, RunFolder
-from composer.runtime.process.environment import log_folder
+from composer.runtime.middleware.environment import log_folder
 from composer.runtime.supervision.events import CallbackFailed, Event, Logged
 
 

@@ -22,7 +22,7 @@ from composer.executables import (
 from composer.model import ChannelKind, Executable, LogLevel, Node, ParameterType
 from composer.names import expand_name
 from composer.runtime.children.child_processes import Command
-from composer.runtime.process.environment import CONSOLE_FORMAT
+from composer.runtime.middleware.environment import CONSOLE_FORMAT
 from composer.tree import Plain
 
 #: The topics and services of an action. rcl remaps each of them by its own name.

@@ -28,12 +28,12 @@ from composer.runtime.children.child_processes import (
     signal_name,
 )
 from composer.runtime.children.server_record import ServerRecord
+from composer.runtime.middleware.discovery import active_variables
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import PortState, is_own_address, port_state, resolve
-from composer.runtime.process.discovery import active_variables
 
 _PROGRAM = "fast-discovery-server"
-_PROFILE = Path(__file__).parents[1] / "process" / "discovery_server.xml"
+_PROFILE = Path(__file__).with_name("discovery_server.xml")
 #: The lease in the profile, and the time until clients have noticed its end.
 RESTART_DELAY_S = 6.0
 #: A server that was idle for so long has passed on that the nodes have left. If it ends earlier,

@@ -9,7 +9,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from composer.runtime.process.dds_participants import count_participants
+from composer.runtime.middleware.dds_participants import count_participants
 from composer.runtime.process.query_socket import KINDS, GraphView
 from composer.runtime.ros_graph.action_info import action_info
 from composer.runtime.ros_graph.changes import PolledGraphChanges

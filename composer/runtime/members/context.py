@@ -14,7 +14,7 @@ from composer.runtime.children.child_processes import ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.report import MemberState
-from composer.runtime.process.environment import CONSOLE_FORMAT
+from composer.runtime.middleware.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
 
 #: The path of the enclave of a process: see :mod:`composer.export.sros2`.

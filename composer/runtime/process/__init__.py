@@ -1,4 +1,4 @@
-"""What concerns the whole process: environment, DDS profiles, instance lock, signals, exit."""
+"""What concerns the whole process: instance lock, query socket, signals, exit."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Set
 from pathlib import Path
 
-from composer.runtime.process.dds_participants import count_participants
+from composer.runtime.middleware.dds_participants import count_participants
 
 #: The prefix of a participant of Fast DDS: its vendor, the computer, and the lower half of the
 #: process id, with the lowest byte first.

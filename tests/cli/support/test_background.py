@@ -74,7 +74,7 @@ WITHOUT_HOME = """
 import os
 from composer.cli.support.process import run_in_background
 from composer.cli.support.errors import CommandError
-from composer.runtime.process import environment
+from composer.runtime.middleware import environment
 del os.environ["HOME"]
 os.environ.pop("ROS_LOG_DIR", None)
 os.environ.pop("ROS_HOME", None)

@@ -13,7 +13,7 @@ import pytest
 import yaml
 from std_srvs.srv import Trigger
 
-from composer.runtime.process.shared_memory import SHARED_MEMORY
+from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import PATIENCE_S, Peer, running, wait_until
 

@@ -14,7 +14,7 @@ from textwrap import dedent
 import pytest
 
 from composer.resources import systems_folder
-from composer.runtime.process.shared_memory import SHARED_MEMORY
+from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import end_limit_s
 

@@ -33,8 +33,8 @@ from composer.project import Project
 from composer.resolve import resolve
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
+from composer.runtime.middleware.shared_memory import remove_incomplete_ports
 from composer.runtime.node.node import RunningNode
-from composer.runtime.process.shared_memory import remove_incomplete_ports
 from composer.runtime.ros_graph.graph import servers_of
 from composer.runtime.supervision.events import (
     BroughtUp,

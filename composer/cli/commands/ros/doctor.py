@@ -116,13 +116,13 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
     from composer.doctor.result import Level, note
     from composer.doctor.versions import check_versions
     from composer.report.tool import tool_version
-    from composer.runtime.process.environment import complete_environment
-    from composer.runtime.process.shared_memory import SHARED_MEMORY
+    from composer.runtime.middleware.environment import complete_environment
+    from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 
     yield from check_versions(tool_version())
     if system is not None and system.discovery is not None:
         from composer.doctor.discovery import check_declared_discovery
-        from composer.runtime.process.discovery import use_discovery
+        from composer.runtime.middleware.discovery import use_discovery
 
         yield from check_declared_discovery(system.discovery, os.environ)
         use_discovery(system.discovery, os.environ)

@@ -156,7 +156,7 @@ def _runs(system: str | None) -> list[Run]:
 
 def _folder() -> Path:
     """Return the ROS log folder. Raises CommandError if there is none."""
-    from composer.runtime.process.environment import log_folder
+    from composer.runtime.middleware.environment import log_folder
 
     folder = log_folder(os.environ)
     if folder is None:

@@ -53,7 +53,7 @@ class LineFormat:
 
 def console_format() -> LineFormat | None:
     """Return the format that the user has set; None for the default one."""
-    from composer.runtime.process.environment import CONSOLE_FORMAT
+    from composer.runtime.middleware.environment import CONSOLE_FORMAT
 
     text = os.environ.get(CONSOLE_FORMAT_VARIABLE, CONSOLE_FORMAT)
     return None if text == CONSOLE_FORMAT else LineFormat(text)
@@ -61,7 +61,7 @@ def console_format() -> LineFormat | None:
 
 def file_format() -> str:
     """Return the format for a log file: it has the date and time unless the user has set one."""
-    from composer.runtime.process.environment import CONSOLE_FORMAT
+    from composer.runtime.middleware.environment import CONSOLE_FORMAT
 
     text = os.environ.get(CONSOLE_FORMAT_VARIABLE, CONSOLE_FORMAT)
     return _FILE_FORMAT if text == CONSOLE_FORMAT else text

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import MutableMapping
 from contextlib import suppress
 
-from composer.runtime.process.dds_profiles import is_default_profile, save_profile
-from composer.runtime.process.dds_xml import without
+from composer.runtime.middleware.dds_profiles import is_default_profile, save_profile
+from composer.runtime.middleware.dds_xml import without
 
 _PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 

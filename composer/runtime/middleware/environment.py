@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 from composer.diagnostics import nearest
 from composer.model.hosts import HIGHEST_DOMAIN_ID, domain_problem
+from composer.runtime.middleware.dds_profiles import use_discovery_profile
+from composer.runtime.middleware.discovery import use_discovery
+from composer.runtime.middleware.shared_memory import remove_incomplete_ports
 from composer.runtime.process import StartRefused
-from composer.runtime.process.dds_profiles import use_discovery_profile
-from composer.runtime.process.discovery import use_discovery
-from composer.runtime.process.shared_memory import remove_incomplete_ports
 
 if TYPE_CHECKING:
     from composer.model import Discovery

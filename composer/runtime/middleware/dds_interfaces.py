@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import MutableMapping, Sequence
 
 from composer.model import Discovery
+from composer.runtime.middleware.dds_profiles import is_own_profile, save_profile
+from composer.runtime.middleware.dds_xml import Profile, add, child
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import has_interface, interface_names
-from composer.runtime.process.dds_profiles import is_own_profile, save_profile
-from composer.runtime.process.dds_xml import Profile, add, child
 
 _PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"

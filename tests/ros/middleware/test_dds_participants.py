@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Empty
 
-from composer.runtime.process.dds_participants import count_participants
+from composer.runtime.middleware.dds_participants import count_participants
 from composer.runtime.ros_graph.ended_participants import ended_participants
 from composer.runtime.ros_graph.endpoints import UNKNOWN_NODE
 from composer.runtime.ros_graph.graph import RosGraph, participant
@@ -33,7 +33,7 @@ FORGOTTEN_WITHIN_S = 15.0
 TOPICS = [f"/flood/topic_{number}" for number in range(250)]
 JOIN = f"""
 import json, time
-from composer.runtime.process.environment import prepare_environment
+from composer.runtime.middleware.environment import prepare_environment
 prepare_environment()
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session
@@ -52,7 +52,7 @@ print(json.dumps([took_s, missing]))
 PRINT_TRANSPORTS = """
 import json, os, re
 from pathlib import Path
-from composer.runtime.process.environment import prepare_environment
+from composer.runtime.middleware.environment import prepare_environment
 prepare_environment()
 from composer.remote.session import Deadline, Session, use_command_profile
 

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.process.dds_announcements import announce_less_often
-from composer.runtime.process.dds_profiles import (
+from composer.runtime.middleware.dds_announcements import announce_less_often
+from composer.runtime.middleware.dds_profiles import (
     use_command_profile,
     use_discovery_profile,
     use_large_system_profile,

@@ -7,13 +7,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.process import dds_segment
-from composer.runtime.process.dds_profiles import (
+from composer.runtime.middleware import dds_segment
+from composer.runtime.middleware.dds_profiles import (
     use_discovery_profile,
     use_large_system_profile,
 )
-from composer.runtime.process.dds_segment import segment_for_large_messages
-from composer.runtime.process.shared_memory import LARGE_SEGMENT_BYTES, MIN_FREE_BYTES
+from composer.runtime.middleware.dds_segment import segment_for_large_messages
+from composer.runtime.middleware.shared_memory import LARGE_SEGMENT_BYTES, MIN_FREE_BYTES
 
 TAG = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
 FAST_DDS = "rmw_fastrtps_cpp"

@@ -16,8 +16,8 @@ import stat
 import time
 from pathlib import Path
 
+from composer.runtime.middleware.dds_participants import ports_of_domain
 from composer.runtime.process import StartRefused
-from composer.runtime.process.dds_participants import ports_of_domain
 
 #: Where Linux keeps it; shm_open(3).
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is written there

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from sensor_msgs.msg import Image
 
-from composer.runtime.process.shared_memory import LARGE_SEGMENT_BYTES
+from composer.runtime.middleware.shared_memory import LARGE_SEGMENT_BYTES
 from tests.ros.support.commands import compose, running
 from tests.ros.support.in_process import Peer, wait_until
 

@@ -13,18 +13,18 @@ from xml.etree import ElementTree
 import pytest
 
 from composer.model import Discovery, DiscoveryKind
-from composer.runtime.process import StartRefused
-from composer.runtime.process.addresses import PortState, port_state
-from composer.runtime.process.dds_interfaces import use_interfaces
-from composer.runtime.process.dds_profiles import is_own_profile, use_discovery_profile
-from composer.runtime.process.dds_segment import profile_with_segment
-from composer.runtime.process.discovery import (
+from composer.runtime.middleware.dds_interfaces import use_interfaces
+from composer.runtime.middleware.dds_profiles import is_own_profile, use_discovery_profile
+from composer.runtime.middleware.dds_segment import profile_with_segment
+from composer.runtime.middleware.discovery import (
     active_variables,
     adopt_discovery,
     as_assignments,
     discovery_conflict,
     use_discovery,
 )
+from composer.runtime.process import StartRefused
+from composer.runtime.process.addresses import PortState, port_state
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.source import Located, SourceFile, Span
 

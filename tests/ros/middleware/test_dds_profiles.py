@@ -13,7 +13,7 @@ MESSAGES = 4000
 PUBLISH = f"""
 import json, os, sys, time
 from pathlib import Path
-from composer.runtime.process.environment import prepare_environment
+from composer.runtime.middleware.environment import prepare_environment
 prepare_environment()
 import rclpy
 from std_msgs.msg import String

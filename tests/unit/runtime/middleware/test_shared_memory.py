@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from composer.runtime.middleware.shared_memory import remove_incomplete_ports
 from composer.runtime.process import StartRefused
-from composer.runtime.process.shared_memory import remove_incomplete_ports
 
 READY, INITIALIZING = b"\x02\0\0\0 the rest", b"\x01\0\0\0 the rest"
 LONG_AGO_S = time.time() - 3600.0

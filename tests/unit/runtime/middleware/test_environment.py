@@ -6,8 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from composer.runtime.middleware.environment import (
+    check_environment,
+    complete_environment,
+    log_folder,
+)
 from composer.runtime.process import StartRefused
-from composer.runtime.process.environment import check_environment, complete_environment, log_folder
 
 SECURE = {
     "ROS_SECURITY_ENABLE": "true",

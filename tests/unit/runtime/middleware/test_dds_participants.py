@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 from pathlib import Path
 
-from composer.runtime.process.dds_participants import count_participants, enlarge_receive_buffers
+from composer.runtime.middleware.dds_participants import count_participants, enlarge_receive_buffers
 
 HEAD = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  inode\n"
 

@@ -12,9 +12,9 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from tempfile import NamedTemporaryFile
 from xml.sax.saxutils import escape
 
-from composer.runtime.process.dds_profiles import is_own_profile
-from composer.runtime.process.dds_xml import Profile, child, extend
-from composer.runtime.process.shared_memory import (
+from composer.runtime.middleware.dds_profiles import is_own_profile
+from composer.runtime.middleware.dds_xml import Profile, child, extend
+from composer.runtime.middleware.shared_memory import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,
     MIN_FREE_BYTES,

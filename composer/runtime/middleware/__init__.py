@@ -1,0 +1,1 @@
+"""What a process makes of its middleware before ROS starts: environment, discovery, Fast DDS."""
