@@ -15,7 +15,7 @@ from typing import Any
 from composer.graph.diagram import Edge, Graph
 from composer.graph.layout import Frame, Layout, Path, Point, Rectangle, Size, Sizes
 from composer.graph.layout.components import MARGIN
-from composer.graph.layout.ranks import break_cycles
+from composer.graph.layout.steps.ranks import break_cycles
 from composer.graph.layout.units import LayoutUnits
 from composer.graph.measure import HEAD_HEIGHT, ROW_HEIGHT
 

@@ -1,10 +1,11 @@
 """Layered graph drawing with nested frames (Sugiyama, Tagawa and Toda, 1981).
 
-The steps are: rank assignment (``ranks``), ordering with few crossings (``ordering``,
-``transpose``), coordinate assignment (``coordinates``) and edge routing (``routing``). A frame is
-one lane across the ranks, so frames never overlap. Positions are in pixels, and the layout is
-deterministic. Edges with a common end share segments (``build``). Ports of a block are rows of one
-box (``units``). Components that differ only in names are laid out once (``alike``).
+The steps, in ``steps``, are: rank assignment (``ranks``), ordering with few crossings
+(``ordering``, ``transpose``), coordinate assignment (``coordinates``) and edge routing
+(``routing``). A frame is one lane across the ranks, so frames never overlap. Positions are in
+pixels, and the layout is deterministic. Edges with a common end share segments (``build``). Ports
+of a block are rows of one box (``units``). Components that differ only in names are laid out once
+(``alike``).
 """
 
 from __future__ import annotations

@@ -7,16 +7,16 @@ from typing import TypeAlias
 
 from composer.graph.diagram import Graph
 from composer.graph.layout.alike import Alike
-from composer.graph.layout.bend_removal import Obstacles
-from composer.graph.layout.boxes import Item
 from composer.graph.layout.build import Parts, build
 from composer.graph.layout.components import MARGIN, components, pack_components
-from composer.graph.layout.coordinates import assign_coordinates
-from composer.graph.layout.ordering import order_boxes
-from composer.graph.layout.rank_extents import Extent, extent_of, rank_extents
 from composer.graph.layout.result import Frame, Layout, Rectangle
-from composer.graph.layout.routing import Router
 from composer.graph.layout.self_loops import loop_path
+from composer.graph.layout.steps.bend_removal import Obstacles
+from composer.graph.layout.steps.boxes import Item
+from composer.graph.layout.steps.coordinates import assign_coordinates
+from composer.graph.layout.steps.ordering import order_boxes
+from composer.graph.layout.steps.rank_extents import Extent, extent_of, rank_extents
+from composer.graph.layout.steps.routing import Router
 from composer.graph.layout.units import Sizes
 
 #: Lays out a connected graph with a margin.

@@ -7,7 +7,9 @@ from dataclasses import field
 
 from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Direction, Edge, Graph
-from composer.graph.layout.boxes import (
+from composer.graph.layout.result import Size
+from composer.graph.layout.self_loops import loops_of, make_room
+from composer.graph.layout.steps.boxes import (
     BEND_GAP,
     FRAME_LABEL,
     FRAME_PADDING,
@@ -18,9 +20,7 @@ from composer.graph.layout.boxes import (
     SelfLoop,
     link,
 )
-from composer.graph.layout.ranks import assign_ranks, break_cycles
-from composer.graph.layout.result import Size
-from composer.graph.layout.self_loops import loops_of, make_room
+from composer.graph.layout.steps.ranks import assign_ranks, break_cycles
 from composer.graph.layout.units import LayoutUnits, Sizes
 
 

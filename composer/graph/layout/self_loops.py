@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from composer.graph.diagram import Edge, Graph
-from composer.graph.layout.boxes import Axes, Box, SelfLoop
 from composer.graph.layout.result import Path, Point, Size
+from composer.graph.layout.steps.boxes import Axes, Box, SelfLoop
 from composer.graph.layout.units import LayoutUnits, Sizes
 
 _BOW = 30.0

@@ -6,8 +6,8 @@ from bisect import bisect_left
 from collections.abc import Iterable
 
 from composer.fast_dataclass import dataclass
-from composer.graph.layout.boxes import Box
-from composer.graph.layout.rank_extents import Extent
+from composer.graph.layout.steps.boxes import Box
+from composer.graph.layout.steps.rank_extents import Extent
 
 #: Minimum distance of a shortened edge from boxes, in pixels.
 _DISTANCE = 7.0

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from composer.graph.layout.boxes import Box, Group, Item, Link
-from composer.graph.layout.packing import Cost, cost, pack
-from composer.graph.layout.transpose import transpose
+from composer.graph.layout.steps.boxes import Box, Group, Item, Link
+from composer.graph.layout.steps.packing import Cost, cost, pack
+from composer.graph.layout.steps.transpose import transpose
 
 _SWEEPS = 12
 _MAX_SWEEPS_WITHOUT_GAIN = 4

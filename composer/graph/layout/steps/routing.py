@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
-from composer.graph.layout.bend_removal import Obstacles, Station
-from composer.graph.layout.boxes import Axes, Box, EdgeChain
-from composer.graph.layout.rank_extents import Extent, extent_of
 from composer.graph.layout.result import Path
+from composer.graph.layout.steps.bend_removal import Obstacles, Station
+from composer.graph.layout.steps.boxes import Axes, Box, EdgeChain
+from composer.graph.layout.steps.rank_extents import Extent, extent_of
 
 #: The part of a side that edges may use, without the corners.
 _USED_SIDE = 0.6

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from collections.abc import Sequence
 
-from composer.graph.layout.boxes import Box, Group, Item, space_between
+from composer.graph.layout.steps.boxes import Box, Group, Item, space_between
 
 #: The cost of an order: crossings, then the total length of edges across in pixels.
 Cost = tuple[int, float]

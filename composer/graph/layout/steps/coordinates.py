@@ -12,7 +12,7 @@ from itertools import groupby
 from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
-from composer.graph.layout.boxes import Box, Group, Item, space_between
+from composer.graph.layout.steps.boxes import Box, Group, Item, space_between
 
 #: Sweeps propagate positions over all ranks; rounds balance pulls from both sides.
 _SWEEPS = 4

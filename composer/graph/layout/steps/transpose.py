@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.graph.layout.boxes import Box, Group, Item
+from composer.graph.layout.steps.boxes import Box, Group, Item
 
 #: The segments that leave an item: rank, target rank, and the positions of both ends.
 _Pieces = dict[tuple[int, int], list[tuple[float, float]]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from composer.fast_dataclass import dataclass
-from composer.graph.layout.boxes import Box, Group, Item
+from composer.graph.layout.steps.boxes import Box, Group, Item
 
 _RANK_GAP = 22.0
 
