@@ -47,6 +47,7 @@ _OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-i
 #: have another cause, and the system would run with them.
 _FOLLOWING = {
     "class-port-type": frozenset({"type-mismatch"}),
+    "duplicate-full-name": frozenset({"unknown-parameter"}),
     "invalid-include": frozenset({"invalid-ros-name", "unknown-node", "unknown-port"}),
     "invalid-namespace": _OF_CONNECTIONS | {"unmatched-parameters"},
     "node-as-behavior": frozenset(
@@ -63,6 +64,7 @@ _FOLLOWING = {
     "type-mismatch": frozenset(
         {"handler-annotation", "invalid-value", "port-connected-twice", "unknown-field"}
     ),
+    "undeclared-parameter": frozenset({"class-parameter"}),
     "unknown-key": frozenset({"transform-source", "unused-restart"}),
     "unknown-port": frozenset({"handler-without-port"}),
     "unknown-process": frozenset({"conflicting-process", "split-executor", "unmeasured-chain"}),

@@ -108,8 +108,8 @@ class _Imports:
             problem = _Missing(
                 f"module '{name}' has no '{alias.name}'", suggestion(alias.name, names)
             )
-            close = frozenset(item for item in names if nearest(alias.name, [item]) is not None)
-            yield _problem(problem, alias.name, alias, self.module), close
+            # Any other name of the module may have been meant.
+            yield _problem(problem, alias.name, alias, self.module), names
 
     def _lacks(self, module: str, name: str) -> bool:
         """Return whether a module has no such name."""

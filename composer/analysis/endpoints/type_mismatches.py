@@ -169,16 +169,23 @@ def _mismatch(
     by_type: dict[str, list[PortOfNode]],
     troubled: set[tuple[str, str] | None],
 ) -> TypeMismatch:
-    """Choose the usual type: one that fits what its nodes do, then the most common, the first."""
+    """Choose the usual type: one that fits what its nodes do, then the most common.
 
-    def weight(name: str) -> tuple[bool, int]:
+    Of the others, that of a node type: other systems may use it. Else the first.
+    """
+
+    def weight(name: str) -> tuple[bool, int, bool]:
         endpoints = by_type[name]
         fits = not any(_key(endpoint) in troubled for endpoint in endpoints)
-        return fits, len(endpoints)
+        return fits, len(endpoints), any(map(_is_of_node_type, endpoints))
 
     common = max(by_type, key=weight)
     others = {name: endpoints for name, endpoints in by_type.items() if name != common}
     return TypeMismatch(channel, by_type[common][0], others)
+
+
+def _is_of_node_type(endpoint: PortOfNode) -> bool:
+    return endpoint.port.interface.span.file != endpoint.node.name.span.file
 
 
 def _key(endpoint: PortOfNode) -> tuple[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register
 
 RULE = register(
@@ -34,7 +35,10 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Check for parameters without a value. A node type alone does not need them."""
     if context.system.node_type:
         return
+    errors = context.once(earlier_errors)
     for node in context.system.nodes:
+        if errors.may_declare(node.name.value, "parameters"):
+            continue
         unknown = [item.name.value for item in node.unknown if item.section == "parameters"]
         for parameter in node.parameters:
             if parameter.value is None:

@@ -65,13 +65,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 hint="name it in one of them",
             )
     used = {process.value for process in named.values()}
+    known_names = {process.name.value for process in system.processes}
+    has_others = not used <= known_names  # unknown-process reports them
     for process in system.processes:
         problem = topic_name_problem(process.name.value)
         if problem is not None or "/" in process.name.value:
             what = problem or "contains '/'"
             yield Diagnostic(RULE, f"process '{process.name}' {what}", process.name.span)
         elif (
-            not (process.nodes or process.name.value in used)
+            not (process.nodes or process.name.value in used or has_others)
             and not context.once(earlier_errors).any
         ):
             yield Diagnostic(RULE, f"process '{process.name}' has no nodes", process.name.span)

@@ -9,6 +9,7 @@ from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.model import Node
 from composer.source import Span
 
 RULE = register(
@@ -46,14 +47,7 @@ nodes:
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the values that instances set and the parameters that expressions read."""
     for node in context.system.nodes:
-        for unknown in node.unknown:
-            if unknown.section == "parameters":
-                yield Diagnostic(
-                    RULE,
-                    f"node '{node.name}' has no parameter '{unknown.name}'",
-                    unknown.name.span,
-                    hint=suggestion(unknown.name.value, unknown.known),
-                )
+        yield from _unknown(node)
     errors = context.once(earlier_errors)
     known = {
         node.name.value: [parameter.name.value for parameter in node.parameters]
@@ -67,6 +61,29 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 f"the node does not declare parameter '{name}'",
                 span,
                 hint=suggestion(name, known[node_name]),
+            )
+
+
+def _unknown(node: Node) -> Iterator[Diagnostic]:
+    """Yield the unknown names, and each parameter once that gets a map of names."""
+    types = {item.name.value: item.type.value for item in node.parameters}
+    maps: set[str] = set()
+    for unknown in node.unknown:
+        name = unknown.name.value
+        first, dot, _ = name.partition(".")
+        is_map = first in types and not any(other.startswith(f"{first}.") for other in types)
+        if unknown.section != "parameters" or first in maps:
+            continue
+        if dot and is_map:
+            maps.add(first)
+            message = f"parameter '{first}' of node '{node.name}' is a {types[first]}, not a map"
+            yield Diagnostic(RULE, message, unknown.name.span)
+        else:
+            yield Diagnostic(
+                RULE,
+                f"node '{node.name}' has no parameter '{name}'",
+                unknown.name.span,
+                hint=suggestion(name, unknown.known),
             )
 
 

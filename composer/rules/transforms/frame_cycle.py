@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.frames import cycles, frame_trees, place
+from composer.analysis.frames import Broadcast, cycles, frame_trees, place
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 
 RULE = register(
@@ -44,8 +44,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Report each cycle once."""
     for tree in context.once(frame_trees):
         for cycle in cycles(tree):
-            first, *others = cycle
-            path = " -> ".join((*(item.child for item in cycle), first.child))
+            first, *others = _from_the_system(cycle)
+            path = " -> ".join((*(item.child for item in (first, *others)), first.child))
             message = f"frames are parents of each other in a cycle: {path}"
             if not others:
                 message = f"frame '{first.child}' is its own parent"
@@ -54,3 +54,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 Label(item.declared.parent.span, f"the parent of '{item.child}'") for item in others
             )
             yield Diagnostic(RULE, message, span, (*labels, *steps), "change one of the parents")
+
+
+def _from_the_system(cycle: tuple[Broadcast, ...]) -> tuple[Broadcast, ...]:
+    """Return a cycle from its first transform that no node type declares, if there is one."""
+    start = next((at for at, item in enumerate(cycle) if _is_of_system(item)), 0)
+    return cycle[start:] + cycle[:start]
+
+
+def _is_of_system(item: Broadcast) -> bool:
+    return item.declared.parent.span.file == item.node.name.span.file

@@ -33,6 +33,46 @@ nodes:
   n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}
 """
 CODE = "from %s import step\n\n\nclass Code:\n    def on_tick(self):\n        step()\n"
+FLOAT = "{type: std_msgs/msg/Float64, qos: command"
+SINK = f"node: sink\nsubscriptions: {{in: {FLOAT}, topic: /x}}}}\n"
+SOURCE = "  source: {publishers: {out: {type: std_msgs/msg/String, qos: command, topic: /x}}}\n"
+NAMED = """\
+system: a
+parameter_files: values.yaml
+nodes:
+  first: {name: n, parameters: {size: 1.0}}
+  n: {parameters: {names: {type: string_array, default: [a]}, far: 2.0}}
+"""
+VALUES = "/n:\n  ros__parameters:\n    %s\n"
+DRIVE = "node: drive\nbehavior: drive:Drive\ntransforms: {dynamic: {base: {parent: odom}}}\n"
+DRIVE_CODE = "class Drive:\n    def on_configure(self): ...\n"
+PROCESSES = """\
+system: a
+processes: {night: {cpus: [1]}}
+nodes:
+  n: {process: day, on_activate: {log: a}}
+"""
+CAMERA = "node: camera\nparameters: {serial: {type: string}}\non_activate: {log: a}\n"
+IMPORTED = """\
+from composer.behavior import %s
+
+
+class Code:
+    def on_tick(self):
+        try:
+            pass
+        except CallError:
+            pass
+"""
+BATTERY = """\
+from rclpy.node import Node
+
+
+class Battery(Node):
+    def __init__(self):
+        super().__init__("battery")
+        print(self.get_parameter("period").value)
+"""
 #: The files of a project, and the only reports: rule, file and line.
 MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
     "a condition does not end a loop through one topic": (
@@ -52,6 +92,56 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
             "drive/control.py": "def step(): ...\n",
         },
         [("unknown-import", "code.py", 1)],
+    ),
+    "two nodes with one name, and parameters of one of them": (
+        {"system.yaml": NAMED, "values.yaml": VALUES % "far: 3.0"},
+        [("duplicate-full-name", "system.yaml", 5)],
+    ),
+    "a map for a parameter": (
+        {
+            "system.yaml": NAMED.replace("name: n", "name: m"),
+            "values.yaml": VALUES % "names: {left: a, right: b}",
+        },
+        [("unknown-parameter", "values.yaml", 3)],
+    ),
+    "a type that differs from that of a node type": (
+        {
+            "system.yaml": f"system: a\nnodes:\n  s: {{type: sink}}\n{SOURCE}",
+            "nodes/sink.yaml": SINK,
+        },
+        [("type-mismatch", "system.yaml", 4)],
+    ),
+    "a cycle of a node type and the system": (
+        {
+            "system.yaml": "system: a\nnodes:\n  d: {type: drive}\n"
+            "  map: {external: true, transforms: {static: {odom: {parent: base}}}}\n",
+            "nodes/drive.yaml": DRIVE,
+            "nodes/drive.py": DRIVE_CODE,
+        },
+        [("frame-cycle", "system.yaml", 4)],
+    ),
+    "a process whose name is wrong": (
+        {"system.yaml": PROCESSES},
+        [("unknown-process", "system.yaml", 4)],
+    ),
+    "a misspelled key of a section": (
+        {
+            "system.yaml": "system: a\nnodes:\n  c: {type: camera, parameter: {serial: a}}\n",
+            "nodes/camera.yaml": CAMERA,
+        },
+        [("unknown-key", "system.yaml", 3)],
+    ),
+    "an import whose name was to be another one": (
+        {"system.yaml": HELPER, "code.py": IMPORTED % "CallFailed"},
+        [("unknown-import", "code.py", 1)],
+    ),
+    "a class without its declaration": (
+        {
+            "system.yaml": "system: a\nnodes:\n"
+            "  n: {class: 'battery:Battery', parameters: {period: 1.0}}\n",
+            "battery.py": BATTERY,
+        },
+        [("undeclared-parameter", "battery.py", 7)],
     ),
     "a module of a package of the project": (
         {
