@@ -18,11 +18,11 @@ from composer.model import (
     System,
 )
 from composer.model.discovery import is_loopback
+from composer.model.processes import ENCLAVE_VARIABLE, own_enclave
 from composer.names import join
 
 #: Longer than --grace of compose run, by which the process ends in any case.
 STOP_WITHIN_S = 15
-_ENCLAVE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 #: ROS reads these; the others of a sourced workspace follow from its setup file.
 VARIABLES = (
     "FASTDDS_BUILTIN_TRANSPORTS",
@@ -31,7 +31,7 @@ VARIABLES = (
     "ROS_DISCOVERY_SERVER",
     "ROS_DOMAIN_ID",
     "ROS_SECURITY_ENABLE",
-    _ENCLAVE,
+    ENCLAVE_VARIABLE,
     "ROS_SECURITY_STRATEGY",
     "ROS_STATIC_PEERS",
     "ROS_SUPER_CLIENT",
@@ -162,12 +162,9 @@ def has_outside_nodes(system: System) -> bool:
 
 
 def ros_variables(environment: Mapping[str, str], service: Service) -> dict[str, str]:
-    """Return the variables that ROS reads, as far as they are set.
-
-    The enclave of a process is the one of the policy: its full name.
-    """
+    """Return the variables that ROS reads, as far as they are set, with its own enclave."""
     found = {name: environment[name] for name in VARIABLES if environment.get(name)}
-    return found | ({_ENCLAVE: service.full_name} if _ENCLAVE in found else {})
+    return found | own_enclave(environment, service.full_name)
 
 
 def _priority(system: System, process: Process | None) -> int | None:

@@ -12,6 +12,9 @@ from composer.source import Located, Span
 if TYPE_CHECKING:
     from composer.model.system import Node, PrimaryState, System
 
+#: ROS reads from it in which enclave a process is.
+ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+
 
 @dataclass(frozen=True, slots=True)
 class Process:
@@ -65,6 +68,14 @@ def member_system(
         supervision=replace(system.supervision, on_failure=None),
         processes=(),
     )
+
+
+def own_enclave(environment: Mapping[str, str], full_name: str) -> dict[str, str]:
+    """Return the variable for a process of a system, if ``environment`` sets an enclave at all.
+
+    As in the policy (:mod:`composer.export.sros2`), the enclave of a process is its full name.
+    """
+    return {ENCLAVE_VARIABLE: full_name} if environment.get(ENCLAVE_VARIABLE) else {}
 
 
 def _located(node: Node, goal: PrimaryState | None) -> Located[PrimaryState] | None:

@@ -10,15 +10,13 @@ from typing import Protocol
 from rclpy.node import Node as RosNode
 
 from composer.model import LogLevel, Process
+from composer.model.processes import own_enclave
 from composer.runtime.children.child_processes import ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.report import MemberState
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
-
-#: The path of the enclave of a process: see :mod:`composer.export.sros2`.
-_ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 
 
 class ProcessUnavailable(Exception):
@@ -72,7 +70,6 @@ class MemberContext:
         words = (*self.command, "--process", process.name.value)
         # Its lines are parsed, whatever format those of this process have.
         usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
-        if os.environ.get(_ENCLAVE_VARIABLE):  # this process has its own, as in the policy
-            usual[_ENCLAVE_VARIABLE] = self.full_name(process)
+        usual |= own_enclave(os.environ, self.full_name(process))
         environment = {name.value: value for name, value in process.environment}
         return Command(words, {**usual, **environment, STARTED_BY_VARIABLE: started_by})
