@@ -28,7 +28,7 @@ RUN pip install --no-cache-dir "$COMPOSER"
 
 WORKDIR {project}
 {requirements}COPY . .
-{interfaces}# Errors in files fail here, not when the container starts.
+{interfaces}{unknown}# Errors in files fail here, not when the container starts.
 RUN compose validate {file}
 
 ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 ROS_LOG_DIR={writable}/log
@@ -44,8 +44,11 @@ RUN pip install --no-cache-dir -r requirements.txt
 """
 _INTERFACES = """\
 RUN apt-get update && apt-get install -y --no-install-recommends g++ \\
-    && compose interfaces build \\
+    && compose interfaces build {packages} \\
     && apt-get purge -y --auto-remove g++ && rm -rf /var/lib/apt/lists/* build
+"""
+_UNKNOWN = """\
+# Not in the image, unless requirements.txt adds them: {packages}
 """
 _IGNORED = """\
 # Written by 'compose export': files of the project that the image does not need.
@@ -64,8 +67,9 @@ class Contents:
 
     ``file`` is the file of the system below the root of its project. ``composer`` is the
     requirement of the composer for pip, ``python`` the version of Python (3.12).
-    ``has_requirements`` is whether the project has a requirements.txt, ``has_interfaces`` whether
-    it has interface packages to be compiled. ``private`` are files below the root that stay here.
+    ``has_requirements`` is whether the project has a requirements.txt. ``interfaces`` are interface
+    packages to be compiled, ``unknown_interfaces`` those of which there are no definitions here.
+    ``private`` are files below the root that stay here.
     """
 
     system: str
@@ -73,7 +77,8 @@ class Contents:
     composer: str
     python: str = "3.12"
     has_requirements: bool = False
-    has_interfaces: bool = False
+    interfaces: tuple[str, ...] = ()
+    unknown_interfaces: tuple[str, ...] = ()
     private: tuple[PurePosixPath, ...] = ()
 
     @property
@@ -90,7 +95,12 @@ def containerfile(contents: Contents) -> str:
         composer=contents.composer,
         project=PROJECT,
         requirements=_REQUIREMENTS if contents.has_requirements else "",
-        interfaces=_INTERFACES if contents.has_interfaces else "",
+        interfaces=_INTERFACES.format(packages=shlex.join(contents.interfaces))
+        if contents.interfaces
+        else "",
+        unknown=_UNKNOWN.format(packages=", ".join(contents.unknown_interfaces))
+        if contents.unknown_interfaces
+        else "",
         file=shlex.quote(str(contents.file)),
         writable=WRITABLE,
         user=USER_ID,

@@ -1,11 +1,37 @@
-"""How to build an interface package."""
+"""Which interface packages a system uses, and how to build one."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from composer.interfaces.sources import Bundle
 from composer.source import shown_path
+
+if TYPE_CHECKING:
+    from composer.model import Node, System
+
+#: Packages of the bundled definitions that are not among the wheels of ROS from PyPI.
+NOT_IN_WHEELS = frozenset(
+    (
+        "composer_interfaces",
+        "control_msgs",
+        "example_interfaces",
+        "geographic_msgs",
+        "nav2_msgs",
+        "tf2_msgs",
+        "vision_msgs",
+    )
+)
+
+
+def used_packages(system: System) -> dict[str, Node]:
+    """Return the interface packages that a system needs, with the first node that uses each."""
+    users: dict[str, Node] = {}
+    for node in system.nodes:
+        for port in node.all_ports if node.implementation.in_process else node.ports:
+            users.setdefault(port.interface.value.partition("/")[0], node)
+    return users
 
 
 def _debian_name(package: str) -> str:

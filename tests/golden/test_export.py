@@ -29,7 +29,7 @@ def exported() -> dict[str, str]:
         PurePosixPath("systems/my robot.yaml"),
         "ros2-composer[ros]==0.1.0",
         has_requirements=True,
-        has_interfaces=True,
+        interfaces=("tf2_msgs", "my_msgs"),
     )
     image = "registry.local:5000/robot:1.2"
     build = {"context": "..", "dockerfile": "deploy/Containerfile"}

@@ -13,7 +13,7 @@ from composer.cli.support.errors import CONFIG, CommandError, UsageError
 from composer.cli.support.output.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
-    from composer.model import Node, System
+    from composer.model import System
     from composer.remote.session import Deadline, Session
     from composer.runtime.process.query_socket import NameAndTypes
 
@@ -71,16 +71,12 @@ def require_launch(command: str) -> None:
 
 def require_interfaces(system: System) -> None:
     """Raise CommandError if Python lacks an interface package that a port of the system uses."""
-    from composer.interfaces.building import how_to_build
+    from composer.interfaces.building import how_to_build, used_packages
     from composer.interfaces.sources import find_packages
     from composer.node_types import interface_folders
     from composer.project import Project
 
-    users: dict[str, Node] = {}  # the first node that uses each package
-    for node in system.nodes:
-        for port in node.all_ports if node.implementation.in_process else node.ports:
-            users.setdefault(port.interface.value.partition("/")[0], node)
-    for package, node in users.items():
+    for package, node in used_packages(system).items():
         if find_spec(package) is None:
             folders = interface_folders(Project.at(Path.cwd()))
             raise CommandError(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from pathlib import Path
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import pytest
 import yaml
 
+from composer.export.container_image import Contents, containerfile
 from composer.export.deployment import VARIABLES
 from tests.cli.compose import compose
 from tests.programs import require_module
@@ -243,7 +245,33 @@ def test_the_image_has_what_the_project_needs(project: Path) -> None:
     export("docker-compose", "-o", "deploy", "--force")
     text = (project / "deploy" / "Containerfile").read_text()
     assert "COPY requirements.txt .\n" in text
-    assert "compose interfaces build" in text
+    assert "&& compose interfaces build my_msgs \\\n" in text
+    assert "Not in the image" not in text
+
+
+def test_the_image_has_the_interfaces_that_ros_on_pypi_lacks(project: Path) -> None:
+    port = "publishers: {found: {type: other_msgs/msg/Found, qos: command}}"
+    laser = "transforms: {static: {laser: {parent: base, translation_m: {x: 1}}}}"
+    add(project, f"  finder: {{{port}, on_activate: {{log: hello}}}}\n  laser: {{{laser}}}\n")
+    (project / "composer.yaml").touch()
+    for package, field in (("other_msgs", "bool ok"), ("base_msgs", "bool ok")):
+        folder = project / "interfaces" / package
+        (folder / "msg").mkdir(parents=True)
+        (folder / "msg" / "Found.msg").write_text(f"{field}\n")
+        (folder / "package.xml").write_text(f"<package><name>{package}</name></package>\n")
+    export("docker-compose", "-o", "deploy")
+    text = (project / "deploy" / "Containerfile").read_text()
+    (line,) = (line for line in text.splitlines() if "interfaces build" in line)
+    words = line.split()[4:-1]
+    assert words[0] == "tf2_msgs"  # the others may use it
+    assert set(words[1:]) == {"other_msgs", "base_msgs"}  # which may use each other
+
+
+def test_the_file_of_the_image_names_the_interfaces_that_it_lacks() -> None:
+    contents = Contents("robot", PurePosixPath("robot.yaml"), "composer")
+    assert "Not in the image" not in containerfile(contents)
+    text = containerfile(replace(contents, unknown_interfaces=("acme_msgs", "lab_msgs")))
+    assert "# Not in the image, unless requirements.txt adds them: acme_msgs, lab_msgs\n" in text
 
 
 def test_the_image_has_no_private_keys(project: Path) -> None:

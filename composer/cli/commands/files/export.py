@@ -292,18 +292,26 @@ def _image(
 
     from composer.export.container_image import Contents
     from composer.export.deployment import services
-    from composer.interfaces.sources import find_packages
+    from composer.interfaces.building import NOT_IN_WHEELS, used_packages
+    from composer.interfaces.sources import Bundle, find_packages
     from composer.model.hosts import private_files
     from composer.report.tool import NAME, tool_version
 
     root = result.project.root
-    used = {port.interface.value.partition("/")[0] for node in system.nodes for port in node.ports}
+    used = sorted(used_packages(system))
+    own = find_packages(result.project.interface_folders).folders
+    # Packages of the project may use the others, and each other.
+    built = [name for name in used if name in NOT_IN_WHEELS and name not in own]
+    built += () if own.keys().isdisjoint(used) else own
     contents = Contents(
         system=system.name.value,
         file=PurePosixPath(path.resolve().relative_to(root).as_posix()),
         composer=f"{NAME}[ros]=={tool_version()}",
         has_requirements=(root / "requirements.txt").is_file(),
-        has_interfaces=not used.isdisjoint(find_packages(result.project.interface_folders).folders),
+        interfaces=tuple(built),
+        unknown_interfaces=tuple(
+            name for name in used if name not in own and name not in Bundle().packages()
+        ),
         private=private_files(system.hosts, root),
     )
     return contents, name or f"{services(system)[0].label}:latest"
