@@ -20,6 +20,9 @@ _SUFFIXES = frozenset({".yaml", ".yml"})
 _MARKER = re.compile(r"""\{?\s*["']?(system|node)["']?\s*:(\s|$)""")
 #: A later line with the same key and a name. In other files, these keys begin maps.
 _LATER_MARKER = re.compile(r"""^(system|node):[ \t]+["']?\w""", re.MULTILINE)
+#: What only systems and node types have together: a section of theirs, and the type of a port.
+_SECTION = re.compile(r"^(nodes|publishers|subscriptions|timers):\s", re.MULTILINE)
+_INTERFACE = re.compile(r"\btype:\s*[\"']?[a-z]\w*/(msg|srv|action)/[A-Z]")
 #: The part of a file that may hold a license and comments before the first key.
 _HEAD_BYTES = 65_536
 #: Folders made by tools: environments, colcon builds, installed packages.
@@ -44,9 +47,9 @@ class FoundFiles:
 def find_files(paths: Iterable[Path]) -> FoundFiles:
     """Find the files to check.
 
-    In folders, this skips files without ``system:`` or ``node:``, symbolic links to folders, hidden
-    folders and folders made by tools. A path that does not exist is among the files: reading it
-    reports the error.
+    In folders, this skips files without ``system:`` or ``node:`` that have nothing of either,
+    symbolic links to folders, hidden folders and folders made by tools. A path that does not exist
+    is among the files: reading it reports the error.
     """
     search = _Search()
     for path in paths:
@@ -127,7 +130,9 @@ def _is_composer_file(path: Path) -> bool:
     except OSError:
         return True  # reading it reports the error
     first = next((line for line in head.splitlines() if _has_content(line)), "")
-    return _MARKER.match(first) is not None or _LATER_MARKER.search(head) is not None
+    if _MARKER.match(first) is not None or _LATER_MARKER.search(head) is not None:
+        return True
+    return _SECTION.search(head) is not None and _INTERFACE.search(head) is not None
 
 
 def _has_content(line: str) -> bool:

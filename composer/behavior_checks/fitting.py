@@ -159,6 +159,8 @@ def argument_problem(
         return f"{shown(found)} where {shown(expected)} is expected"
     if _are_related(found, expected):
         return None
+    if isinstance(found, ApiValue) and isinstance(expected, Message | FieldType | Collection):
+        return f"a {found.class_name} where {shown(expected)} is expected"
     is_enum = isinstance(expected, OwnObject) and is_enumeration(expected.of)
     if is_enum and is_float(found):  # an int may stand for a member of an IntEnum
         return f"{shown(found)} where {shown(expected)} is expected"

@@ -41,7 +41,8 @@ class CodeProblem:
 
     ``about`` is the name of what has the wrong value, by default the text at its location.
     ``lines`` are the first and last line of a function that lacks names because of the problem.
-    ``called`` is the function of the project that a call does not fit, with its file.
+    ``called`` is the function of the project that a call does not fit, with its file. ``cause`` is
+    the value in another file that the code does not expect.
     """
 
     kind: Kind
@@ -51,6 +52,7 @@ class CodeProblem:
     about: str = ""
     lines: tuple[int, int] | None = None
     called: tuple[Function, Module] | None = None
+    cause: Span | None = None
 
     @property
     def attribute(self) -> str:

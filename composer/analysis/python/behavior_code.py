@@ -27,6 +27,10 @@ def diagnostics_of(context: Context, kind: Kind, rule: Rule) -> Iterator[Diagnos
             classes = {id(item.source) for item in context.once(hosted_classes)}
             what = "class" if id(source) in classes else "behavior"
             label = Label(source.reference.text.span, f"the {what} of this node")
+            if problem.cause is not None:
+                label = Label(problem.span, f"what the {what} expects")
+                yield Diagnostic(rule, problem.message, problem.cause, (label,), problem.hint)
+                continue
             yield Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from composer.analysis.context import Context, is_unresolved
 from composer.behavior_source import BehaviorSource, Call, Method, find_behavior
 from composer.fast_dataclass import dataclass
-from composer.model import BehaviorReference, Node, Port, PortKind
+from composer.model import BehaviorReference, Node, Parameter, Port, PortKind
 from composer.source import Located
 
 #: Handlers that every behavior may have, with the arguments they are called with.
@@ -67,11 +67,19 @@ def distinct_behaviors(context: Context) -> tuple[tuple[Node, BehaviorSource], .
     found: dict[object, tuple[Node, BehaviorSource]] = {}
     for node, source in context.once(behaviors):
         ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
-        parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
+        parameters = tuple(map(_kind_of, node.parameters))
         timers = tuple(timer.name.value for timer in node.timers)
         key = (id(source), node.complete, ports, parameters, timers)
         found.setdefault(key, (node, source))
     return tuple(found.values())
+
+
+def _kind_of(parameter: Parameter) -> tuple[object, ...]:
+    """Return what the code may depend on: also the length of a list, and which choice is set."""
+    value = None if parameter.value is None else parameter.value.value
+    is_choice = parameter.choices is not None and isinstance(value, str)
+    known = len(value) if isinstance(value, list) else value if is_choice else None
+    return parameter.name.value, parameter.type.value, known
 
 
 def complete_behaviors(context: Context) -> Iterator[tuple[Node, BehaviorSource]]:

@@ -14,7 +14,7 @@ from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
 from composer.behavior_types.syntax.bindings import Binding, How, nodes_of
-from composer.behavior_types.values import OwnClass, OwnObject, Pending, Value
+from composer.behavior_types.values import InterfaceClass, OwnClass, OwnObject, Pending, Value
 from composer.field_types import BOOL
 from composer.interfaces import Message
 
@@ -90,6 +90,14 @@ def _without_call(types: BehaviorTypes) -> Iterator[CodeProblem]:
                 span = span_of(binding.expression, scope.home.source)
                 message = f"this is the class {name}, not an object of it"
                 yield CodeProblem(Kind.CHANGED, message, span, f"create one: {name}()")
+        kinds = {kind_of(found) for _, _, found in values if found is not None}
+        for scope, binding, found in values:
+            value = binding.expression
+            if isinstance(found, InterfaceClass) and value is not None and kinds - {None, "text"}:
+                name = found.definition.name.rpartition("/")[2]
+                span = span_of(value, scope.home.source)
+                message = f"this is the class {name}, and other values are not"
+                yield CodeProblem(Kind.CHANGED, message, span, f"did you mean {name}()?")
 
 
 def _bound(place: tuple[FunctionTypes, Binding]) -> Value | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from composer.behavior_checks.messages.lengths import length_of, looks_first, parameter_length
 from composer.behavior_checks.problems import CodeProblem, Kind
@@ -15,6 +15,7 @@ from composer.behavior_types.values import Parameters
 from composer.field_types import described
 from composer.interfaces import FieldType
 from composer.model import Parameter
+from composer.source import Span
 
 
 def element_problems(
@@ -42,6 +43,7 @@ def element_problems(
                     f"parameter '{name}' has no element {at}: it has {counted(count)}",
                     span_of(index, scope.home.source),
                     f"indices count from 0, so the last one is {count - 1}" if count else None,
+                    cause=_cause(parameter, lambda length: -length <= at < length),
                 )
         case ast.Assign(targets=[ast.Tuple(elts=targets) | ast.List(elts=targets)], value=value):
             parameter = parameter_read(value, scope)
@@ -52,7 +54,16 @@ def element_problems(
                 message = f"parameter '{name}' has {counted(count or 0)}, not {len(targets)}"
                 span = span_of(value, scope.home.source)
                 lines = (function.lineno, function.end_lineno or function.lineno)
-                yield CodeProblem(Kind.INDEX, message, span, lines=lines)
+                cause = _cause(parameter, lambda length: length == len(targets))
+                yield CodeProblem(Kind.INDEX, message, span, lines=lines, cause=cause)
+
+
+def _cause(parameter: Parameter, fits: Callable[[int], bool]) -> Span | None:
+    """Return the value that a system or a file sets, if the default would fit."""
+    value, default = parameter.value, parameter.default
+    if value is None or default is None or value is default or not isinstance(default.value, list):
+        return None
+    return value.span if fits(len(default.value)) else None
 
 
 def size_problem(node: ast.expr, expected: FieldType, scope: FunctionTypes) -> str | None:

@@ -11,11 +11,14 @@ from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.scalars import is_float, is_integer, is_text
+from composer.behavior_types.scalars import is_float, is_integer, is_number, is_text
+from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import NONE, Collection, OwnObject, Value
 from composer.interfaces import Message
 
+#: Functions of logging whose first argument is a format of the others.
+_LEVELS = frozenset({"critical", "debug", "error", "exception", "info", "warning"})
 _CONVERSION = re.compile(
     r"%(?P<key>\([^)]*\))?[-#0 +]*(?P<star>\*|\d+)?(?:\.(?:\*|\d+))?[hlL]?(?P<type>.)"
 )
@@ -30,12 +33,25 @@ def text_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
             func=ast.Attribute(value=ast.Constant(value=str() as text) as value, attr="format")
         ):
             problem = _call_problem(text, node, scope)
+        case ast.Call(
+            func=ast.Attribute(attr=level) as function, args=[ast.Constant(str()) as value, *items]
+        ) if level in _LEVELS and items and _is_logging(function, scope):
+            problem = percent_problem(value, ast.Mod(), ast.Tuple(items), scope)
         case ast.Raise(exc=ast.expr() as value):
             problem = _raise_problem(scope.type_of(value))
         case _:
             return
     if problem is not None:
         yield CodeProblem(Kind.VALUE, problem, span_of(value, scope.home.source))
+
+
+def _is_logging(function: ast.Attribute, scope: FunctionTypes) -> bool:
+    """Return whether a function is of the module ``logging``, or of a logger of the file."""
+    if (scope.called_name(function) or "").startswith("logging."):
+        return True
+    owner = function.value.id if isinstance(function.value, ast.Name) else ""
+    made = None if scope.is_local(owner) else constant_named(owner, scope.home)
+    return isinstance(made, ast.Call) and scope.called_name(made.func) == "logging.getLogger"
 
 
 def _call_problem(text: str, call: ast.Call, scope: FunctionTypes) -> str | None:
@@ -106,6 +122,8 @@ def _spec_problem(value: Value, spec: str) -> str | None:
         return f"{what} cannot be formatted with ':{spec}'"
     if is_text(value) and spec[-1] in "bcdeEfFgGnoxX%":
         return f"a string cannot be formatted with ':{spec}'"
+    if is_number(value) and spec[-1] == "s":
+        return f"{shown(value)} cannot be formatted with ':{spec}'"
     if is_float(value) and spec[-1] in "bcdoxX":
         return f"a float cannot be formatted with ':{spec}'"
     if is_integer(value) and spec[-1] == "d" and "." in spec:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.behavior_checks.fitting import argument_problem, shown
+from composer.behavior_checks.fitting import argument_problem, kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import (
@@ -16,12 +16,13 @@ from composer.behavior_source.flow import (
     returned_values,
     yields,
 )
+from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.syntax import name_span
 from composer.behavior_types.expressions.annotations import allows_none, annotated
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.functions import definition_of
-from composer.behavior_types.libraries.handlers import Handler
+from composer.behavior_types.libraries.handlers import TRANSITIONS, Handler
 from composer.behavior_types.libraries.standard_types import ITERATORS
 from composer.behavior_types.scalars import is_float, is_integer
 from composer.behavior_types.values import (
@@ -47,6 +48,8 @@ def return_problems(
     if handler is not None and handler.returns is NONE:
         yield from _unused(function, scope)
         return
+    if handler is None and function.name in TRANSITIONS:
+        yield from _of_transition(function, scope)
     annotation = function.returns
     if annotation is None or is_stub(function):
         return
@@ -149,6 +152,17 @@ def _unused(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
             yield CodeProblem(
                 Kind.UNUSED, message, span, "publish it: self.publishers.NAME.publish"
             )
+
+
+def _of_transition(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Yield what a handler of a transition returns that is neither None nor a bool."""
+    for value in returned_values(function):
+        found = scope.type_of(value)
+        is_of_rclpy = dotted(value).rpartition(".")[0].endswith("TransitionCallbackReturn")
+        if is_of_rclpy or (kind_of(found) is not None and found != BOOL):
+            message = f"'{function.name}' returns {ast.unparse(value)}, which is an error"
+            hint = "return nothing; to refuse the transition, raise TransitionFailed"
+            yield CodeProblem(Kind.RETURN, message, span_of(value, scope.home.source), hint)
 
 
 def _is_iterator(found: Value) -> bool:

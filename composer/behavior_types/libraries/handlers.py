@@ -10,6 +10,9 @@ from composer.field_types import ANYTHING
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node, PortKind
 
+#: Handlers of transitions: they return nothing, or whether the transition may happen.
+TRANSITIONS = ("on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown")
+
 
 @dataclass(frozen=True, slots=True)
 class Handler:

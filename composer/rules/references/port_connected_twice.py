@@ -13,7 +13,7 @@ RULE = register(
         code="RC212",
         name="port-connected-twice",
         severity=Severity.ERROR,
-        summary="A port is in two connections with different names or QoS profiles.",
+        summary="A port is twice in a connection, or in two with different names or QoS profiles.",
         why=(
             "A port has one name and one QoS profile in ROS, so one of the connections would have "
             "no effect."
@@ -58,7 +58,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
             earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
             difference = _difference(earlier, connection)
             later = location(endpoint.text.span)
-            if difference is not None and later not in reported:
+            if place is not endpoint and _is_repeated(place, endpoint, connection):
+                yield Diagnostic(
+                    RULE,
+                    f"port '{endpoint.text}' is named twice",
+                    endpoint.text.span,
+                    (Label(place.text.span, "here too"),),
+                    "did you mean another port?",
+                )
+            elif difference is not None and later not in reported:
                 reported.add(later)
                 yield Diagnostic(
                     RULE,
@@ -67,6 +75,14 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     (Label(place.text.span, f"connected to '{earlier.name}' here"),),
                     "put all ports that share a name into one connection",
                 )
+
+
+def _is_repeated(first: Endpoint, second: Endpoint, connection: Connection) -> bool:
+    """Return whether one connection names a port twice, both times without a pattern."""
+    written = {first.text.span.text, second.text.span.text}
+    is_within = any(end is first for end in connection.ends)
+    is_elsewhere = location(first.text.span) != location(second.text.span)
+    return is_within and is_elsewhere and written == {second.text.value}
 
 
 def _difference(earlier: Connection, later: Connection) -> str | None:

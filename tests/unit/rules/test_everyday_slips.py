@@ -11,6 +11,7 @@ from tests.unit.support.checking import diagnostics_in, quoted
 
 SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
 CODE = """\
+import logging
 from dataclasses import asdict, dataclass
 from enum import Enum
 
@@ -18,6 +19,9 @@ import numpy as np
 from geometry_msgs.msg import Point
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 from std_msgs.msg import Bool, String
+
+
+logger = logging.getLogger(__name__)
 
 
 class Mode(Enum):
@@ -123,6 +127,12 @@ MISTAKES = [
     # lists
     ("self.tasks.extend(['a'])", "['a']"),
     ("self.tasks += Task('a')", "Task('a')"),
+    # formats
+    ("print(f'{Bool().data:s} {self.name:s}')", "Bool().data"),
+    ("logger.info('%s of %s', self.name)", "'%s of %s'"),
+    ("logging.warning('%d', self.count, self.name)", "'%d'"),
+    # classes that are stored
+    ("self.on = Bool\nself.on = 1.0", "Bool"),
     # conditions that depend on nothing
     ("if self.name == 'a' or 'b':\n    pass", "'b'"),
     ("assert (self.count > 0, 'positive')", "(self.count > 0, 'positive')"),
@@ -155,6 +165,9 @@ RIGHT = [
     "if self.name == 'a' or self.name == 'b' or self.count is None:\n    pass",
     "asdict(Task('a'))\nself.scan.header.stamp.sec += 2\nself.scan.header.stamp.sec //= 2",
     "self.scan.range_max += 1\nself.count += 0.5",
+    "logger.info('%s of %s', self.name, self.count), logger.info('100 %'), logging.info('%s', {})",
+    "logger.info('%(a)s', {'a': 1}), f'{self.name:s} {self.mode!s:s} {self.value():5}'",
+    "self.kind = Bool\nself.kind = String",
     "[].append(1), [1, 'a'].index('a'), 'a' in [1, 'a']",
 ]
 

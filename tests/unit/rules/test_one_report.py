@@ -53,6 +53,40 @@ nodes:
   n: {process: day, on_activate: {log: a}}
 """
 CAMERA = "node: camera\nparameters: {serial: {type: string}}\non_activate: {log: a}\n"
+UNPACKING = """\
+system: a
+nodes:
+  far: {type: turning}
+  near: {type: turning, parameters: {start: %s}}
+"""
+TURNING = """\
+node: turning
+behavior: code:Code
+parameters: {start: {type: double_array, default: [0.0, 0.0]}}
+"""
+UNPACKING_CODE = """\
+class Code:
+    def on_activate(self):
+        self.x, self.y = self.parameters.start
+"""
+TWICE = f"""\
+system: a
+nodes:
+  a: {{publishers: {{out: {TALK}}}}}}}
+  b: {{subscriptions: {{in: {TALK}, log: a}}}}}}
+  c: {{subscriptions: {{in: {TALK}, external: true, log: a}}}}}}
+connections:
+  - {{topic: /x, from: a.out, to: [b.in, b.in]}}
+"""
+ACTION = """\
+from example_interfaces.action import Fibonacci
+
+
+class Code:
+    async def on_go(self, goal):
+        request: Fibonacci.Goal = goal
+        return Fibonacci.Result(sequence=[request.order])
+"""
 IMPORTED = """\
 from composer.behavior import %s
 
@@ -119,6 +153,41 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
             "nodes/drive.py": DRIVE_CODE,
         },
         [("frame-cycle", "system.yaml", 4)],
+    ),
+    "a list of another length than the code expects": (
+        {
+            "system.yaml": UNPACKING % "[1.0, 2.0, 3.0]",
+            "nodes/turning.yaml": TURNING,
+            "nodes/code.py": UNPACKING_CODE,
+        },
+        [("index-out-of-range", "system.yaml", 4)],
+    ),
+    "code that expects another length than the default": (
+        {
+            "system.yaml": UNPACKING % "[1.0, 2.0]",
+            "nodes/turning.yaml": TURNING,
+            "nodes/code.py": UNPACKING_CODE.replace("self.y", "self.y, self.z"),
+        },
+        [("index-out-of-range", "code.py", 3)],
+    ),
+    "a port that is named twice": (
+        {"system.yaml": TWICE},
+        [("port-connected-twice", "system.yaml", 7)],
+    ),
+    "a value that a transition returns": (
+        {
+            "system.yaml": HELPER,
+            "code.py": CODE % "math" + "\n    def on_configure(self):\n        return 'ready'\n",
+        },
+        [("unknown-import", "code.py", 1), ("missing-return", "code.py", 9)],
+    ),
+    "a handle for a message": (
+        {
+            "system.yaml": "system: a\nnodes:\n  n:\n    behavior: code:Code\n    action_servers:\n"
+            "      go: {type: example_interfaces/action/Fibonacci, external: true}\n",
+            "code.py": ACTION,
+        },
+        [("invalid-value", "code.py", 6)],
     ),
     "a process whose name is wrong": (
         {"system.yaml": PROCESSES},
