@@ -17,9 +17,11 @@ from composer.behavior_checks.calls.arguments import (
 from composer.behavior_checks.calls.call import call_problems, uncallable
 from composer.behavior_checks.calls.collection_calls import method_problems
 from composer.behavior_checks.calls.rclpy_calls import rclpy_call
+from composer.behavior_checks.calls.standard_calls import shape_problems
 from composer.behavior_checks.messages.message_values import ValueChecker
 from composer.behavior_checks.operations.membership import enumeration_problems
 from composer.behavior_checks.operations.operations import annotations_by_name
+from composer.behavior_checks.parts import uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.receivers import lacks_self
@@ -52,6 +54,7 @@ from composer.behavior_types.values import (
 )
 from composer.diagnostics import nearest, suggestion
 from composer.fast_dataclass import dataclass
+from composer.field_types import ANYTHING
 from composer.interfaces import Action, Message, Service
 from composer.source import Span
 
@@ -95,12 +98,8 @@ class CallChecker:
                 yield from self._created(node, own)
             case AnyFunction(arguments=tuple() as takes):
                 yield from self._described(node, takes)
-            case BuiltinMethod(python=python, name=name) if python is ndarray or (
-                python.__module__ == "random"
-            ):
-                parameters = method_signature(python, name)
-                if parameters is not None:
-                    yield from call_problems(node, parameters, self.scope)
+            case BuiltinMethod(python=python, name=name):
+                yield from self._builtin(node, python, name)
             case CollectionMethod(owner=collection, name=name):
                 yield from method_problems(node, collection, name, self.scope)
             case _ if (changed := changed_tuple(self.scope, node)) is not None:
@@ -109,6 +108,7 @@ class CallChecker:
                     fields = fields_expected(self.scope, changed.of)
                     yield from call_problems(node, parameters, self.scope, fields)
             case other:
+                yield from self._of_array(node)
                 yield from self.values.added(node)
                 special = special_method(self.scope, other, "__call__")
                 if special is not None:
@@ -116,6 +116,30 @@ class CallChecker:
                 reason = uncallable(other)
                 if reason is not None:
                     yield CodeProblem(Kind.VALUE, reason[0], self._span(node.func), reason[1])
+
+    def _builtin(self, node: ast.Call, python: type, name: str) -> Iterator[CodeProblem]:
+        """Check a call of a method of an array of numpy, or of a source of random numbers."""
+        is_known = python is ndarray or python.__module__ == "random"
+        parameters = method_signature(python, name) if is_known else None
+        if parameters is not None:
+            yield from call_problems(node, parameters, self.scope)
+        yield from self._of_array(node)
+
+    def _of_array(self, node: ast.Call) -> Iterator[CodeProblem]:
+        """Check a call of a method of an array of numpy, or of the array itself."""
+        if not uses_numpy(self.scope.home):
+            return
+        if isinstance(node.func, ast.Attribute):
+            if not self.scope.called_name(node.func):
+                yield from shape_problems(node, f".{node.func.attr}", self.scope)
+        elif isinstance(node.func, ast.Name) and self.scope.is_local(node.func.id):
+            from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+                rank_of,
+            )
+
+            if self.scope.type_of(node.func) is ANYTHING and rank_of(node.func, self.scope):
+                problem, hint = "an array of numpy is not a function", "write [...] for an index"
+                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
 
     def _created(self, node: ast.Call, own: OwnClass) -> Iterator[CodeProblem]:
         yield from enumeration_problems(node, own, self.scope)

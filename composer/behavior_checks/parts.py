@@ -36,6 +36,12 @@ def outside_functions(home: Module) -> ast.FunctionDef:
     )
 
 
+@lru_cache(maxsize=128)
+def uses_numpy(home: Module) -> bool:
+    """Return whether a file imports numpy."""
+    return any(item.module.partition(".")[0] == "numpy" for item in home.imports.values())
+
+
 def possible_values(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:
     """Yield the expressions that an expression may have the value of."""
     match node:

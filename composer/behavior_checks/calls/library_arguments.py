@@ -51,8 +51,9 @@ def library_argument_problems(
     one, other = (given.get(item) for item in _SAME_LENGTHS.get(name, ("", "")))
     if one is not None and other is not None:
         shapes = shape_of(one, scope), shape_of(other, scope)
-        if shapes[0] and shapes[1] and shapes[0][0] != shapes[1][0]:
-            message = f"arrays of {shapes[0][0]} and {shapes[1][0]} elements in '{name}'"
+        lengths = [shape[0] if shape else None for shape in shapes]
+        if None not in lengths and lengths[0] != lengths[1]:
+            message = f"arrays of {lengths[0]} and {lengths[1]} elements in '{name}'"
             yield CodeProblem(Kind.CALL, message, span_of(other, scope.home.source))
 
 

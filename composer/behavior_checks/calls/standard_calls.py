@@ -58,6 +58,8 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
             )
 
             yield from library_argument_problems(call, signature, scope)
+    if name.startswith("numpy."):
+        yield from shape_problems(call, name, scope)
     if name == "time.sleep" or name in _OF_NUMBERS:
         takes_numbers = name not in _OF_ITERABLES
         for item in call.args:
@@ -83,6 +85,17 @@ def library_call_problems(call: ast.Call, name: str, scope: FunctionTypes) -> It
                 span = span_of(call, scope.home.source)
                 yield CodeProblem(Kind.VALUE, problem, span)
                 return
+
+
+def shape_problems(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    """Check the axis and the sizes that a function of numpy, or ``.method``, is called with."""
+    from composer.behavior_checks.operations.shape_problems import (  # noqa: PLC0415 (start-up time)
+        call_on_shapes,
+    )
+
+    problem = call_on_shapes(call, name, scope)
+    if problem is not None:
+        yield CodeProblem(Kind.VALUE, problem, span_of(call, scope.home.source))
 
 
 def _called_functions(call: ast.Call, name: str, scope: FunctionTypes) -> Iterator[CodeProblem]:

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
+from composer.behavior_checks.parts import uses_numpy
 from composer.behavior_source import Function
 from composer.behavior_source.flow import returned_values
 from composer.behavior_types.expressions.fillings import fillings_of
@@ -25,6 +26,7 @@ from composer.behavior_types.values import (
     Parameters,
     Self,
 )
+from composer.field_types import ANYTHING
 from composer.interfaces import FieldType, Message
 from composer.model import Parameter
 
@@ -48,16 +50,25 @@ def length_of(node: ast.expr, scope: FunctionTypes, depth: int = 0) -> Length:
         members = member_values(found)
         return _exactly(len({ast.unparse(x) for x in members.values()})) if members else _UNKNOWN
     length = _of_syntax(node, scope, depth + 1) if depth < _DEEPEST else _UNKNOWN
-    return _of_array(node, scope) if found == ARRAY and length == _UNKNOWN else length
+    is_array = found in (ARRAY, ANYTHING) or isinstance(node, ast.Attribute)
+    if length != _UNKNOWN or not is_array or not uses_numpy(scope.home):
+        return length
+    return _of_array(node, scope)
 
 
 def _of_array(node: ast.expr, scope: FunctionTypes) -> Length:
+    """Return how many elements an array has in its first dimension, or how many its shape has."""
     from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+        rank_of,
         shape_of,
     )
 
-    shape = shape_of(node, scope)
-    return _exactly(shape[0]) if shape else _UNKNOWN
+    if isinstance(node, ast.Attribute) and node.attr == "shape":
+        count = rank_of(node.value, scope)
+        return _exactly(count) if count else _UNKNOWN
+    is_array = scope.type_of(node) in (ARRAY, ANYTHING)
+    shape = shape_of(node, scope) if is_array else None
+    return _exactly(shape[0]) if shape and shape[0] is not None else _UNKNOWN
 
 
 def _of_syntax(node: ast.expr, scope: FunctionTypes, depth: int) -> Length:

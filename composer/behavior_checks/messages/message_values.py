@@ -9,7 +9,7 @@ from composer.behavior_checks.fitting import value_problem
 from composer.behavior_checks.messages.elements import size_problem
 from composer.behavior_checks.messages.field_values import field_problem
 from composer.behavior_checks.operations.awaiting import missing_await
-from composer.behavior_checks.parts import possible_values
+from composer.behavior_checks.parts import possible_values, uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.spans import span_of, start_span
@@ -160,9 +160,7 @@ def _dimensions(
     is_list = isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "tolist"
     if is_list and isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
         node = node.func.value
-    found = scope.type_of(node)
-    is_attribute = is_list and isinstance(node, ast.Attribute) and found is ANYTHING
-    if found != ARRAY and not is_attribute:
+    if scope.type_of(node) not in (ARRAY, ANYTHING) or not uses_numpy(scope.home):
         return None
     from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
         rank_of,

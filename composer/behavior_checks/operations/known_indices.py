@@ -40,7 +40,8 @@ def index_problems(
         if not -count <= index < count:
             owner = ast.unparse(node.value)
             message = f"'{owner}' has no element {index}: it has {counted(count)}"
-            yield CodeProblem(Kind.INDEX, message, span_of(node.slice, scope.home.source))
+            span = span_of(node.slice, scope.home.source)
+            yield CodeProblem(Kind.INDEX, message, span, about=owner)
             return
 
 

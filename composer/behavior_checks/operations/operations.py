@@ -11,7 +11,7 @@ from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.operations.caught import exception_class, unreachable_handlers
 from composer.behavior_checks.operations.formats import percent_problem
 from composer.behavior_checks.operations.membership import CONVERSIONS, conversion_problems
-from composer.behavior_checks.parts import is_only_none
+from composer.behavior_checks.parts import is_only_none, uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module
 from composer.behavior_source.flow import returned_values
@@ -83,6 +83,8 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             problem = problem or _position_problem(scope.type_of(owner), index)
             if problem is not None:
                 yield CodeProblem(Kind.VALUE, problem, span_of(index, source), about=about)
+            elif uses_numpy(scope.home):
+                yield from _index_of_array(node, scope)
         case ast.Call(func=ast.Name(id="len"), args=[argument]):
             found = scope.type_of(argument)
             if _has_no_length(found):
@@ -112,12 +114,30 @@ def operation_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
                 yield CodeProblem(Kind.ASYNCIO, message, span_of(function, source), hint)
 
 
-def _product_problem(left: ast.expr, right: ast.expr, scope: FunctionTypes) -> str | None:
-    from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+def _shape_problem(
+    left: ast.expr, operator: ast.operator, right: ast.expr, scope: FunctionTypes
+) -> str | None:
+    """Return why the shapes of two arrays of numpy do not allow an operation."""
+    if not uses_numpy(scope.home):
+        return None
+    from composer.behavior_checks.operations.shape_problems import (  # noqa: PLC0415 (start-up time)
+        operation_on_shapes,
         product_problem,
     )
 
-    return product_problem(left, right, scope)
+    is_product = isinstance(operator, ast.MatMult)
+    return (product_problem if is_product else operation_on_shapes)(left, right, scope)
+
+
+def _index_of_array(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProblem]:
+    from composer.behavior_checks.operations.shape_problems import (  # noqa: PLC0415 (start-up time)
+        index_on_shape,
+    )
+
+    found = index_on_shape(node, scope)
+    if found is not None:
+        span, about = span_of(found[1], scope.home.source), dotted(node.value)
+        yield CodeProblem(Kind.INDEX, found[0], span, about=about)
 
 
 def _calculation(node: ast.BinOp, scope: FunctionTypes) -> Iterator[CodeProblem]:
@@ -127,10 +147,9 @@ def _calculation(node: ast.BinOp, scope: FunctionTypes) -> Iterator[CodeProblem]
     problem = operation_problem(scope.type_of(left), operator, scope.type_of(right))
     problem = problem or percent_problem(left, operator, right, scope)
     problem = problem or _problem_of_array(left, operator, right, scope)
-    if isinstance(operator, ast.MatMult):
-        problem = problem or _product_problem(left, right, scope)
+    problem = problem or _shape_problem(left, operator, right, scope)
     if problem is not None:
-        about = blamed_name((left, right), scope)
+        about = blamed_name((left, right), scope) or dotted(left)
         place = uncalled(left, scope) or uncalled(right, scope) or node
         yield CodeProblem(Kind.VALUE, problem, span_of(place, source), about=about)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from functools import lru_cache
 
+from composer.behavior_checks.parts import uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
-from composer.behavior_source import Function, Module
+from composer.behavior_source import Function
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -30,7 +30,7 @@ def truth_problems(
 ) -> Iterator[CodeProblem]:
     """Yield the methods that a condition tests without a call, as in ``if sensor.is_ready``."""
     yield from constant_problems(node, scope)
-    if _uses_numpy(scope.home):
+    if uses_numpy(scope.home):
         yield from _arrays(node, scope)
     for test in _tested(node):
         name = _always_true(test, scope)
@@ -41,11 +41,6 @@ def truth_problems(
             yield CodeProblem(Kind.VALUE, message, span, f"call it: {name}()")
 
 
-@lru_cache(maxsize=128)
-def _uses_numpy(home: Module) -> bool:
-    return any(item.module.partition(".")[0] == "numpy" for item in home.imports.values())
-
-
 def _arrays(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
     """Yield the arrays of numpy in conditions: which element counts is not clear."""
     tested = [*_tested(node)]
@@ -54,8 +49,12 @@ def _arrays(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProblem]:
             tested += first
         case ast.Compare(left=left, comparators=[*others]) if len(others) > 1:
             tested += [item for item in (left, *others) if scope.type_of(item) == ARRAY][:1]
+    from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+        is_array,
+    )
+
     for test in tested:
-        if scope.type_of(test) == ARRAY:
+        if is_array(test, scope):
             message = "an array of numpy is neither true nor false"
             hint = "write .any() or .all(), or ask for its .size"
             if isinstance(node, ast.BoolOp):

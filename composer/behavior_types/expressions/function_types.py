@@ -72,6 +72,8 @@ class FunctionTypes:
     of_class: OwnClass | None = None
     #: The function itself, if it is one.
     function: Function | None = None
+    #: The shapes of arrays of numpy, by the id of the expression; checks fill it.
+    shapes: dict[int, tuple[int | None, ...] | None] = field(default_factory=dict)
     _known: dict[int, Value] = field(default_factory=dict)
     _names: dict[str, Value] = field(default_factory=dict)
     #: The names that are not of the type that they have at first.
@@ -112,6 +114,7 @@ class FunctionTypes:
     def forget(self) -> None:
         """Forget all types, since one of them rests on an assumption that is wrong."""
         self._known.clear()
+        self.shapes.clear()
         self._names.clear()
         self._is_started = False
 
