@@ -300,9 +300,8 @@ def _image(
     root = result.project.root
     used = sorted(used_packages(system))
     own = find_packages(result.project.interface_folders).folders
-    # Packages of the project may use the others, and each other.
     built = [name for name in used if name in NOT_IN_WHEELS and name not in own]
-    built += () if own.keys().isdisjoint(used) else own
+    built += () if own.keys().isdisjoint(used) else own  # behaviors may import the others
     contents = Contents(
         system=system.name.value,
         file=PurePosixPath(path.resolve().relative_to(root).as_posix()),

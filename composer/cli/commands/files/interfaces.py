@@ -65,10 +65,11 @@ def build(
     'action', and a package.xml that names it. The rest is generated in 'build/interfaces', and pip
     builds it, with gcc. Packages that have a pyproject.toml of their own are built as they are.
 
-    tf2_msgs, nav2_msgs and other packages of ROS that are not on PyPI are built by their names,
+    tf2_msgs, control_msgs and other packages of ROS that are not on PyPI are built by their names,
     from the definitions that come with the composer.
 
-    Building needs ROS 2 from PyPI. With a sourced ROS 2, build the generated package with colcon.
+    Building needs ROS 2 from PyPI. With a sourced ROS 2, and for packages with types of another one
+    that is not on PyPI, such as nav2_msgs, build the generated package with colcon.
     """
     from composer.cli.support.interface_builds import complete_package, install_package
     from composer.project import Project
