@@ -17,6 +17,8 @@ import re
 MAXIMUM_NODE_NAME_LENGTH = 255
 MAXIMUM_NAMESPACE_LENGTH = 245
 MAXIMUM_TOPIC_NAME_LENGTH = 247
+#: The logger of what the program itself says. Those of nodes have the names of the nodes.
+PROGRAM_LOGGER = "compose"
 
 _FOREIGN_CHARACTER = re.compile(r"[^A-Za-z0-9_]")
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
+from composer.names import PROGRAM_LOGGER
 from composer.run_log.reading import RunReader
 from composer.run_log.record import Record
 from composer.run_log.runs import Run, find_parts, find_runs
@@ -15,7 +16,7 @@ from composer.run_log.runs import Run, find_parts, find_runs
 _POLL_S = 0.1
 _SECOND_NS = 1_000_000_000
 #: What a process says about states, the one that coordinates it says as well.
-_COMPOSE, _INFO = "compose", "info"
+_INFO = "info"
 
 
 class SystemLog:
@@ -74,7 +75,7 @@ class SystemLog:
         return not is_later and part.written_ns() >= self._from_ns
 
     def _belongs(self, record: Record) -> bool:
-        if record.logger == _COMPOSE and record.level == _INFO:
+        if record.logger == PROGRAM_LOGGER and record.level == _INFO:
             return False
         is_later = self._next is not None and record.time_ns >= _start_ns(self._next)
         return not is_later and record.time_ns >= self._from_ns

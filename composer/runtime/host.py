@@ -34,7 +34,7 @@ from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
 from composer.model import LogLevel, Node, System
 from composer.model.dependencies import dependency_edges, in_dependency_order
-from composer.names import join
+from composer.names import PROGRAM_LOGGER, join
 from composer.plan import Fault, Plan
 from composer.runtime.children.discovery_server import discovery_servers
 from composer.runtime.executors.process_limits import (
@@ -172,7 +172,7 @@ class Host:
         """Return the block in which this process joins the ROS graph."""
         if not sends_large_messages(self._system):
             return nullcontext()
-        warn = partial(self._reporter.log, LogLevel.WARN, "composer")
+        warn = partial(self._reporter.log, LogLevel.WARN, PROGRAM_LOGGER)
         return segment_for_large_messages(os.environ, get_rmw_implementation_identifier(), warn)
 
     def _join(self, namespace: str) -> ManagerNode:
@@ -247,7 +247,7 @@ class Host:
             self._fail(f"{error.node} failed")
             return False
         for warning in self._node_set.warnings:
-            self._reporter.log(LogLevel.WARN, "composer", warning)
+            self._reporter.log(LogLevel.WARN, PROGRAM_LOGGER, warning)
         if self._options.ends_process:
             # What is there now stays to the end. A search for reference cycles in it takes 0.1 s.
             gc.freeze()
@@ -317,7 +317,7 @@ class Host:
         self._status.update_states({name: node.state for name, node in nodes})
         excess = None if self._options.process is None else memory_excess(self._options.process)
         if excess is not None and not self._main_queue.stopping:
-            self._reporter.log(LogLevel.ERROR, "composer", excess)
+            self._reporter.log(LogLevel.ERROR, PROGRAM_LOGGER, excess)
             self._fail(excess)
 
     # --- end

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from composer.cli.support.output.output_queue import OutputQueue
 from composer.cli.support.output.progress import logger_and_text, severity_of
 from composer.cli.support.output.terminal import say
+from composer.names import PROGRAM_LOGGER
 from composer.run_log import Record, RotatingFile, RunFolder
 from composer.runtime.middleware.environment import log_folder
 from composer.runtime.supervision.events import CallbackFailed, Event, Logged
@@ -76,7 +77,7 @@ def run_log(system: str, *, part: bool = False, forwarded: bool = False) -> Iter
 def _record(event: Event) -> Record:
     logger, text = logger_and_text(event)
     if isinstance(event, Logged):
-        node = "" if logger in _OWN_LOGGERS else "/" + logger.replace(".", "/")
+        node = "" if logger == PROGRAM_LOGGER else "/" + logger.replace(".", "/")
     else:
         node = getattr(event, "node", "")
     return Record(time.time_ns(), severity_of(event).lower(), logger, node, text)
@@ -84,8 +85,4 @@ def _record(event: Event) -> Record:
 
 def _note(dropped_lines: int) -> str:
     text = f"{dropped_lines} lines of the log are missing: the disk was full or too slow"
-    return Record(time.time_ns(), "warn", "compose", "", text).to_line()
-
-
-#: Those of the composer, which is not a node.
-_OWN_LOGGERS = ("compose", "composer")
+    return Record(time.time_ns(), "warn", PROGRAM_LOGGER, "", text).to_line()

@@ -21,6 +21,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from composer.model import Discovery, LogLevel
+from composer.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import (
     Child,
     ChildProcesses,
@@ -43,7 +44,6 @@ _IDLE_WITHIN_S = 1.0
 _POLL_S = 0.02
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
-_LOGGER = "composer"
 
 #: Receives the level, the logger and the text of a line.
 Write = Callable[[LogLevel, str, str], None]
@@ -258,7 +258,7 @@ class _Server:
             self._log(LogLevel.ERROR, f"{refusal}: {refusal.hint}")
 
     def _log(self, level: LogLevel, text: str) -> None:
-        self._write_log(level, _LOGGER, text)
+        self._write_log(level, PROGRAM_LOGGER, text)
 
 
 def _has_ended_in_order(child: Child) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from rclpy.logging import get_logger
 
 from composer.model import Executor, ExecutorKind
+from composer.names import PROGRAM_LOGGER
 from composer.runtime.executors.event_loop import EventLoop
 from composer.runtime.executors.exceptions import describe, internal_report_of
 from composer.runtime.executors.loop import ExceptionHandler, Loop
@@ -43,7 +44,7 @@ def log_exception(what: str, error: BaseException) -> None:
     admission = _EXCEPTIONS.admit(what)
     if admission is not None:
         text = internal_report_of(error) if admission.is_first else describe(error)
-        get_logger("composer").error(f"{what}: {text}{admission.suffix}")
+        get_logger(PROGRAM_LOGGER).error(f"{what}: {text}{admission.suffix}")
 
 
 def place_threads(executor: Executor, native_thread_ids: Iterable[int]) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import LogLevel, Process
+from composer.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.output import parse_line
 from composer.runtime.executors.exceptions import printable
@@ -349,7 +350,7 @@ class MemberProcess:
         self._life = life = MemberLife(holds_lock=is_held(self._name))
         self._may_start = False
         text = f"{self} was not started here; it is used: host {report.host}, process {report.pid}"
-        self._context.write_log(LogLevel.INFO, "composer", text)
+        self._context.write_log(LogLevel.INFO, PROGRAM_LOGGER, text)
         return life
 
     def _check(self) -> None:
@@ -379,7 +380,7 @@ class MemberProcess:
                 member.on_process_end(reason)
 
     def _warn(self, text: str) -> None:
-        self._context.write_log(LogLevel.WARN, "composer", f"{self} {text}")
+        self._context.write_log(LogLevel.WARN, PROGRAM_LOGGER, f"{self} {text}")
 
     def _log(self, text: str, is_error: bool) -> None:
         level, logger, message = parse_line(text, is_error=is_error)

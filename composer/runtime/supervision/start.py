@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from composer.model import LogLevel, PrimaryState, System
+from composer.names import PROGRAM_LOGGER
 from composer.plan import Plan, SystemGoals
 from composer.runtime.supervision.events import BroughtUp, Reporter
 from composer.runtime.supervision.main_queue import Item, MainQueue
@@ -76,7 +77,7 @@ class SystemStart:
     def _take_over(self, found: SystemGoals) -> None:
         """Lead the nodes to the goals that they had: those that are there do not move."""
         text = f"an earlier process has coordinated the system, which is {found.activity}"
-        self.reporter.log(LogLevel.INFO, "composer", text)
+        self.reporter.log(LogLevel.INFO, PROGRAM_LOGGER, text)
         serial = self.supervisor.desired.serial
         self.node_set.take_over()
         self.supervisor.start(found.states(self.system), found.activity, serial)

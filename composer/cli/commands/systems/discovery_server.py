@@ -13,6 +13,7 @@ from composer.cli.support.errors import CONFIG, FAILED, CommandError
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import say
 from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.names import PROGRAM_LOGGER
 
 if TYPE_CHECKING:
     from composer.model import Discovery
@@ -97,7 +98,7 @@ def _run(discovery: Discovery) -> None:
             while not received and not _is_running(discovery):
                 wakeup.wait(time.monotonic() + _POLL_S)
             if not received:
-                write_log(LogLevel.INFO, "composer", f"running at {_listed(discovery)}")
+                write_log(LogLevel.INFO, PROGRAM_LOGGER, f"running at {_listed(discovery)}")
                 manager.send(READY)
             while not received:
                 wakeup.wait()

@@ -11,6 +11,7 @@ from composer.cli.support.output.callback_tables import summary_table
 from composer.cli.support.output.line_format import Line, LineFormat
 from composer.cli.support.output.terminal import columns, lines, use_color
 from composer.cli.support.process import report_ready, take_ready_descriptor
+from composer.names import PROGRAM_LOGGER
 from composer.runtime.supervision.events import (
     BroughtUp,
     CallbackFailed,
@@ -80,7 +81,7 @@ def logger_and_text(event: Event) -> tuple[str, str]:
     """Return the name of the logger that an event is shown with, and its text."""
     if isinstance(event, Logged):
         return event.logger, event.message
-    return "compose", str(event)
+    return PROGRAM_LOGGER, str(event)
 
 
 def continued(text: str) -> str:
