@@ -45,6 +45,7 @@ from composer.behavior_checks.operations.returns import must_return, return_prob
 from composer.behavior_checks.operations.truth import TESTING, truth_problems
 from composer.behavior_checks.parts import outside_functions, scalar_name
 from composer.behavior_checks.problems import CodeProblem, Kind, distinct
+from composer.behavior_checks.refused_parameters import refused_parameters
 from composer.behavior_source import BehaviorSource, Function
 from composer.behavior_source.flow import returned_values
 from composer.behavior_source.method_body import dotted
@@ -101,6 +102,9 @@ def _all_problems(types: BehaviorTypes, source: BehaviorSource) -> Iterator[Code
         yield from missing_constructors(types)
         yield from undeclared_parameters(types)
         yield from transition_problems(types)
+    for names, problem in refused_parameters(types) if not is_hosted else ():
+        types.refused |= names  # what else they cause is never reached
+        yield problem
     missing: set[str] = set()
     wrong: dict[str, CodeProblem] = {}
     blame = _blame(types)

@@ -18,6 +18,7 @@ from composer.behavior_checks.calls.call import call_problems, uncallable
 from composer.behavior_checks.calls.collection_calls import method_problems
 from composer.behavior_checks.calls.rclpy_calls import rclpy_call
 from composer.behavior_checks.calls.standard_calls import shape_problems
+from composer.behavior_checks.calls.swapped_arguments import swapped_arguments
 from composer.behavior_checks.messages.message_values import ValueChecker
 from composer.behavior_checks.operations.membership import enumeration_problems
 from composer.behavior_checks.operations.operations import annotations_by_name
@@ -184,8 +185,11 @@ class CallChecker:
         signature = signature_of(function, is_bound=is_bound)
         if signature is not None:
             expected = annotations_by_name(function, home, self.scope.owner)
-            for problem in call_problems(node, signature, self.scope, expected):
+            found = list(call_problems(node, signature, self.scope, expected))
+            for problem in found:
                 yield replace(problem, called=(function, home))
+            if not found and len(node.args) > 1:
+                yield from swapped_arguments(node, signature, function, self.scope)
 
     def _may_be_derived(self, called: ast.expr, own: OwnClass) -> bool:
         """Return whether a class method creates what may be of another class: by 'cls(...)'."""

@@ -80,6 +80,8 @@ class BehaviorTypes:
     #: The types of what functions without annotations return, by the id of the function.
     results: dict[int, Value] = field(default_factory=dict)
     depth: int = 0
+    #: The parameters whose values ``on_configure`` refuses.
+    refused: set[str] = field(default_factory=set)
     assumed: Assumed = field(default_factory=Assumed)
     _at_modules: dict[int, FunctionTypes] = field(default_factory=dict)
     _functions: dict[int, FunctionTypes] = field(default_factory=dict)

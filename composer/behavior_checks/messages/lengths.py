@@ -105,6 +105,7 @@ def _of_syntax(node: ast.expr, scope: FunctionTypes, depth: int) -> Length:
         case ast.Attribute(value=owner, attr=name) if isinstance(scope.type_of(owner), Parameters):
             count = parameter_length(scope.owner.node.parameter(name))
             is_asked = scope.function is None or looks_first(scope.function, name, scope)
+            is_asked = is_asked or name in scope.owner.refused
             return _UNKNOWN if count is None or is_asked else _exactly(count)
         case _:
             return _UNKNOWN

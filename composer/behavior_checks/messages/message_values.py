@@ -41,21 +41,29 @@ class ValueChecker:
                 yield CodeProblem(Kind.VALUE, problem, self._span(argument), hint)
                 return
         seen: set[str] = set()
+        wrong: list[tuple[ast.expr, Field]] = []
         for keyword in node.keywords:
             if keyword.arg is None:
                 continue
             field = message.field(keyword.arg)
             if field is not None:
                 found = list(self.field(keyword.value, field))
+                if found and any(self._fits_in(keyword.value, field, *other) for other in wrong):
+                    continue  # two values that are swapped are one slip
                 # the same slip in several fields is one, as in ColorRGBA(r=1, g=0, b=0)
                 yield from (problem for problem in found if problem.message not in seen)
                 seen.update(problem.message for problem in found)
+                wrong += [(keyword.value, field)] if found else []
             elif keyword.arg != "check_fields":
                 problem = f"{message.name} has no field '{keyword.arg}'"
                 hint = suggestion(keyword.arg, message.field_names)
                 span = start_span(keyword, len(keyword.arg), self.scope.home.source)
                 yield CodeProblem(Kind.FIELD, problem, span, hint)
                 return  # more of them come from the wrong class
+
+    def _fits_in(self, value: ast.expr, field: Field, other: ast.expr, its_field: Field) -> bool:
+        """Return whether two values fit if each is in the field of the other one."""
+        return not any(self.field(value, its_field)) and not any(self.field(other, field))
 
     def added(self, node: ast.Call) -> Iterator[CodeProblem]:
         """Check what ``append`` and ``insert`` add to a list in a message."""

@@ -41,7 +41,8 @@ def index_problems(
             owner = ast.unparse(node.value)
             message = f"'{owner}' has no element {index}: it has {counted(count)}"
             span = span_of(node.slice, scope.home.source)
-            yield CodeProblem(Kind.INDEX, message, span, about=owner)
+            about = "" if isinstance(node.slice, ast.Name) else owner
+            yield CodeProblem(Kind.INDEX, message, span, about=about)
             return
 
 

@@ -123,15 +123,40 @@ def _member(node: ast.Subscript, scope: FunctionTypes) -> Iterator[CodeProblem]:
         span = span_of(node.slice, scope.home.source)
         yield CodeProblem(Kind.VALUE, message, span, f"by value: {class_name}(...)")
         return
-    name = node.slice.value if isinstance(node.slice, ast.Constant) else None
-    if not isinstance(name, str):
-        return
-    known = known_attributes(own)
-    if known is not None and name not in known:
-        message = f"'{own.definition.name}' has no member '{name}'"
-        names = [item for item in known if not item.startswith("_")]
-        span = span_of(node.slice, scope.home.source)
-        yield CodeProblem(Kind.ATTRIBUTE, message, span, suggestion(name, names))
+    known = _member_names(own) if known_attributes(own) is not None else None
+    for name in _names(node.slice, scope):
+        if known is not None and name not in known:
+            is_here = isinstance(node.slice, ast.Constant)
+            message = f"'{own.definition.name}' has no member '{name}'"
+            message += "" if is_here else " for this parameter"
+            names = [item for item in known if not item.startswith("_")]
+            span = span_of(node.slice, scope.home.source)
+            yield CodeProblem(Kind.ATTRIBUTE, message, span, suggestion(name, names))
+            return
+
+
+def _member_names(own: OwnClass) -> set[str]:
+    return {
+        target.id
+        for item in lineage(own).classes
+        for statement in item.definition.node.body
+        if isinstance(statement, ast.Assign)
+        for target in statement.targets
+        if isinstance(target, ast.Name)
+    }
+
+
+def _names(node: ast.expr, scope: FunctionTypes) -> list[str]:
+    """Return the texts that an expression has the value of, also for choices of a parameter."""
+    match node:
+        case ast.Constant(value=str() as name):
+            return [name]
+        case ast.Call(
+            func=ast.Attribute(value=owner, attr="upper" | "lower" as changed), args=[], keywords=[]
+        ):
+            return [getattr(name, changed)() for name in _names(owner, scope)]
+        case _:
+            return [item for item in parameter_values(node, scope) if isinstance(item, str)]
 
 
 def enumeration_problems(
@@ -150,6 +175,11 @@ def enumeration_problems(
             match statement:
                 case ast.Assign(targets=[ast.Name()], value=ast.Constant(value=value)):
                     values.append(value)
+                case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=function)):
+                    if scope.owner.at_module(item.home).called_name(function) != "enum.auto":
+                        return
+                    is_text = is_enumeration(own, "enum.StrEnum")
+                    values.append(name.lower() if is_text else len(values) + 1)
                 case ast.Expr() | ast.Pass():
                     pass
                 case _:

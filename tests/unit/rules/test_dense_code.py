@@ -33,6 +33,7 @@ from typing import NamedTuple
 
 from composer.behavior import Behavior
 from composer_interfaces.action import Navigate
+from std_msgs.msg import ColorRGBA, String
 from std_srvs.srv import Trigger
 
 
@@ -96,6 +97,9 @@ class Code(Behavior):
 
     def move(self):
         {move}
+
+    def send(self, label: str, data: str):
+        print(label, data)
 
     def enter(self, step: Step):
         print(step.reason)
@@ -168,6 +172,10 @@ MISTAKES = [
     ({"tick": "name = self.name\nself.times[name].append(1.0)"}, "invalid-value", "name"),
     ({"low": "self.value += 0.5", "tick": "Low().start()"}, "unchecked-none", "self.value"),
     ({"low": "self.started -= 0.5", "tick": "Low().start()"}, "unchecked-none", "self.started"),
+    # what is swapped
+    ({"tick": "label, text = 'a', String()\nself.send(text.data, label)"}, "call-arguments",
+     "text.data"),
+    ({"tick": "Trigger.Response(success='a', message=True)"}, "invalid-value", "'a'"),
     # what is read before it is set
     ({"accept": "return not self.busy and request", "drive": "self.busy = True"},
      "unknown-attribute", "busy"),
@@ -195,6 +203,9 @@ RIGHT = [
     {"low": "self.value += 0.5", "tick": "low = Low()\nsetattr(low, 'value', 1.0)\nlow.start()"},
     {"accept": "return request and not self.busy", "drive": "self.busy = True"},
     {"accept": "return not self.busy", "drive": "self.busy = True", "tock": "self.busy = False"},
+    {"tick": "label, text = 'a', String()\nself.send(label, text.data)"},
+    {"tick": "label, data = 'a', 'b'\nself.send(data, label)"},
+    {"tick": "a = String()\nlabel = 'a'\nself.send(a.data, label)\nself.send(label, a.data)"},
     {"tick": "for axis in 'xy':\n    setattr(self, f'_{axis}', 1.0)\nself._x + self.poses"},
     {"tick": "if hasattr(self, 'poze'):\n    print(self.poze)"},
     {"move": "if not hasattr(self, 'since'):\n    self.since = 1\nprint(self.since)"},

@@ -21,7 +21,7 @@ nodes:
       sections: {type: bool_array, default: [true, true, true]}
 """
 CODE = """\
-from enum import Enum, IntEnum
+from enum import Enum, IntEnum, auto
 
 import numpy as np
 from composer.behavior import Behavior
@@ -38,6 +38,11 @@ class Mode(Enum):
 
 class FastMode(Enum):
     FAST = "fast"
+
+
+class Gear(Enum):
+    FAST = auto()
+    SLOW = auto()
 
 
 class Leg(IntEnum):
@@ -97,6 +102,10 @@ GUARD = "if len(self.parameters.{}) != 3:\n    raise ValueError\n"
         ("Imu().orientation_covariance = np.zeros(3).tolist()", "np.zeros(3).tolist()"),
         # a float is not a member
         ("self.side(self.clock.now())", "self.clock.now()"),
+        ("Mode[self.parameters.mode]", "self.parameters.mode"),
+        ("FastMode[self.parameters.mode.upper()]", "self.parameters.mode.upper()"),
+        ("Gear(self.parameters.mode)", "self.parameters.mode"),
+        ("Gear(3)", "3"),
         # a choice that is not a key, or not the value of a member
         ("FACTOR[self.parameters.mode]", "self.parameters.mode"),
         (
@@ -128,6 +137,8 @@ def test_what_a_known_length_contradicts_is_found(
         "FACTORS[self.parameters.mode], Mode(self.parameters.mode)",
         "if self.parameters.mode != 'slow':\n    FACTOR[self.parameters.mode]",
         "mode = self.parameters.mode\nif mode == 'fast':\n    FastMode(self.parameters.mode)",
+        "Mode[self.parameters.mode.upper()], Gear(1), Gear(2), Gear[self.parameters.mode.upper()]",
+        "try:\n    FastMode[self.parameters.mode.upper()]\nexcept KeyError:\n    pass",
         "try:\n    FACTOR[self.parameters.mode]\nexcept KeyError:\n    pass",
         "try:\n    FastMode(self.parameters.mode)\nexcept ValueError:\n    pass",
         "if len(self.parameters.limits) > 2:\n    self.parameters.gains[2]",  # one for each
@@ -137,6 +148,36 @@ def test_what_a_known_length_contradicts_is_found(
 )
 def test_what_may_be_there_is_not_reported(statement: str, tmp_path: Path) -> None:
     assert _found(statement, tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("statement", "places"),
+    [
+        # what else the value causes is never reached
+        (
+            "if len(self.parameters.gains) != COUNT:\n    raise ValueError\n"
+            "Imu().orientation_covariance = self.parameters.gains",
+            ["len(self.parameters.gains) != COUNT"],
+        ),
+        ("assert self.parameters.mode == 'slow', 'no'", ["self.parameters.mode == 'slow'"]),
+        (
+            "if not self.parameters.gains or len(self.parameters.gains) < 3:\n    raise ValueError",
+            ["not self.parameters.gains or len(self.parameters.gains) < 3"],
+        ),
+        ("if len(self.parameters.gains) != 2:\n    raise ValueError", []),
+        ("if self.name and len(self.parameters.gains) != 3:\n    raise ValueError", []),
+        ("if self.name:\n    return\nif self.parameters.mode == 'fast':\n    raise KeyError", []),
+        ("if self.parameters.mode == 'fast':\n    self.log.warn('fast')", []),
+    ],
+)
+def test_values_that_on_configure_refuses(
+    statement: str, places: list[str], tmp_path: Path
+) -> None:
+    code = "COUNT = 3\n" + CODE.replace("{statement}", "pass")
+    statement = statement.replace("\n", "\n        ")
+    code = code.replace("self.row = [1.0, 2.0]", f"self.row = [1.0, 2.0]\n        {statement}")
+    (tmp_path / "code.py").write_text(code, encoding="utf-8")
+    assert [quoted(item) for item in diagnostics_in(SYSTEM, tmp_path)] == places
 
 
 def test_a_bounded_string_has_characters(tmp_path: Path) -> None:
