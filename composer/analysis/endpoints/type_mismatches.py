@@ -74,23 +74,30 @@ def misnamed_port(context: Context, mismatch: TypeMismatch) -> tuple[Endpoint, s
 
     The other one has the type of the channel, and the name of the channel or of another port on it.
     """
-    system = context.system
+    ends = set(map(_key, mismatch.channel.ends))
     for connection in _connections(context, mismatch):
-        ends = [(end, port) for end in connection.ends if (port := system.port(end)) is not None]
-        for end, port in ends:
-            others = [other for _, other in ends if other is not port]
-            names = {other.name.value for other in others}
-            names.add(connection.name.value.rpartition("/")[2])
-            types = {other.interface.value for other in others} - {port.interface.value}
-            node = system.node(end.node)
-            if node is None or port.name.value in names:
-                continue
-            if all(_key(item) != (end.node, end.port) for item in mismatch.channel.ends):
-                continue
-            for meant in node.ports_of(port.kind):
-                is_alike = meant.interface.value in types and meant.name.value in names
-                if is_alike and meant not in others:
-                    return end, f"{end.node}.{meant.name}"
+        for end in connection.ends:
+            meant = _meant(context, connection, end) if (end.node, end.port) in ends else None
+            if meant is not None:
+                return end, f"{end.node}.{meant}"
+    return None
+
+
+def _meant(context: Context, connection: Connection, end: Endpoint) -> str | None:
+    """Return the port that a connection means where it names another one, None if it does not."""
+    node, port = context.system.node(end.node), context.system.port(end)
+    if node is None or port is None:
+        return None
+    ports = (context.system.port(item) for item in connection.ends)
+    others = [other for other in ports if other is not None and other is not port]
+    names = {other.name.value for other in others}
+    names.add(connection.name.value.rpartition("/")[2])
+    types = {other.interface.value for other in others} - {port.interface.value}
+    if port.name.value in names:
+        return None
+    for meant in node.ports_of(port.kind):
+        if meant.interface.value in types and meant.name.value in names and meant not in others:
+            return meant.name.value
     return None
 
 
