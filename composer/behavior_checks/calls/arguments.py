@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import builtins
-import dataclasses
 import importlib
 import inspect
 import math
@@ -20,6 +19,7 @@ from composer.behavior_types.libraries.numpy_names import ndarray
 from composer.behavior_types.syntax.bindings import CONTEXTS, is_class_method, is_static
 from composer.behavior_types.syntax.lineage import PLAIN_BASES, lineage
 from composer.behavior_types.syntax.own_classes import (
+    OPTIONS_OF_FIELD,
     all_fields,
     constructor_of,
     is_dataclass,
@@ -176,21 +176,12 @@ def _of_fields(own: OwnClass) -> Signature | None:
     if misplaced_field(own) is not None:
         return None  # the class itself is wrong
     for field in all_fields(own):
-        is_by_name, is_required = field.by_name, field.value is None
-        match field.value:
-            case ast.Call(func=function, keywords=keywords) if dotted(function).endswith("field"):
-                given = {keyword.arg: keyword.value for keyword in keywords}
-                is_known = isinstance(given.get("init", ast.Constant(True)), ast.Constant)
-                if not is_known or None in given or given.keys() - _OF_FIELD:
-                    return None
-                if "init" in given and not ast.literal_eval(given["init"]):
-                    continue
-                only = given.get("kw_only")
-                if only is not None:
-                    is_by_name = not isinstance(only, ast.Constant) or bool(only.value)
-                is_required = not {"default", "default_factory"} & given.keys()
-        (by_name if is_by_name else names).append(field.name)
-        required += [field.name] if is_required else []
+        parameter = field.parameter
+        if parameter is None:
+            return None
+        if parameter.is_taken:
+            (by_name if parameter.by_name else names).append(field.name)
+            required += [] if parameter.has_default else [field.name]
     name = own.definition.name
     return Signature(name, tuple(names), tuple(by_name), frozenset(required))
 
@@ -256,7 +247,6 @@ _LIBRARY = frozenset(
     {"bisect", "colorsys", "copy", "glob", "heapq", "json", "operator", "os.path", "random"}
     | {"statistics", "struct", "textwrap"}
 )
-_OF_FIELD = frozenset(inspect.signature(dataclasses.field).parameters)
 _BY_NAME: Mapping[str, Signature] = {
     "collections.deque": Signature("deque", ("iterable", "maxlen"), (), frozenset()),
     "collections.namedtuple": Signature(
@@ -265,7 +255,7 @@ _BY_NAME: Mapping[str, Signature] = {
         ("defaults", "module", "rename"),
         frozenset({"field_names", "typename"}),
     ),
-    "dataclasses.field": Signature("field", (), tuple(sorted(_OF_FIELD)), frozenset()),
+    "dataclasses.field": Signature("field", (), tuple(sorted(OPTIONS_OF_FIELD)), frozenset()),
 }
 
 

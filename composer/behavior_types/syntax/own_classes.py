@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
+import inspect
 from collections.abc import Iterator
 from functools import lru_cache
 
@@ -96,6 +98,38 @@ class ClassField:
     home: Module
     by_name: bool = False
 
+    @property
+    def parameter(self) -> FieldParameter | None:
+        """How the constructor takes the field, None if that is not known."""
+        match self.value:
+            case ast.Call(func=function, keywords=keywords) if (
+                dotted(function).rpartition(".")[2] == "field"
+            ):
+                options = {item.arg: item.value for item in keywords}
+            case _:
+                return FieldParameter(has_default=self.value is not None, by_name=self.by_name)
+        is_taken, by_name = options.get("init"), options.get("kw_only")
+        if options.keys() - OPTIONS_OF_FIELD or not isinstance(is_taken, ast.Constant | None):
+            return None
+        return FieldParameter(
+            has_default=bool({"default", "default_factory"} & options.keys()),
+            by_name=self.by_name if by_name is None else bool(getattr(by_name, "value", True)),
+            is_taken=is_taken is None or bool(is_taken.value),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FieldParameter:
+    """How the constructor of a dataclass takes a field, if it does."""
+
+    has_default: bool
+    by_name: bool = False
+    is_taken: bool = True
+
+
+#: The parameters of ``dataclasses.field``.
+OPTIONS_OF_FIELD = frozenset(inspect.signature(dataclasses.field).parameters)
+
 
 def has_fields(owner: OwnClass) -> bool:
     """Return whether the constructor of a class takes the fields of a dataclass or named tuple."""
@@ -160,18 +194,13 @@ def misplaced_field(owner: OwnClass) -> ClassField | None:
         return None
     has_default = False
     for field in all_fields(owner):
-        if field.by_name or "InitVar" in ast.unparse(field.annotation):
+        parameter = field.parameter
+        is_placed = parameter is not None and parameter.is_taken and not parameter.by_name
+        if parameter is None or not is_placed or "InitVar" in ast.unparse(field.annotation):
             continue
-        value = field.value
-        options: dict[str | None, ast.expr] = {}
-        if isinstance(value, ast.Call) and dotted(value.func).rpartition(".")[2] == "field":
-            options = {item.arg: item.value for item in value.keywords}
-            if {"init", "kw_only", None} & options.keys():
-                continue
-            value = options.get("default") or options.get("default_factory")
-        if value is None and has_default:
+        if not parameter.has_default and has_default:
             return field
-        has_default = has_default or value is not None
+        has_default = has_default or parameter.has_default
     return None
 
 
