@@ -6,14 +6,14 @@ import ast
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
+from composer.behavior_checks.guards import OF_KEYS, asks_for_key, handles
 from composer.behavior_checks.parts import possible_values, stored_in
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function, Module, helper_named
-from composer.behavior_source.method_body import catches, dotted
+from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.names import value_named
 from composer.behavior_types.syntax.own_classes import fields_of_class, is_record, updated_targets
@@ -23,7 +23,6 @@ from composer.field_types import ANYTHING
 
 _READING = frozenset({"copy", "get", "items", "keys", "values"})
 _TAKING = frozenset({"dict", "enumerate", "iter", "len", "list", "max", "min", "set", "sorted"})
-_CAUGHT = frozenset({"BaseException", "Exception", "KeyError", "LookupError"})
 
 
 def key_problems_of(
@@ -118,16 +117,7 @@ def _constant(node: ast.expr) -> str | int | None:
 
 def expects_missing(function: Function, owner: ast.expr) -> bool:
     """Return whether a function handles a missing key, or asks for it."""
-    written = ast.unparse(owner)
-    for node in nodes_of(function):
-        match node:
-            case ast.ExceptHandler() if catches(node, _CAUGHT):
-                return True
-            case ast.Compare(ops=operators, comparators=others):
-                asks = any(isinstance(item, ast.In | ast.NotIn) for item in operators)
-                if asks and any(ast.unparse(item) == written for item in others):
-                    return True
-    return False
+    return handles(function, OF_KEYS) or asks_for_key(function, owner)
 
 
 def _declared(node: ast.Subscript, scope: FunctionTypes) -> frozenset[str | int] | None:

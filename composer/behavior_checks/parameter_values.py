@@ -5,11 +5,11 @@ from __future__ import annotations
 import ast
 from functools import lru_cache
 
+from composer.behavior_checks.guards import OF_CHOICES, handles
 from composer.behavior_checks.messages.elements import parameter_read
-from composer.behavior_source import Function, Module
+from composer.behavior_source import Module
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
-from composer.behavior_types.syntax.bindings import nodes_of
 
 
 def parameter_values(node: ast.expr, scope: FunctionTypes) -> list[str | int]:
@@ -18,7 +18,7 @@ def parameter_values(node: ast.expr, scope: FunctionTypes) -> list[str | int]:
     There are none if the files may do otherwise with some of them.
     """
     parameter = parameter_read(node, scope)
-    if parameter is None or (scope.function is not None and _handles_errors(scope.function)):
+    if parameter is None or (scope.function is not None and handles(scope.function, OF_CHOICES)):
         return []
     name = parameter.name.value
     if any(name in _compared(module) for module in scope.owner.source.own_modules):
@@ -26,13 +26,6 @@ def parameter_values(node: ast.expr, scope: FunctionTypes) -> list[str | int]:
     values = [] if parameter.value is None else [parameter.value.value]
     values += parameter.choices.value if parameter.choices is not None else ()
     return [item for item in values if isinstance(item, str | int) and not isinstance(item, bool)]
-
-
-def _handles_errors(function: Function) -> bool:
-    return any(
-        isinstance(node, ast.Try) or (isinstance(node, ast.Name) and node.id == "suppress")
-        for node in nodes_of(function)
-    )
 
 
 @lru_cache(maxsize=128)

@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
+from composer.behavior_checks.guards import OF_LENGTHS, asks_for_length, handles
 from composer.behavior_checks.parts import uses_numpy
 from composer.behavior_source import Function
 from composer.behavior_source.flow import returned_values
@@ -235,14 +236,9 @@ def looks_first(function: Function, name: str, scope: FunctionTypes) -> bool:
 
     The length of another parameter does not limit this one, unless they have as many elements.
     """
-    for node in nodes_of(function):
-        match node:
-            case ast.Try() | ast.Call(args=[ast.Name(id="len"), *_]):  # map(len, ...)
-                return True
-            case ast.Call(func=ast.Name(id="len"), args=[measured]):
-                if not _is_other(measured, name, scope):
-                    return True
-    return False
+    if handles(function, OF_LENGTHS):
+        return True
+    return asks_for_length(function, lambda measured: _is_other(measured, name, scope))
 
 
 def _is_other(measured: ast.expr, name: str, scope: FunctionTypes) -> bool:

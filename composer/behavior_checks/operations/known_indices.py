@@ -5,13 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
+from composer.behavior_checks.guards import OF_INDICES, asks_for_length, handles
 from composer.behavior_checks.messages.elements import counted
 from composer.behavior_checks.messages.lengths import length_of
 from composer.behavior_checks.possible_constants import only_binding, passed
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import returned_values
-from composer.behavior_source.method_body import catches
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.traversal import children
 from composer.behavior_types.expressions.function_types import FunctionTypes
@@ -20,7 +20,6 @@ from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.own_classes import is_enumeration, member_values
 from composer.behavior_types.values import OwnClass, OwnMethod
 
-_CAUGHT = frozenset({"BaseException", "Exception", "IndexError", "LookupError"})
 _DEEPEST = 4
 _MOST = 100
 
@@ -30,7 +29,7 @@ def index_problems(
 ) -> Iterator[CodeProblem]:
     """Yield an index that a loop, a call or an enumeration gives, beyond the end of a list."""
     is_checked = integer_constant(node.slice) is None and not isinstance(node.ctx, ast.Del)
-    if not is_checked or _expects_missing(function):
+    if not is_checked or asks_for_length(function) or handles(function, OF_INDICES):
         return
     first = next(_values(node.slice, scope, _DEEPEST), None)
     count = length_of(node.value, scope)[1] if first is not None else None
@@ -44,17 +43,6 @@ def index_problems(
             about = "" if isinstance(node.slice, ast.Name) else owner
             yield CodeProblem(Kind.INDEX, message, span, about=about)
             return
-
-
-def _expects_missing(function: Function) -> bool:
-    """Return whether a function asks for a length, or handles an element that is missing."""
-    for node in nodes_of(function):
-        match node:
-            case ast.Name(id="len"):
-                return True
-            case ast.ExceptHandler() if catches(node, _CAUGHT):
-                return True
-    return False
 
 
 def _values(node: ast.expr, scope: FunctionTypes, depth: int) -> Iterator[int]:
