@@ -20,6 +20,8 @@ _SUFFIXES = frozenset({".yaml", ".yml"})
 _MARKER = re.compile(r"""\{?\s*["']?(system|node)["']?\s*:(\s|$)""")
 #: A later line with the same key and a name. In other files, these keys begin maps.
 _LATER_MARKER = re.compile(r"""^(system|node):[ \t]+["']?\w""", re.MULTILINE)
+#: The beginning of a ROS parameter file for a node named 'node' or 'system'.
+_PARAMETERS = re.compile(r"""["']?\w+["']?:\s*\{?\s*["']?ros__parameters\b""")
 #: What only systems and node types have together: a section of theirs, and the type of a port.
 _SECTION = re.compile(r"^(nodes|publishers|subscriptions|timers):\s", re.MULTILINE)
 _INTERFACE = re.compile(r"\btype:\s*[\"']?[a-z]\w*/(msg|srv|action)/[A-Z]")
@@ -129,8 +131,10 @@ def _is_composer_file(path: Path) -> bool:
             head = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
     except OSError:
         return True  # reading it reports the error
-    first = next((line for line in head.splitlines() if _has_content(line)), "")
-    if _MARKER.match(first) is not None or _LATER_MARKER.search(head) is not None:
+    content = "\n".join(line for line in head.splitlines() if _has_content(line))
+    if _PARAMETERS.match(content) is not None:
+        return False
+    if _MARKER.match(content) is not None or _LATER_MARKER.search(head) is not None:
         return True
     return _SECTION.search(head) is not None and _INTERFACE.search(head) is not None
 

@@ -78,6 +78,16 @@ def test_yaml_files_of_other_programs_are_listed_separately(tmp_path: Path) -> N
     assert (found.files, found.foreign) == ((), (tmp_path / "other.yaml",))
 
 
+@pytest.mark.parametrize(
+    "text", ["node:\n  ros__parameters: {a: 1}\n", "# all\nsystem: {ros__parameters: {a: 1}}\n"]
+)
+def test_parameter_files_of_a_node_with_such_a_name_are_not_checked(
+    tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "parameters.yaml").write_text(text)
+    assert find_files([tmp_path]).foreign == (tmp_path / "parameters.yaml",)
+
+
 def test_links_are_followed_in_the_project_only(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

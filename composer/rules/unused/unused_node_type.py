@@ -7,6 +7,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import System
+from composer.resolve.tree_values import is_opaque
 
 RULE = register(
     Rule(
@@ -41,6 +42,7 @@ def unused_node_types(loaded: Iterable[System]) -> Iterator[Diagnostic]:
         path.resolve() for system in systems for node in system.nodes for path in node.type_files
     }
     for node_type in node_types if systems else ():
-        if Path(node_type.source.path).resolve() not in used:
+        is_unused = Path(node_type.source.path).resolve() not in used
+        if is_unused and not is_opaque(node_type.name.value):
             message = f"no system here uses node type '{node_type.name}'"
             yield Diagnostic(RULE, message, node_type.name.span)

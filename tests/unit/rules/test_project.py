@@ -36,6 +36,11 @@ def test_an_unused_node_type_is_reported(project: Path) -> None:
     assert str(diagnostic.primary) == "nodes/old_planner.yaml:1:7"
 
 
+def test_a_node_type_with_a_wrong_name_is_not_reported_again(project: Path) -> None:
+    (project / "nodes" / "old_planner.yaml").write_text("node: {old: planner}\n")
+    assert together(*FILES) == []
+
+
 def test_node_types_without_a_system_are_not_checked(project: Path) -> None:
     assert together("nodes/planner.yaml", "nodes/old_planner.yaml") == []
 
