@@ -120,9 +120,16 @@ def _unknown_arguments(
             missing = _without_value(scope, given)
             if hint is None and len(missing) == 1:
                 hint = f"did you mean '{shown(missing[0])}'?"
+            labels = _declared_in(tree) if hint is None else ()
             hint = hint or "remove it"
-            problem = Diagnostic(rules.UNKNOWN_VARIABLE, message, entry.key.span, hint=hint)
+            problem = Diagnostic(rules.UNKNOWN_VARIABLE, message, entry.key.span, labels, hint)
             yield argument, problem
+
+
+def _declared_in(tree: Mapping) -> tuple[Label, ...]:
+    """Point at the file that lacks a variable: it may be another one than was meant."""
+    name = tree.get(kind_of(tree) or "")
+    return (Label(name.span, "declared here"),) if name is not None else ()
 
 
 def _cycle(names: list[str], scope: Scope) -> Diagnostic:

@@ -35,6 +35,7 @@ class InvalidDefinition:
     line: int
     message: str
     text: str = ""
+    hint: str | None = None
 
     @property
     def span(self) -> Span:
@@ -205,10 +206,12 @@ class Interfaces:
                 interface.name, definition.path, line, message, definition.text
             )
         for field in (field for part in parts(interface).values() for field in part.fields):
+            hint = None
             if field.type.is_primitive:
                 continue
             if not self._may_exist(field.type.name):
                 message = f"field '{field.name}' has the unknown type '{shown(field.type.name)}'"
+                hint = self._similar_type(field.type.name)
             elif field.type.name in self._reading:
                 message = f"field '{field.name}' makes the message contain itself"
             else:
@@ -219,9 +222,17 @@ class Interfaces:
             written = re.search(rf"(?m)^.*\s{re.escape(field.name)}\b", definition.text)
             line = definition.text.count("\n", 0, written.start()) + 1 if written else 1
             return InvalidDefinition(
-                interface.name, definition.path, line, message, definition.text
+                interface.name, definition.path, line, message, definition.text, hint
             )
         return None
+
+    def _similar_type(self, name: str) -> str | None:
+        """Return a hint for an unknown type of a field, with a name as definitions write it."""
+        package, _, rest = name.partition("/")
+        known = self.packages()
+        close = package if package in known else nearest(package, known)
+        hint = similar_interface(f"{close}/{rest}", self.names("msg"))
+        return hint.replace("/msg/", "/") if hint is not None else None
 
     def _may_exist(self, name: str) -> bool:
         package, _, rest = name.partition("/")
@@ -242,7 +253,9 @@ def _parse(name: str, definition: Definition) -> Interface | InvalidDefinition:
             return read_description(name, definition.text)
         return parse_definition(name, definition.text)
     except DefinitionError as error:
-        return InvalidDefinition(name, definition.path, error.line, error.message, definition.text)
+        return InvalidDefinition(
+            name, definition.path, error.line, error.message, definition.text, error.hint
+        )
     except ValueError as error:
         return InvalidDefinition(name, definition.path, 1, str(error))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 
-from composer.diagnostics import shown
+from composer.diagnostics import nearest, shown
 from composer.interfaces.definitions import (
     FLOATS,
     INTEGER_RANGES,
@@ -48,6 +48,14 @@ SEPARATOR = "---"
 _DASHES = "-_=*~\u2013\u2014"
 _MAX_DIGITS = 100  # of an integer
 _QUOTES = ("'", '"')
+#: What other languages and ROS 1 call a type.
+_FOREIGN_TYPES = {
+    "double": "float64",
+    "duration": "builtin_interfaces/Duration",
+    "float": "float64",
+    "int": "int32",
+    "time": "builtin_interfaces/Time",
+}
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 _Lines = list[tuple[int, str]]
 
@@ -55,10 +63,20 @@ _Lines = list[tuple[int, str]]
 class DefinitionError(Exception):
     """A definition that is invalid in ROS. ``line`` counts from 1."""
 
-    def __init__(self, message: str, line: int) -> None:
+    def __init__(self, message: str, line: int, hint: str | None = None) -> None:
         super().__init__(message)
         self.message = message
         self.line = line
+        self.hint = hint
+
+
+class _UnknownTypeError(ValueError):
+    """A type that is neither primitive nor a message, with the name that was probably meant."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"'{shown(name)}' is neither a primitive type nor a message")
+        meant = _FOREIGN_TYPES.get(name) or nearest(name, PRIMITIVES)
+        self.hint = f"did you mean '{meant}'?" if meant is not None else None
 
 
 def split_name(name: str) -> tuple[str, str, str] | None:
@@ -160,7 +178,8 @@ def _message(name: str, package: str, lines: _Lines) -> Message:
         try:
             item = _member(line, package)
         except ValueError as error:
-            raise DefinitionError(str(error), number) from None
+            hint = error.hint if isinstance(error, _UnknownTypeError) else None
+            raise DefinitionError(str(error), number, hint) from None
         if item.name in names:
             raise DefinitionError(f"'{shown(item.name)}' is defined twice", number)
         names.add(item.name)
@@ -226,7 +245,7 @@ def _type_name(name: str, package: str) -> str:
         return name
     match = _MESSAGE_TYPE.fullmatch(name)
     if match is None:
-        raise ValueError(f"'{shown(name)}' is neither a primitive type nor a message")
+        raise _UnknownTypeError(name)
     return f"{match['package'] or package}/msg/{match['name']}"
 
 

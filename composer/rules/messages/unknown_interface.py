@@ -65,7 +65,7 @@ def _invalid(context: Context, port: Port, problem: InvalidDefinition) -> Diagno
     if context.interfaces.source_folder(problem.name) is None or not problem.path:
         return Diagnostic(RULE, str(problem), used, hint=f"see {shown(problem.place, limit=300)}")
     label = Label(used, f"'{port.name}' has this type")
-    return Diagnostic(RULE, str(problem), problem.span, (label,))
+    return Diagnostic(RULE, str(problem), problem.span, (label,), problem.hint)
 
 
 def _word(port: Port) -> str:

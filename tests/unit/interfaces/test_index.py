@@ -263,6 +263,28 @@ def test_wrong_types_of_fields_are_found(
         assert problem.place.endswith(f"demo/msg/Demo.msg:{line}")
 
 
+@pytest.mark.parametrize(
+    ("field", "hint"),
+    [
+        ("sting name", "did you mean 'string'?"),
+        ("double speed", "did you mean 'float64'?"),
+        ("time start", "did you mean 'builtin_interfaces/Time'?"),
+        ("std_msgs/Heder header", "did you mean 'std_msgs/Header'?"),
+        ("std_msg/Header header", "did you mean 'std_msgs/Header'?"),
+        ("Header header", "did you mean 'std_msgs/Header'?"),
+        ("Othr other", "did you mean 'demo_msgs/Other'?"),
+        ("int8 small 300", None),
+    ],
+)
+def test_a_wrong_type_has_the_nearest_one_as_a_hint(
+    tmp_path: Path, field: str, hint: str | None
+) -> None:
+    package(tmp_path / "demo", "demo_msgs", msg_Demo=f"{field}\n", msg_Other="bool on\n")
+    problem = Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo")
+    assert problem is not None
+    assert problem.hint == hint
+
+
 def test_an_error_in_the_type_of_a_field_is_found_where_it_is(tmp_path: Path) -> None:
     package(tmp_path / "demo", "demo_msgs", msg_Demo="Other other", msg_Other="bool on\nint33 x")
     problem = Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo")
