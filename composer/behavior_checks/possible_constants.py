@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from composer.behavior_checks.parts import possible_values
 from composer.behavior_source import Function, helper_named
+from composer.behavior_source.flow import returned_values
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.syntax.bindings import Binding, How, is_static, nodes_of
 from composer.behavior_types.syntax.names import value_named
@@ -23,6 +24,18 @@ def possible_constants(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.exp
         if isinstance(item, ast.Name):
             for given, outside in passed(item, scope):
                 yield from _written(given, outside)
+        elif isinstance(item, ast.Call):
+            yield from _returned(item, scope)
+
+
+def _returned(call: ast.Call, scope: FunctionTypes) -> Iterator[ast.expr]:
+    """Yield what a method of the behavior returns that is called."""
+    match scope.type_of(call.func):
+        case OwnMethod(method=method, home=home) if method.node is not None and method.known:
+            inside = scope.owner.scope(method, home)
+            if inside is not None and not isinstance(method.node, ast.AsyncFunctionDef):
+                for value in returned_values(method.node):
+                    yield from possible_values(value, inside)
 
 
 def _written(node: ast.expr, scope: FunctionTypes) -> Iterator[ast.expr]:

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 from composer.behavior_checks.calls.arguments import method_signature
 from composer.behavior_checks.calls.call import call_problems, function_problems
 from composer.behavior_checks.fitting import argument_problem, kind_of, shown
+from composer.behavior_checks.parts import uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.standard_types import called
-from composer.behavior_types.scalars import is_text
+from composer.behavior_types.scalars import is_number, is_text
 from composer.behavior_types.syntax.own_classes import defines
 from composer.behavior_types.values import Collection, OwnObject, Parameters, Ports, Value
 from composer.field_types import INTEGER, STRING
@@ -136,6 +137,12 @@ def _stored(
     node: ast.expr, expected: Value, what: str, scope: FunctionTypes
 ) -> Iterator[CodeProblem]:
     wrong = argument_problem(node, scope.type_of(node), expected, scope.type_of)
+    if wrong is None and is_number(expected) and uses_numpy(scope.home):
+        from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+            is_array,
+        )
+
+        wrong = "an array where a number is expected" if is_array(node, scope) else None
     if wrong is not None:
         yield CodeProblem(Kind.VALUE, f"{what}: {wrong}", span_of(node, scope.home.source))
 

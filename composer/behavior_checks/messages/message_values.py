@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from dataclasses import replace
 
 from composer.behavior_checks.fitting import value_problem
 from composer.behavior_checks.messages.elements import size_problem
@@ -16,6 +17,7 @@ from composer.behavior_source.spans import span_of, start_span
 from composer.behavior_types.expressions.function_types import FunctionTypes
 from composer.behavior_types.libraries.numpy_types import ARRAY
 from composer.behavior_types.scalars import is_float, is_integer, is_number
+from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.values import Pending, Value
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
@@ -88,11 +90,13 @@ class ValueChecker:
 
     def value(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
         """Yield why an expression does not fit ``expected``."""
-        for part in possible_values(node, self.scope):
-            found = list(self._part(part, expected))
-            yield from found
-            if found:
-                return  # the other parts have the same cause
+        parts = list(possible_values(node, self.scope))
+        wrong = [found for part in parts if (found := list(self._part(part, expected)))]
+        first = wrong[0] if wrong else []
+        if isinstance(node, ast.Name) and len(wrong) == len(parts) > 1:
+            # no choice of the value fits, so that the name is the wrong one
+            first = [replace(problem, span=self._span(node)) for problem in first]
+        yield from first  # the other parts have the same cause
 
     def _part(self, node: ast.expr, expected: Value) -> Iterator[CodeProblem]:
         found = self.scope.type_of(node)
@@ -124,7 +128,16 @@ class ValueChecker:
     def _creation(self, node: ast.expr) -> ast.expr:
         """Return where a message is created that a name means, if that is known."""
         value = self.scope.bindings.value_of(node.id) if isinstance(node, ast.Name) else None
-        return value.func if isinstance(value, ast.Call) else node
+        if not isinstance(value, ast.Call) or not isinstance(node, ast.Name):
+            return node
+        passed = [
+            item
+            for call in nodes_of(self.function)
+            if isinstance(call, ast.Call)
+            for item in call.args
+            if isinstance(item, ast.Name) and item.id == node.id and item is not node
+        ]
+        return node if passed else value.func  # it may be right for what else gets it
 
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)

@@ -13,6 +13,7 @@ from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.method_body import dotted
 from composer.behavior_source.spans import span_of
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.expressions.objects import unpacked_tuple
 from composer.behavior_types.functions import is_function
 from composer.behavior_types.libraries.standard_types import is_asynchronous
 from composer.behavior_types.scalars import is_byte, is_number, is_text
@@ -45,14 +46,15 @@ def iteration_problems(node: ast.AST, scope: FunctionTypes) -> Iterator[CodeProb
             if getattr(node, "is_async", 0):
                 return
             yield from _iterated(iterated, scope)
-            yield from _unpacked(target, scope.element(scope.type_of(iterated)), iterated, scope)
+            element = unpacked_tuple(scope, scope.element(scope.type_of(iterated)))
+            yield from _unpacked(target, element, iterated, scope)
         case ast.Assign(
             targets=[ast.Tuple(elts=targets) | ast.List(elts=targets)],
             value=ast.Constant(value=str() | bytes() as text),
         ) if len(targets) == len(text):
             return
         case ast.Assign(targets=[target], value=value):
-            found = scope.type_of(value)
+            found = unpacked_tuple(scope, scope.type_of(value))
             yield from _unpacked(target, found, value, scope)
         case ast.Call(func=function, args=arguments):
             name = scope.called_name(function)

@@ -127,7 +127,7 @@ def _collection(python: type, parts: list[Value], *, has_length: bool = True) ->
     if python is dict and len(parts) > 1:
         return Collection(dict, parts[1], parts[0])
     if python is Counter:
-        return Collection(Counter, key=parts[0])
+        return Collection(Counter, INTEGER, parts[0])
     if python in (GeneratorType, AsyncIterator) or (python is tuple and not has_length):
         return Collection(python, parts[0])
     items = tuple(parts) if python is tuple else None

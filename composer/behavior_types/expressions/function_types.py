@@ -13,12 +13,12 @@ from composer.behavior_types.expressions.annotations import annotated
 from composer.behavior_types.expressions.displays import computed
 from composer.behavior_types.expressions.fillings import filled, fillings_of, is_fresh, without_none
 from composer.behavior_types.expressions.members import attribute_of
-from composer.behavior_types.expressions.objects import value_in_record
+from composer.behavior_types.expressions.objects import unpacked_tuple, value_in_record
 from composer.behavior_types.expressions.protocols import entered, iterated
 from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.expressions.results import awaited, result_of
 from composer.behavior_types.libraries.rclpy_api import rclpy_value
-from composer.behavior_types.libraries.standard_types import exception_type, sliced
+from composer.behavior_types.libraries.standard_types import NUMBERS, exception_type, sliced
 from composer.behavior_types.scalars import is_text
 from composer.behavior_types.syntax.bindings import Binding, Bindings, How, reads_attribute
 from composer.behavior_types.syntax.lineage import class_named
@@ -49,6 +49,7 @@ from composer.behavior_types.values import (
 from composer.fast_dataclass import dataclass
 from composer.field_types import (
     ANYTHING,
+    NUMBER,
     STRING,
     fields_of,
 )
@@ -282,6 +283,8 @@ class FunctionTypes:
     def _global(self, dotted_name: str) -> Value:
         """Return the type of an imported name."""
         full = self.global_name(dotted_name)
+        if full in NUMBERS:
+            return NUMBER
         name, rest = interface_name(full)
         definition = self.owner.interfaces.find(name) if name and not rest else None
         return InterfaceClass(definition) if definition is not None else rclpy_value(full)
@@ -312,6 +315,7 @@ class FunctionTypes:
 
     def _at(self, owner: Value, position: int) -> Value:
         """Return the type of the item at a position of what is unpacked."""
+        owner = unpacked_tuple(self, owner)
         if isinstance(owner, Collection) and owner.items is not None:
             count = len(owner.items)
             return owner.items[position] if -count <= position < count else ANYTHING

@@ -41,6 +41,7 @@ from composer.behavior_types.values import (
     Pending,
     Value,
     join_all,
+    pair,
 )
 from composer.field_types import ANYTHING, STRING
 
@@ -110,6 +111,15 @@ def fields_expected(scope: FunctionTypes, own: OwnClass) -> Mapping[str, Value]:
     if not has_fields(own):
         return {}
     return {item.name: scope.annotated(item.annotation, item.home) for item in all_fields(own)}
+
+
+def unpacked_tuple(scope: FunctionTypes, value: Value) -> Value:
+    """Return the tuple that unpacking a named tuple gives, or else the value."""
+    if not isinstance(value, OwnObject) or not is_named_tuple(value.of):
+        return value
+    if "__iter__" in {method.name for method in value.of.definition.methods}:
+        return value
+    return pair(*fields_expected(scope, value.of).values())
 
 
 def value_in_record(scope: FunctionTypes, owner: OwnObject, key: object) -> Value:

@@ -77,6 +77,10 @@ _COLLECTIONS: Mapping[str, type] = {
     "collections.deque": deque,
     "itertools.cycle": itertools.cycle,
 }
+#: Constants of libraries.
+NUMBERS = frozenset(
+    {"math.e", "math.inf", "math.nan", "math.pi", "math.tau", "numpy.inf", "numpy.nan", "numpy.pi"}
+)
 #: Functions that iterate over each of their arguments.
 ITERATING = frozenset(
     {"enumerate", "filter", "frozenset", "iter", "itertools.chain", "itertools.dropwhile"}

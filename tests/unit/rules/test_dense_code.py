@@ -25,7 +25,8 @@ CODE = """\
 import collections
 import functools
 import itertools
-from collections import defaultdict, deque
+import math
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
@@ -172,6 +173,16 @@ MISTAKES = [
     ({"tick": "name = self.name\nself.times[name].append(1.0)"}, "invalid-value", "name"),
     ({"low": "self.value += 0.5", "tick": "Low().start()"}, "unchecked-none", "self.value"),
     ({"low": "self.started -= 0.5", "tick": "Low().start()"}, "unchecked-none", "self.started"),
+    ({"tick": "target, reason, other = Step(State.IDLE, 'a')"}, "invalid-value",
+     "Step(State.IDLE, 'a')"),
+    ({"tick": "for target, reason in [Step(State.IDLE, 'a')]:\n    reason / 2"}, "invalid-value",
+     "reason / 2"),
+    # where one of several values, or all of them, are wrong
+    ({"tick": "text = 'a' if self.pose else 5\nString(data=text)"}, "invalid-value", "5"),
+    ({"tick": "text = 4 if self.pose else 5\nString(data=text)"}, "invalid-value", "text"),
+    ({"tick": "String(data=math.inf if self.pose else 'a')"}, "invalid-value", "math.inf"),
+    ({"tick": "count: Counter[str] = Counter()\nString(data=count['a'])"}, "invalid-value",
+     "count['a']"),
     # what is swapped
     ({"tick": "label, text = 'a', String()\nself.send(text.data, label)"}, "call-arguments",
      "text.data"),
