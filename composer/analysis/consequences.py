@@ -46,13 +46,15 @@ _OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-i
 #: Rules, and others whose reports may follow from theirs. A warning does not hide errors: they may
 #: have another cause, and the system would run with them.
 _FOLLOWING = {
+    "class-port-missing": frozenset({"unknown-port"}),
     "class-port-type": frozenset({"type-mismatch"}),
     "duplicate-full-name": frozenset({"unknown-parameter"}),
+    "key-without-value": frozenset({"unknown-name", "unknown-word"}),
     "invalid-include": frozenset({"invalid-ros-name", "unknown-node", "unknown-port"}),
     "invalid-namespace": _OF_CONNECTIONS | {"unmatched-parameters"},
     "node-as-behavior": frozenset(
         {"attribute-kind", "handler-signature", "handler-without-port", "missing-handler"}
-        | {"unknown-attribute", "unused-remapping"}
+        | {"missing-return", "unknown-attribute", "unused-remapping"}
     ),
     "outside-qos": frozenset({"reliable-sensor-stream", "unreliable-command"}),
     "parameter-file": frozenset({"missing-parameter"}),
@@ -171,7 +173,8 @@ def _names(item: Diagnostic, context: Context) -> Iterator[str]:
     if item.rule.name == "unknown-port":
         yield from (f"on_{name}" for name in quoted(item.message)[-1:])
         return
-    yield from (*quoted(item.message), *quoted(item.hint))
+    names = (*quoted(item.message), *quoted(item.hint))
+    yield from (name.strip("{}") if name.startswith("{") else name for name in names)
     nodes = context.system.nodes
     match item.rule.name:
         case "invalid-namespace":

@@ -41,7 +41,11 @@ from composer.behavior_checks.operations.operations import (
     returned_exceptions,
 )
 from composer.behavior_checks.operations.protocols import CHECKED, protocol_problems
-from composer.behavior_checks.operations.returns import must_return, return_problems
+from composer.behavior_checks.operations.returns import (
+    must_return,
+    return_problems,
+    transition_results,
+)
 from composer.behavior_checks.operations.truth import TESTING, truth_problems
 from composer.behavior_checks.parts import outside_functions, scalar_name
 from composer.behavior_checks.problems import CodeProblem, Kind, distinct
@@ -61,6 +65,7 @@ from composer.behavior_types.syntax.bindings import assigned_pairs, nodes_of
 from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.values import (
     Collection,
+    InterfaceClass,
     OwnClass,
     OwnObject,
     Parameters,
@@ -70,7 +75,7 @@ from composer.behavior_types.values import (
 )
 from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING
-from composer.interfaces import Interfaces, Message
+from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node
 from composer.source import Span
 
@@ -353,6 +358,8 @@ class _FunctionChecker:
         is_service = self.handler is not None and len(self.handler.arguments) > 1
         if is_service and isinstance(returns, Message):
             return
+        if self.handler is None and self.scope.of_class is None:
+            yield from transition_results(self.function, self.scope)
         yield from return_problems(self.function, self.scope, self.handler)
 
     # --- annotations
@@ -367,10 +374,14 @@ class _FunctionChecker:
             scope = self.scope
             home, node = scope.home, self.types.node
             found = annotated(argument.annotation, home, node, self.types.interfaces)
-            if isinstance(found, Message) and found != type_:
+            named = scope.type_of(argument.annotation)
+            if isinstance(named, InterfaceClass) and not isinstance(named.definition, Message):
+                found = named  # a service or an action
+            wrong = found.definition if isinstance(found, InterfaceClass) else found
+            if isinstance(wrong, Message | Service | Action) and wrong != type_:
                 yield CodeProblem(
                     Kind.ANNOTATION,
-                    f"'{self.function.name}' gets a {type_.name}, not a {found.name}",
+                    f"'{self.function.name}' gets a {type_.name}, not a {wrong.name}",
                     self._span(argument.annotation),
                 )
 

@@ -76,11 +76,19 @@ def _direction(
         all_requests = [endpoint for _, requests in found for endpoint in requests]
         by_place: dict[tuple[str, int, int], list[QosConflict]] = defaultdict(list)
         for problems, requests in found:
-            is_offer = _is_offer_wrong(context, problems, offers, all_requests)
+            fits_others = len(found) < len(requesting)
+            is_offer = not (fits_others and _is_of_streams(problems)) and _is_offer_wrong(
+                context, problems, offers, all_requests
+            )
             place = _place(context, (offers if is_offer else requests)[0], problems[0].policy)
             conflict = QosConflict(problems, tuple(offers), tuple(requests), is_offer, place)
             by_place[location(place)].append(conflict)
         yield from by_place.values()
+
+
+def _is_of_streams(problems: Sequence[Incompatibility]) -> bool:
+    """Return whether both policies differ that distinguish a stream from a latched value."""
+    return {"durability", "reliability"} <= {item.policy for item in problems}
 
 
 def _is_offer_wrong(

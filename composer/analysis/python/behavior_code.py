@@ -16,6 +16,7 @@ from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.receivers import lacks_self
 from composer.behavior_source.spans import span_of
 from composer.behavior_source.undefined_names import undefined_names
+from composer.behavior_types.libraries.handlers import TRANSITIONS
 from composer.diagnostics import Diagnostic, Label, Rule, nearest
 from composer.model import Node
 
@@ -125,6 +126,9 @@ def _missing_arguments(node: Node, source: BehaviorSource) -> Iterator[str]:
     """Yield the arguments of handlers that do not accept them; another rule reports these."""
     if node.hosted_class is not None:
         yield from (name.value for name, _ in node.hosted_class.arguments)
+        transitions = (source.method(name) for name in TRANSITIONS)
+        if any(method is not None and not method.accepts(1) for method in transitions):
+            yield "state"
     for handler in handlers(node):
         method = source.method(handler.name)
         if method is not None and not method.accepts(len(handler.arguments)):

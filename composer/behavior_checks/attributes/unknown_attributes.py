@@ -177,20 +177,20 @@ def _of_own_class(types: BehaviorTypes, owner: OwnClass | OwnObject, name: str) 
     if is_rclpy(own.home):
         if name.startswith("RMW_QOS_POLICY_"):  # an old name of a member
             return None
-    elif _may_have(types, own, name):
+    elif _may_have(types, own, name, is_object=isinstance(owner, OwnObject)):
         return None
     is_similar = nearest(name, known) is not None or is_enumeration(own) or is_frozen(own)
-    if not is_similar and _is_passed_on(own):
+    if isinstance(owner, OwnObject) and not is_similar and _is_passed_on(own):
         return None
     public = [other for other in known if not other.startswith("_")]
     problem = f"'{own.definition.name}' has no attribute '{name}'"
     return Kind.ATTRIBUTE, problem, suggestion(name, public)
 
 
-def _may_have(types: BehaviorTypes, own: OwnClass, name: str) -> bool:
-    """Return whether objects of a class, or of one derived from it, may have an attribute."""
+def _may_have(types: BehaviorTypes, own: OwnClass, name: str, *, is_object: bool) -> bool:
+    """Return whether a class, one derived from it, or an object of them may have an attribute."""
     classes = types.project_classes
-    if not classes.is_created(own):
+    if is_object and not classes.is_created(own):
         return True
     derived = [known_attributes(item) for item in classes.derived(own)]
     if any(known is None or name in known for known in derived):

@@ -48,8 +48,6 @@ def return_problems(
     if handler is not None and handler.returns is NONE:
         yield from _unused(function, scope)
         return
-    if handler is None and function.name in TRANSITIONS:
-        yield from _of_transition(function, scope)
     annotation = function.returns
     if annotation is None or is_stub(function):
         return
@@ -60,7 +58,7 @@ def return_problems(
     if allows_none(annotation) or function.name.startswith("accept_"):
         return
     if isinstance(expected, Message | FieldType | OwnObject | Collection):
-        yield from _missing(function, scope, expected)
+        yield from _missing(function, scope, expected, is_certain=is_message)
 
 
 def must_return(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
@@ -77,11 +75,18 @@ def must_return(function: Function, scope: FunctionTypes, expected: Value) -> It
         yield _without_end(function, scope, expected)
 
 
-def _missing(function: Function, scope: FunctionTypes, expected: Value) -> Iterator[CodeProblem]:
+def _missing(
+    function: Function, scope: FunctionTypes, expected: Value, *, is_certain: bool
+) -> Iterator[CodeProblem]:
+    """Yield where a function returns None. What ends in a loop or a call may know better.
+
+    The handler of an action has to return a result in any case.
+    """
     if isinstance(expected, Collection) and _yields(function):
         return
     yield from _empty(function, scope, expected)
-    if reaches_end(function) and not may_raise_at_end(function, lambda call: _returns(call, scope)):
+    ends = is_certain or not may_raise_at_end(function, lambda call: _returns(call, scope))
+    if reaches_end(function) and ends:
         yield _without_end(function, scope, expected)
 
 
@@ -154,8 +159,10 @@ def _unused(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
             )
 
 
-def _of_transition(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
+def transition_results(function: Function, scope: FunctionTypes) -> Iterator[CodeProblem]:
     """Yield what a handler of a transition returns that is neither None nor a bool."""
+    if function.name not in TRANSITIONS:
+        return
     for value in returned_values(function):
         found = scope.type_of(value)
         is_of_rclpy = dotted(value).rpartition(".")[0].endswith("TransitionCallbackReturn")

@@ -71,6 +71,11 @@ class _Reader:
         if leaves and not any(map(_is_parameters, entry.value)):
             self._report_no_parameters(entry)
             return
+        outside = _next_to_parameters(entry.value)
+        if outside is not None:
+            message = f"'{shown(outside.name)}' is next to '{PARAMETERS}', not below it"
+            self._report(message, outside.key.span, "indent it further")
+            return
         for item in entry.value:
             if _is_parameters(item):
                 self._read_section(Located(name, entry.key.span), item)
@@ -173,6 +178,18 @@ def _misspelled_key(tree: Mapping) -> Entry | None:
         and (entry.name in _MISSPELLED or nearest(entry.name, [PARAMETERS]) is not None)
     )
     return next((entry for entry in candidates if not _has_parameters(entry.value)), None)
+
+
+def _next_to_parameters(tree: Mapping) -> Entry | None:
+    """Return the first parameter that is not below ``ros__parameters``, if nothing is."""
+    is_empty = any(_is_parameters(item) and _is_null(item.value) for item in tree)
+    values = (item for item in tree if not isinstance(item.value, Mapping))
+    others = (item for item in values if not _is_parameters(item))
+    return next(others, None) if is_empty else None
+
+
+def _is_null(tree: Tree) -> bool:
+    return isinstance(tree, Scalar) and tree.value is None
 
 
 def _has_parameters(tree: Tree) -> bool:

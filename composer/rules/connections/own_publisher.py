@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
+from composer.analysis.endpoints.unconnected import name_location
 from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Channel, ChannelKind, Event, PortOfNode
@@ -54,11 +55,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
         names = {end.node.full_name for end in both}
         if len(names) == 1 and not any(_republishes(channel, end) for end in both):
             sink, source = both[0], publishers[both[0].node.full_name]
+            place, labels = name_location(sink)
+            published = Label(source.port.name.span, f"'{port_name(source)}' publishes them")
             yield Diagnostic(
                 RULE,
                 f"node '{sink.node.name}' receives its own messages on '{channel.name}'",
-                sink.port.name.span,
-                (Label(source.port.name.span, f"'{port_name(source)}' publishes them"),),
+                place,
+                (*labels, published),
                 "give one of the two ports another topic",
             )
 

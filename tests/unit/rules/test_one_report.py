@@ -87,6 +87,127 @@ class Code:
         request: Fibonacci.Goal = goal
         return Fibonacci.Result(sequence=[request.order])
 """
+RECIPE = """\
+from dataclasses import dataclass
+
+
+@dataclass
+class Recipe:
+    @classmethod
+    def load(cls, name):
+        return cls()
+
+
+class Code:
+    def on_tick(self): Recipe.fetch("a")
+"""
+SERVER = """\
+system: a
+nodes:
+  n:
+    behavior: code:Code
+    action_servers:
+      go: {type: example_interfaces/action/Fibonacci, external: true}
+"""
+LOOP = """\
+from example_interfaces.action import Fibonacci
+
+
+class Code:
+    async def on_go(self, goal) -> Fibonacci.Result:
+        for step in range(goal.request.order):
+            await self.clock.sleep(0.1)
+            if goal.is_cancel_requested:
+                return Fibonacci.Result()
+"""
+ECHO_BY_CODE = f"""\
+system: a
+nodes:
+  n:
+    behavior: code:Code
+    subscriptions: {{in: {TALK}, external: true}}}}
+    publishers: {{out: {TALK}, external: true}}}}
+"""
+NUMBER = """\
+class Code:
+    def on_in(self, message):
+        share = 1.0 if message.data else 0.0
+        self.publishers.out.publish(share)
+"""
+EMPTY = """\
+from std_srvs.srv import Empty
+
+
+class Code:
+    def on_in(self, message: Empty): ...
+"""
+POWER = """\
+system: a
+nodes:
+  n:
+    behavior: code:Code
+    parameters: {power: {type: double_array, default: %s}}
+    timers: {tick: {period_ms: 100}}
+"""
+PRODUCT = """\
+import numpy as np
+
+
+class Code:
+    def on_configure(self):
+        self.power = np.array(self.parameters.power)
+        self.duty = np.zeros(3)
+
+    def on_tick(self):
+        self.sum = self.power @ self.duty
+"""
+OUTSIDE = "/n:\n  ros__parameters:\n  far: 2.0\n"
+STREAM = """\
+system: a
+nodes:
+  source:
+    publishers: {out: {type: std_msgs/msg/String, qos: sensor_data, topic: /x}}
+    timers: {tick: {period_ms: 100, publish: {out: {data: a}}}}
+  near: {subscriptions: {in: {type: std_msgs/msg/String, qos: sensor_data, topic: /x, log: a}}}
+  far: {subscriptions: {in: {type: std_msgs/msg/String, qos: state, topic: /x, log: a}}}
+"""
+COLONS = """\
+system: a
+nodes:
+  b: {on_activate: {log: a}}
+  c:
+"""
+CLASS_PORT = """\
+system: a
+nodes:
+  n:
+    class: talker:Talker
+    publishers: {chater: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /x, from: n.chatter}
+"""
+TALKER = """\
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.chatter = self.create_publisher(String, "chatter", 10)
+"""
+METER = """\
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+
+
+class Meter(LifecycleNode):
+    def __init__(self, **kwargs):
+        super().__init__("meter", **kwargs)
+
+    def on_configure(self):
+        self.get_logger().info(state.label)
+        return TransitionCallbackReturn.SUCCESS
+"""
 IMPORTED = """\
 from composer.behavior import %s
 
@@ -188,6 +309,54 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
             "code.py": ACTION,
         },
         [("invalid-value", "code.py", 6)],
+    ),
+    "a class attribute that a class lacks": (
+        {"system.yaml": HELPER, "code.py": RECIPE},
+        [("unknown-attribute", "code.py", 12)],
+    ),
+    "a handler of an action that ends with a loop": (
+        {"system.yaml": SERVER, "code.py": LOOP},
+        [("missing-return", "code.py", 5)],
+    ),
+    "a number for a message": (
+        {"system.yaml": ECHO_BY_CODE, "code.py": NUMBER},
+        [("invalid-value", "code.py", 4)],
+    ),
+    "a service that annotates a message": (
+        {"system.yaml": ECHO_BY_CODE.replace("String", "Empty"), "code.py": EMPTY},
+        [("handler-annotation", "code.py", 5)],
+    ),
+    "shapes of parameters and attributes": (
+        {"system.yaml": POWER % "[1.0, 2.0]", "code.py": PRODUCT},
+        [("invalid-value", "code.py", 10)],
+    ),
+    "shapes that fit": ({"system.yaml": POWER % "[1.0, 2.0, 3.0]", "code.py": PRODUCT}, []),
+    "a parameter next to the parameters": (
+        {"system.yaml": NAMED.replace("name: n", "name: m"), "values.yaml": OUTSIDE},
+        [("parameter-file", "values.yaml", 3)],
+    ),
+    "a subscription that asks a stream for the latest value": (
+        {"system.yaml": STREAM},
+        [("qos-incompatible", "system.yaml", 7)],
+    ),
+    "colons without a space": (
+        {"system.yaml": f"{COLONS}    lifecycle: {{depends_on: {{b:active}}}}\n"},
+        [("key-without-value", "system.yaml", 5)],
+    ),
+    "a port that a class and a connection name otherwise": (
+        {"system.yaml": CLASS_PORT, "talker.py": TALKER},
+        [("class-port-missing", "system.yaml", 5)],
+    ),
+    "a transition of a class without its argument": (
+        {"system.yaml": "system: a\nnodes:\n  n: {class: 'meter:Meter'}\n", "meter.py": METER},
+        [("handler-signature", "meter.py", 8)],
+    ),
+    "a lifecycle node as a behavior": (
+        {
+            "system.yaml": "system: a\nnodes:\n  n: {behavior: 'meter:Meter'}\n",
+            "meter.py": METER.replace("(self):", "(self, state):"),
+        },
+        [("node-as-behavior", "system.yaml", 3)],
     ),
     "a process whose name is wrong": (
         {"system.yaml": PROCESSES},
