@@ -102,12 +102,15 @@ class BandwidthWindow:
         self._messages.append((at_s, size_bytes))
 
     def statistics(self, now_s: float) -> BandwidthStatistics | None:
-        """Return the bandwidth up to now, None before the first message."""
+        """Return the bandwidth from the first message up to now, None before the second one.
+
+        The first message only starts the time: its bytes belong to the time before.
+        """
         sizes = [size for _, size in self._messages]
-        if not sizes or now_s <= self._messages[0][0]:
+        if len(sizes) < 2 or now_s <= self._messages[0][0]:
             return None
         return BandwidthStatistics(
-            bytes_per_s=sum(sizes) / (now_s - self._messages[0][0]),
+            bytes_per_s=sum(sizes[1:]) / (now_s - self._messages[0][0]),
             mean=statistics.fmean(sizes),
             smallest=min(sizes),
             largest=max(sizes),

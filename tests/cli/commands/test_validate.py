@@ -152,6 +152,13 @@ def test_a_path_without_its_suffix_gets_a_suggestion(folder: Path) -> None:
     assert "did you mean 'fine.yaml'?" in compose("validate", "fine").err
 
 
+def test_the_name_of_a_system_of_the_project_suggests_its_path(folder: Path) -> None:
+    """Not that of the example system with the same name."""
+    Path("systems").mkdir()
+    Path("systems/robot.yaml").write_text(FINE)
+    assert compose("validate", "robot").err.endswith("did you mean 'systems/robot.yaml'?\n")
+
+
 def test_the_name_of_an_example_system_suggests_its_path(folder: Path) -> None:
     done = compose("validate", "pipeline")
     assert done.code == 2

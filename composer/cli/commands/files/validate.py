@@ -15,7 +15,12 @@ import typer
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import say, use_color, write_raw
-from composer.cli.support.system_arguments import example_systems, nearest_path, path_exists
+from composer.cli.support.system_arguments import (
+    example_systems,
+    nearest_path,
+    path_exists,
+    project_systems,
+)
 from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -153,10 +158,12 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
 
 
 def _path_hint(path: Path) -> str | None:
-    """Return a hint with a similar path, or with the path of the example system."""
-    examples = example_systems()
-    close = examples.get(str(path)) or nearest_path(path)
-    return None if close is None else f"did you mean '{close}'?"
+    """Return a hint with the path of the system of that name, or with a similar path."""
+    from composer.source import shown_path
+
+    named = example_systems() | project_systems()
+    close = named.get(str(path)) or nearest_path(path)
+    return None if close is None else f"did you mean '{shown_path(close)}'?"
 
 
 def _listed(paths: Sequence[Path]) -> str:

@@ -34,6 +34,15 @@ def test_a_window_keeps_the_last_messages() -> None:
     assert (rate.average_hz, rate.window) == (2.0, 2)
 
 
+def test_bandwidth_is_that_of_a_steady_topic_from_the_second_message_on() -> None:
+    window = BandwidthWindow(100)
+    for number in range(21):
+        window.add(number / 10, 24)
+        found = window.statistics(number / 10)
+        assert found is None if number == 0 else found is not None
+        assert found is None or found.bytes_per_s == pytest.approx(240.0)
+
+
 def test_bandwidth_decreases_without_new_messages() -> None:
     window = BandwidthWindow(10)
     window.add(0.0, 100)
@@ -41,14 +50,14 @@ def test_bandwidth_decreases_without_new_messages() -> None:
     found = window.statistics(2.0)
     assert found is not None
     assert (found.bytes_per_s, found.mean, found.smallest, found.largest) == (
-        200.0,
+        150.0,
         200.0,
         100,
         300,
     )
     later = window.statistics(4.0)
     assert later is not None
-    assert later.bytes_per_s == 100.0
+    assert later.bytes_per_s == 75.0
 
 
 def test_delay_statistics() -> None:
