@@ -12,7 +12,7 @@ from typing import TypeAlias, TypeVar
 from composer.fast_dataclass import dataclass
 from composer.report.display import visible
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, merged_chains
-from composer.runtime.metrics.numbers import finite
+from composer.runtime.metrics.numbers import finite, whole
 from composer.runtime.ros.diagnostic_arrays import read_array
 
 
@@ -138,7 +138,8 @@ def system_report(name: str, statuses: Iterable[Status]) -> SystemReport:
     Raises InvalidReportError.
     """
     try:
-        (_, text, values), *nodes = statuses
+        own, *nodes = _some(statuses)
+        _, text, values = own
         return SystemReport(
             name=name,
             activity=values["activity"],
@@ -150,6 +151,14 @@ def system_report(name: str, statuses: Iterable[Status]) -> SystemReport:
         )
     except (ValueError, KeyError, TypeError) as error:
         raise invalid_report(error) from error
+
+
+def _some(statuses: Iterable[Status]) -> list[Status]:
+    """Return the statuses. Raises ValueError if there are none."""
+    found = list(statuses)
+    if not found:
+        raise ValueError("it is empty")
+    return found
 
 
 def partial_report(name: str, content: bytes) -> PartialReport | None:
@@ -220,16 +229,16 @@ def _node_report(status_name: str, values: Mapping[str, str], host: str) -> Node
         state=values["state"],
         desired=values["desired"],
         since_s=finite(values["since"]),
-        restarts=int(values["restarts"]),
-        errors=int(values["errors"]),
+        restarts=whole(values["restarts"]),
+        errors=whole(values["errors"]),
         last_error=values["last_error"],
         held_down=values["held_down"],
         sent_hz=finite(values["sent_hz"]),
         received_hz=finite(values["received_hz"]),
         busy=finite(values["busy"]),
         slowest=values["slowest"],
-        overruns=int(values["overruns"]),
-        queue_drops=int(values["queue_drops"]),
+        overruns=whole(values["overruns"]),
+        queue_drops=whole(values["queue_drops"]),
         qos_events=_counts(values["qos_events"]),
         depends_on=_pairs(values["depends_on"]),
         sent=_counts(values["sent"]),
@@ -243,7 +252,7 @@ def _node_report(status_name: str, values: Mapping[str, str], host: str) -> Node
 
 def _counts(text: str) -> dict[str, int]:
     """Parse counts by name, such as ``incompatible=1``. Raises ValueError."""
-    return {name: int(count) for name, count in _pairs(text).items()}
+    return {name: whole(count) for name, count in _pairs(text).items()}
 
 
 def _pairs(text: str) -> dict[str, str]:

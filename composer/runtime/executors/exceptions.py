@@ -7,6 +7,7 @@ of any size. The functions here raise nothing, and their text can be printed and
 from __future__ import annotations
 
 import os
+import re
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -17,6 +18,10 @@ from composer.runtime.executors.stacks import calls_user_code, is_internal
 _LINE_LENGTH = 1000
 _VALUE_LENGTH = 80
 _TRACEBACK_LENGTH = 20_000
+#: Begins the names of the packages that modules of behaviors are imported as.
+BEHAVIOR_PACKAGE = "_composer_behavior_"
+#: What Python puts before the names of the exceptions that these modules define.
+_IN_PACKAGE = re.compile(rf"\b{BEHAVIOR_PACKAGE}[0-9a-f]+\.")
 
 
 def describe(error: BaseException) -> str:
@@ -90,7 +95,8 @@ def _traceback(error: BaseException, *, all_frames: bool) -> str:
     try:
         full = traceback.TracebackException.from_exception(error)
         if all_frames or _keep_user_frames(full):
-            return _cut(_plain("".join(full.format())).rstrip(), _TRACEBACK_LENGTH)
+            text = _IN_PACKAGE.sub("", _plain("".join(full.format())))
+            return _cut(text.rstrip(), _TRACEBACK_LENGTH)
     except BaseException:
         return "<its traceback is not available>"
     return ""

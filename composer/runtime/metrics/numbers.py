@@ -7,7 +7,18 @@ import math
 
 def finite(text: str) -> float:
     """Return a number. Raises ValueError, also for infinity and NaN."""
-    number = float(text)
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
     if not math.isfinite(number):
-        raise ValueError(f"'{text}' is not a number")
+        raise ValueError(f"'{text:.80}' is not a number")
     return number
+
+
+def whole(text: str) -> int:
+    """Return an integer. Raises ValueError."""
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"'{text:.80}' is not an integer") from None

@@ -21,9 +21,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from composer.runtime.executors.exceptions import BEHAVIOR_PACKAGE
 from composer.runtime.executors.stacks import calls_user_code
 
-_PREFIX = "_composer_behavior_"
 #: Held during imports: another loop must not see a module that is only half executed.
 _LOCK = threading.RLock()
 #: The folders in which the modules of a package are searched, by its name.
@@ -44,7 +44,7 @@ def import_module(module: str, base: Path, folders: Sequence[Path]) -> ModuleTyp
 def _package(base: Path, folders: Sequence[Path]) -> str:
     """Return the name of the package of a folder, without importing anything from it."""
     digest = hashlib.sha256(str(base.resolve()).encode()).hexdigest()[:12]
-    name = f"{_PREFIX}{digest}"
+    name = f"{BEHAVIOR_PACKAGE}{digest}"
     if name not in sys.modules:
         if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
             sys.meta_path.insert(0, _Finder())  # before the one that would load without _Loader
@@ -77,7 +77,7 @@ class _Finder(MetaPathFinder):
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Return the spec of a module below one of our packages, else None."""
-        if not name.startswith(_PREFIX):
+        if not name.startswith(BEHAVIOR_PACKAGE):
             return None
         spec = PathFinder.find_spec(name, path, target)
         if spec is not None and type(spec.loader) is SourceFileLoader:

@@ -284,7 +284,7 @@ class Lifecycle:
     def _refuse(self, transition: str, why: str) -> TransitionOutcome:
         available = ", ".join(self.available) or "none"
         name = transition[:_LABEL_LENGTH]  # the label of a request may be any text
-        name = name if name.isprintable() else ascii(name)
+        name = name if name.isprintable() else ascii(name)[1:-1]
         reason = f"refused '{name}': {why}; available transitions: {available}"
         self._warn(transition if transition in _NAMES.values() else "", reason)
         return TransitionOutcome(transition, self.state, success=False, reason=reason)

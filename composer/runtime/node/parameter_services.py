@@ -31,7 +31,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 
-from composer.runtime.executors.exceptions import describe
+from composer.runtime.executors.exceptions import text_of
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.ros.limited_requests import MAX_ITEMS, TooLarge, limited
 
@@ -118,7 +118,7 @@ def set_parameters(node: Node, changes: Iterable[ParameterMessage]) -> SetParame
     except ParameterNotDeclaredException as error:
         return _refusal(str(error))
     except Exception as error:  # such as a value that rclpy cannot compare
-        return _refusal(describe(error))
+        return _refusal(text_of(error))
 
 
 class ParameterServices:

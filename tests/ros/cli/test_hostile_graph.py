@@ -125,15 +125,22 @@ def test_a_report_has_no_control_characters() -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [{"since": "nan"}, {"busy": "1e999"}, {"errors": "many"}, {"qos_events": "lost"}]
+    ("changes", "problem"),
+    [
+        ({"since": "nan"}, "'nan' is not a number"),
+        ({"since": "x"}, "'x' is not a number"),
+        ({"busy": "1e999"}, "'1e999' is not a number"),
+        ({"errors": "many"}, "'many' is not an integer"),
+        ({"qos_events": "lost"}, "'' is not an integer"),
+    ],
 )
-def test_values_of_another_kind_are_not_a_report(changes: dict[str, str]) -> None:
-    with pytest.raises(InvalidReportError, match="not a report of this version"):
+def test_values_of_another_kind_are_not_a_report(changes: dict[str, str], problem: str) -> None:
+    with pytest.raises(InvalidReportError, match=f"not a report of this version.*{problem}"):
         parse_state("/lab", report(**changes))
 
 
 def test_messages_of_another_shape_are_not_a_report() -> None:
-    with pytest.raises(InvalidReportError, match="invalid"):
+    with pytest.raises(InvalidReportError, match="invalid: it is empty"):
         parse_state("/lab", serialize_message(DiagnosticArray()))
     with pytest.raises(InvalidReportError, match="it ends early"):
         parse_state("/lab", report()[:-200])

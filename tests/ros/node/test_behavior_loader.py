@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from composer.model import BehaviorReference
+from composer.runtime.executors.exceptions import report_of
 from composer.runtime.node.behavior_loader import behavior_class
 from composer.runtime.node.parameters import ParameterValues
 from composer.source import Located, SourceFile, Span
@@ -50,6 +51,20 @@ def test_a_behavior_does_not_shadow_the_standard_library(tmp_path: Path) -> None
     assert found.__name__ == "Light"
     assert sys.modules["signal"] is signal
     assert sys.path == before
+
+
+def test_an_exception_of_a_behavior_is_reported_under_the_name_of_its_module(
+    tmp_path: Path,
+) -> None:
+    module = (
+        "class Jam(Exception): ...\nclass Arm:\n    def move(self):\n        raise Jam('wrist')\n"
+    )
+    tmp_path.joinpath("arm.py").write_text(module, encoding="utf-8")
+    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+    found = behavior_class(BehaviorReference(Located("arm:Arm", span), tmp_path))
+    with pytest.raises(Exception, match="wrist") as caught:
+        found().move()
+    assert report_of(caught.value).splitlines()[-1] == "arm.Jam: wrist"
 
 
 HELPED = """\
