@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from composer.behavior_checks.annotated_values import argument_problem, problem_place
 from composer.behavior_checks.attributes.changing_attributes import changing_attributes
 from composer.behavior_checks.attributes.fixed_attributes import fixed_problems
 from composer.behavior_checks.attributes.misspelled_attributes import misspelled_attributes
@@ -20,7 +21,7 @@ from composer.behavior_checks.calls.rclpy_calls import transition_problems
 from composer.behavior_checks.calls.wrong_definitions import at_definitions
 from composer.behavior_checks.classes import class_problems
 from composer.behavior_checks.declared_keys import key_problems_of, member_key_problems_of
-from composer.behavior_checks.fitting import argument_problem, problem_place, value_problem
+from composer.behavior_checks.fitting import value_problem
 from composer.behavior_checks.function_calls import CallChecker
 from composer.behavior_checks.messages.elements import element_problems
 from composer.behavior_checks.messages.message_values import ValueChecker

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -19,6 +20,7 @@ from composer.behavior_checks.calls.collection_calls import method_problems
 from composer.behavior_checks.calls.rclpy_calls import rclpy_call
 from composer.behavior_checks.calls.standard_calls import shape_problems
 from composer.behavior_checks.calls.swapped_arguments import swapped_arguments
+from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.messages.message_values import ValueChecker
 from composer.behavior_checks.operations.membership import enumeration_problems
 from composer.behavior_checks.operations.operations import annotations_by_name
@@ -120,6 +122,11 @@ class CallChecker:
 
     def _builtin(self, node: ast.Call, python: type, name: str) -> Iterator[CodeProblem]:
         """Check a call of a method of an array of numpy, or of a source of random numbers."""
+        if python is re.Pattern and node.args and name in {"fullmatch", "match", "search"}:
+            found = self.scope.type_of(node.args[0])
+            if kind_of(found) not in (None, "bytes", "text"):
+                problem = f"'{name}' takes a string, not {shown(found)}"
+                yield CodeProblem(Kind.VALUE, problem, self._span(node.args[0]))
         is_known = python is ndarray or python.__module__ == "random"
         parameters = method_signature(python, name) if is_known else None
         if parameters is not None:

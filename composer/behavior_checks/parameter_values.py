@@ -13,10 +13,18 @@ from composer.behavior_types.expressions.function_types import FunctionTypes
 
 
 def parameter_values(node: ast.expr, scope: FunctionTypes) -> list[str | int]:
-    """Return the value and the choices of the parameter that an expression reads.
+    """Return the value and the choices of the parameter that an expression reads, or changes.
 
     There are none if the files may do otherwise with some of them.
     """
+    match node:
+        case ast.Call(
+            func=ast.Attribute(value=owner, attr="lower" | "strip" | "title" | "upper" as changed),
+            args=[],
+            keywords=[],
+        ):
+            before = parameter_values(owner, scope)
+            return [getattr(item, changed)() for item in before if isinstance(item, str)]
     parameter = parameter_read(node, scope)
     if parameter is None or (scope.function is not None and handles(scope.function, OF_CHOICES)):
         return []

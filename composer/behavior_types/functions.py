@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from composer.behavior_source import Function
+from composer.behavior_types.libraries.numpy_names import METHODS_OF_ARRAYS, ndarray
 from composer.behavior_types.values import (
     ApiMethod,
     BuiltinMethod,
@@ -23,6 +24,8 @@ def is_function(value: Value) -> bool:
             return callable(getattr(python, name, None))
         case BuiltinMethod(python=python, name=name):
             # what is known of the classes of numpy are names only
+            if python is ndarray:
+                return name in METHODS_OF_ARRAYS
             is_numpy = python.__module__.startswith("composer.")
             return not is_numpy and callable(getattr(python, name, None))
         case _:

@@ -122,15 +122,17 @@ def _missing(
             del unset[name]
             setter = min(others or setters)
             if is_first or is_own:
-                yield _not_set(node, setter, scope)
+                yield _not_set(node, {setter}, scope)
             else:
                 message = f"'{name}' may not be set yet: '{setter}' sets it, perhaps later"
                 span = attribute_span(node, scope.home.source)
                 yield name, CodeProblem(Kind.NONE, message, span, _hint(name))
 
 
-def _not_set(node: ast.Attribute, setter: str, scope: FunctionTypes) -> _Found:
-    message = f"'{node.attr}' is not set yet: only '{setter}' sets it, later"
+def _not_set(node: ast.Attribute, setters: set[str], scope: FunctionTypes) -> _Found:
+    named = " and ".join(f"'{setter}'" for setter in sorted(setters))
+    sets = "sets" if len(setters) == 1 else "set"
+    message = f"'{node.attr}' is not set yet: only {named} {sets} it, later"
     span = attribute_span(node, scope.home.source)
     return node.attr, CodeProblem(Kind.ATTRIBUTE, message, span, _hint(node.attr))
 
@@ -152,7 +154,7 @@ def _before_goals(
         for node, scope in _reads(start, methods):
             setters = unset.get(node.attr, set())
             if setters and not setters & others:
-                yield _not_set(node, min(setters), scope)
+                yield _not_set(node, setters, scope)
 
 
 def _reads(start: str, methods: _Methods) -> Iterator[tuple[ast.Attribute, FunctionTypes]]:
@@ -179,13 +181,29 @@ def _place(node: ast.AST) -> tuple[int, int]:
 
 
 def _never_set(methods: _Methods, values: Mapping[str, set[str]]) -> Iterator[_Found]:
-    """Yield the attributes that only one method sets, after it has read them."""
+    """Yield the attributes that all methods which set them have read before.
+
+    What executes a goal comes after what accepts it.
+    """
     for name, setters in values.items():
-        setter = next(iter(setters))
-        function, scope = methods[setter]
-        read = _read_before(name, function, scope) if len(setters) == 1 else None
-        if read is not None:
-            yield _not_set(read, setter, scope)
+        reads = [_read_first(name, setter, methods) for setter in setters]
+        known = [read for read in reads if read is not None]
+        if len(known) == len(reads):
+            node, scope = min(known, key=lambda read: read[0].lineno)
+            yield _not_set(node, setters, scope)
+
+
+def _read_first(
+    name: str, setter: str, methods: _Methods
+) -> tuple[ast.Attribute, FunctionTypes] | None:
+    """Return where an attribute is read in any case before a method sets it, or None."""
+    function, scope = methods[setter]
+    read = _read_before(name, function, scope)
+    if read is not None:
+        return read, scope
+    start = f"accept_{setter.removeprefix('on_')}"
+    found = _reads(start, methods) if setter.startswith("on_") and start in methods else ()
+    return next((item for item in found if item[0].attr == name), None)
 
 
 def _read_before(name: str, function: Function, scope: FunctionTypes) -> ast.Attribute | None:

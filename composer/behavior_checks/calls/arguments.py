@@ -227,6 +227,8 @@ def method_signature(python: type, name: str) -> Signature | None:
         return _of_array(name)
     if (python, name) in _WITHOUT_ARGUMENTS:
         return Signature(name, (), (), frozenset())
+    if (python, name) == (dict, "update"):
+        return Signature(name, ("other",), (), frozenset(), 1, takes_keywords=True)
     found = _signature(getattr(python, name, None), name)
     if found is None or not found.positional:
         return None

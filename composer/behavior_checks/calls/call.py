@@ -6,8 +6,8 @@ import ast
 from collections.abc import Iterator, Mapping
 from inspect import isabstract
 
+from composer.behavior_checks.annotated_values import argument_problem, problem_place
 from composer.behavior_checks.calls.arguments import Signature, signature_of_function
-from composer.behavior_checks.fitting import argument_problem, problem_place
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of, start_span
 from composer.behavior_types.expressions.function_types import FunctionTypes

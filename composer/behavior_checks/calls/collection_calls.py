@@ -6,9 +6,10 @@ import ast
 from collections import deque
 from collections.abc import Iterator
 
+from composer.behavior_checks.annotated_values import argument_problem
 from composer.behavior_checks.calls.arguments import method_signature
 from composer.behavior_checks.calls.call import call_problems, function_problems
-from composer.behavior_checks.fitting import argument_problem, kind_of, shown
+from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.parts import uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source.spans import span_of

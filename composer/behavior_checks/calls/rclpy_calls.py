@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 
+from composer.behavior_checks.annotated_values import argument_problem
 from composer.behavior_checks.calls.arguments import signature_of
 from composer.behavior_checks.calls.call import call_problems
-from composer.behavior_checks.fitting import argument_problem, kind_of, shown
+from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.method_body import dotted

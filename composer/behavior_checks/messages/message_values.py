@@ -10,6 +10,7 @@ from composer.behavior_checks.fitting import value_problem
 from composer.behavior_checks.messages.elements import size_problem
 from composer.behavior_checks.messages.field_values import field_problem
 from composer.behavior_checks.operations.awaiting import missing_await
+from composer.behavior_checks.operations.operations import before_changes
 from composer.behavior_checks.parts import possible_values, uses_numpy
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
@@ -113,6 +114,9 @@ class ValueChecker:
             if first is not None:
                 yield first
                 return
+        if found is ANYTHING and _is_message(expected):
+            before = before_changes(node, self.scope)  # what is added to a number makes no message
+            found = before if is_number(before) else found
         problem = value_problem(node, found, expected, self.scope.owner.interfaces)
         if problem is None and expected == BOOL and "numpy" in self.scope.home.source.text:
             problem = _of_numpy(node, self.scope)
@@ -141,6 +145,13 @@ class ValueChecker:
 
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)
+
+
+def _is_message(expected: Value) -> bool:
+    """Return whether a field or a port is for one message."""
+    if isinstance(expected, FieldType):
+        return not expected.is_array and not expected.is_primitive
+    return isinstance(expected, Message)
 
 
 def _are_parts(found: Value, expected: Value) -> bool:

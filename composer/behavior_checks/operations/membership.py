@@ -147,16 +147,10 @@ def _member_names(own: OwnClass) -> set[str]:
 
 
 def _names(node: ast.expr, scope: FunctionTypes) -> list[str]:
-    """Return the texts that an expression has the value of, also for choices of a parameter."""
-    match node:
-        case ast.Constant(value=str() as name):
-            return [name]
-        case ast.Call(
-            func=ast.Attribute(value=owner, attr="upper" | "lower" as changed), args=[], keywords=[]
-        ):
-            return [getattr(name, changed)() for name in _names(owner, scope)]
-        case _:
-            return [item for item in parameter_values(node, scope) if isinstance(item, str)]
+    """Return the text that an expression is, or the choices of a parameter that it reads."""
+    if isinstance(node, ast.Constant):
+        return [node.value] if isinstance(node.value, str) else []
+    return [item for item in parameter_values(node, scope) if isinstance(item, str)]
 
 
 def enumeration_problems(

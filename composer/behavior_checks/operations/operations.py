@@ -149,7 +149,8 @@ def _calculation(node: ast.BinOp, scope: FunctionTypes) -> Iterator[CodeProblem]
     problem = problem or _problem_of_array(left, operator, right, scope)
     problem = problem or _shape_problem(left, operator, right, scope)
     if problem is not None:
-        about = blamed_name((left, right), scope) or dotted(left)
+        first = left.operand if isinstance(left, ast.UnaryOp) else left
+        about = blamed_name((left, right), scope) or dotted(first)
         place = uncalled(left, scope) or uncalled(right, scope) or node
         yield CodeProblem(Kind.VALUE, problem, span_of(place, source), about=about)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.behavior_checks.fitting import argument_problem, kind_of, shown
+from composer.behavior_checks.annotated_values import argument_problem
+from composer.behavior_checks.fitting import kind_of, shown
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
 from composer.behavior_source.flow import (

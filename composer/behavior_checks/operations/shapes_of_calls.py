@@ -21,7 +21,7 @@ _FROM_LISTS = frozenset({"array", "asarray", "ascontiguousarray"})
 _FILLED = frozenset({"empty", "full", "ones", "zeros"})
 _TURNED = frozenset({"linalg.pinv", "transpose"})
 _SAME = frozenset(
-    {"abs", "absolute", "argsort", "ceil", "clip", "copy", "cos", "cumprod", "deg2rad"}
+    {"abs", "absolute", "argsort", "ceil", "clip", "copy", "cos", "deg2rad"}
     | {"empty_like", "exp", "flip", "floor", "full_like", "isfinite", "isinf", "isnan"}
     | {"linalg.inv", "log", "logical_not", "nan_to_num", "negative", "ones_like", "rad2deg"}
     | {"rint", "roll", "round", "sign", "sin", "sort", "sqrt", "square", "tan", "tanh"}
@@ -80,6 +80,8 @@ def shape_of_call(name: str, call: ast.Call, of: _ShapeOf, integer: _Integer) ->
         return (*found[:-1], None) if found and len(call.args) == 1 and not call.keywords else None
     if name == "diag" and len(call.args) == 1:
         return (*found, *found) if len(found) == 1 else (None,) if len(found) == _MATRIX else None
+    if name in {"cumprod", "cumsum"} and argument(call, 1, "axis") is not None:
+        return found
     if name == "trace" and len(found) == _MATRIX:
         return ()
     if name in {"ravel", "cumsum"} and len(call.args) == 1 and not call.keywords:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import warnings
 from collections import Counter, deque
-from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping, Sequence
 from types import GeneratorType
 
 from composer.behavior_source import Module
@@ -53,6 +53,8 @@ _GENERIC: dict[str, type] = {
     "collections.abc.Generator": GeneratorType,
     "collections.abc.Iterable": Iterable,
     "collections.abc.Iterator": Iterator,
+    "collections.abc.Mapping": Mapping,
+    "collections.abc.MutableMapping": Mapping,
     "collections.abc.Sequence": Sequence,
     "typing.AsyncGenerator": AsyncIterator,
     "typing.AsyncIterator": AsyncIterator,
@@ -61,6 +63,8 @@ _GENERIC: dict[str, type] = {
     "typing.Generator": GeneratorType,
     "typing.Iterable": Iterable,
     "typing.Iterator": Iterator,
+    "typing.Mapping": Mapping,
+    "typing.MutableMapping": Mapping,
     "typing.OrderedDict": dict,
     "typing.Sequence": Sequence,
 }
@@ -124,8 +128,8 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
 
 
 def _collection(python: type, parts: list[Value], *, has_length: bool = True) -> Collection:
-    if python is dict and len(parts) > 1:
-        return Collection(dict, parts[1], parts[0])
+    if python in (dict, Mapping) and len(parts) > 1:
+        return Collection(python, parts[1], parts[0])
     if python is Counter:
         return Collection(Counter, INTEGER, parts[0])
     if python in (GeneratorType, AsyncIterator) or (python is tuple and not has_length):

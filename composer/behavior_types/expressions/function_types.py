@@ -14,7 +14,7 @@ from composer.behavior_types.expressions.displays import computed
 from composer.behavior_types.expressions.fillings import filled, fillings_of, is_fresh, without_none
 from composer.behavior_types.expressions.members import attribute_of
 from composer.behavior_types.expressions.objects import unpacked_tuple, value_in_record
-from composer.behavior_types.expressions.protocols import entered, iterated
+from composer.behavior_types.expressions.protocols import entered, item_of, iterated
 from composer.behavior_types.expressions.rebinding import joined, with_changes
 from composer.behavior_types.expressions.results import awaited, result_of
 from composer.behavior_types.libraries.rclpy_api import rclpy_value
@@ -300,7 +300,10 @@ class FunctionTypes:
         if isinstance(index, ast.Slice):
             return sliced(owner)
         if isinstance(owner, OwnObject) and isinstance(index, ast.Constant):
-            return value_in_record(self, owner, index.value)
+            found = value_in_record(self, owner, index.value)
+            return item_of(self, owner) if found is ANYTHING else found
+        if isinstance(owner, OwnObject):
+            return item_of(self, owner)
         if isinstance(owner, Collection):
             position = integer_constant(index)
             if owner.items is not None and position is not None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from composer.behavior_source import helper_named
 from composer.behavior_types.expressions.objects import attribute_of_class, attribute_of_object
 from composer.behavior_types.libraries.api_values import api_member, class_member
+from composer.behavior_types.libraries.iterables import element_of
 from composer.behavior_types.libraries.numpy_types import ARRAY, array_attribute
-from composer.behavior_types.libraries.standard_types import element_of
 from composer.behavior_types.scalars import is_text
 from composer.behavior_types.values import (
     ApiValue,

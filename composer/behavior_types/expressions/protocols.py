@@ -10,8 +10,8 @@ from composer.behavior_source.method_body import dotted
 from composer.behavior_types.expressions.inferred import inferred_result
 from composer.behavior_types.expressions.objects import attribute_of_object, returned_by
 from composer.behavior_types.expressions.operators import NAMES, binary
+from composer.behavior_types.libraries.iterables import element_of
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
-from composer.behavior_types.libraries.standard_types import element_of
 from composer.behavior_types.syntax.bindings import CONTEXTS
 from composer.behavior_types.syntax.own_classes import known_attributes
 from composer.behavior_types.values import (
@@ -51,6 +51,12 @@ def iterable(scope: FunctionTypes, owner: Value) -> Value:
     if method is None or method.of is None:
         return owner
     return Collection(GeneratorType, element_of(_result(scope, method)))
+
+
+def item_of(scope: FunctionTypes, owner: Value) -> Value:
+    """Return the type of an item of an object of the project, by an index or a key."""
+    method = special_method(scope, owner, "__getitem__")
+    return _result(scope, method) if method is not None and method.of is not None else ANYTHING
 
 
 def calculated(scope: FunctionTypes, left: Value, operator: ast.operator, right: Value) -> Value:

@@ -8,13 +8,9 @@ from typing import TYPE_CHECKING
 from composer.behavior_types.expressions.objects import created_object, given_class, returned_by
 from composer.behavior_types.expressions.protocols import called_object, iterable
 from composer.behavior_types.libraries.api_values import api_result
+from composer.behavior_types.libraries.iterables import ITERATING
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
-from composer.behavior_types.libraries.standard_types import (
-    ITERATING,
-    builtin_result,
-    called,
-    method_result,
-)
+from composer.behavior_types.libraries.standard_types import builtin_result, called, method_result
 from composer.behavior_types.syntax.own_classes import is_named_tuple
 from composer.behavior_types.values import (
     AnyFunction,

@@ -108,6 +108,11 @@ NUMPY_NAMES: Mapping[str, frozenset[str]] = {
     "numpy.linalg": frozenset(_LINALG.split()),
     "numpy.random": frozenset(_RANDOM.split()),
 }
+_DATA_OF_ARRAYS = frozenset(
+    {"T", "base", "ctypes", "data", "device", "dtype", "flags", "flat", "imag", "itemsize", "mT"}
+    | {"nbytes", "ndim", "real", "shape", "size", "strides"}
+)
+METHODS_OF_ARRAYS = frozenset(_OF_ARRAYS.split()) - _DATA_OF_ARRAYS
 #: Stand for the classes of numpy, with their attributes.
 ndarray = type("ndarray", (), dict.fromkeys(_OF_ARRAYS.split()))
 Generator = type("Generator", (), dict.fromkeys(_OF_GENERATORS.split()))

@@ -68,6 +68,8 @@ def numpy_method_result(python: type, name: str, keywords: Mapping[str, Value]) 
     if python is ndarray:
         if name == "tobytes":
             return Collection(bytes, INTEGER)
+        if name == "tolist":
+            return Collection(list)
         return ARRAY if name in _METHODS else ANYTHING
     if python is Generator:
         return ARRAY if name in OF_GENERATORS and "size" in keywords else ANYTHING

@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from types import AsyncGeneratorType, GeneratorType
 
 from composer import behavior
+from composer.behavior_types.libraries.iterables import OF_ITERABLES, element_of
 from composer.behavior_types.libraries.numpy_types import ARRAY, numpy_method_result, numpy_result
 from composer.behavior_types.scalars import is_float, is_integer, is_number, is_text
 from composer.behavior_types.values import (
@@ -81,12 +82,6 @@ _COLLECTIONS: Mapping[str, type] = {
 NUMBERS = frozenset(
     {"math.e", "math.inf", "math.nan", "math.pi", "math.tau", "numpy.inf", "numpy.nan", "numpy.pi"}
 )
-#: Functions that iterate over each of their arguments.
-ITERATING = frozenset(
-    {"enumerate", "filter", "frozenset", "iter", "itertools.chain", "itertools.dropwhile"}
-    | {"itertools.islice", "itertools.pairwise", "itertools.takewhile", "list", "set", "sorted"}
-    | {"sum", "tuple", "zip"}
-)
 _COPYING = frozenset({"copy.copy", "copy.deepcopy", "dataclasses.replace"})
 _TEXTS = Collection(list, STRING)
 _OF_TEXT: Mapping[str, Value] = {
@@ -111,15 +106,6 @@ def is_asynchronous(type_: Value) -> bool:
     """Return whether a value is iterated over by ``async for``."""
     asynchronous = (AsyncGeneratorType, AsyncIterator)
     return isinstance(type_, Collection) and type_.python in asynchronous
-
-
-def element_of(type_: Value) -> Value:
-    """Return the type of what iterating over a value gives, as it is written in its type."""
-    if isinstance(type_, Collection):
-        return type_.key if issubclass(type_.python, dict) else type_.element
-    if isinstance(type_, FieldType) and type_.is_array:
-        return type_.element
-    return STRING if is_text(type_) else ANYTHING
 
 
 def sliced(owner: Value) -> Value:
@@ -171,7 +157,7 @@ def _math(function: str) -> Value:
 
 def _dict(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
     source = arguments[0] if len(arguments) == 1 and not keywords else ANYTHING
-    if isinstance(source, Collection) and issubclass(source.python, dict):
+    if isinstance(source, Collection) and issubclass(source.python, Mapping):
         return Collection(dict, source.element, source.key, is_empty=source.is_empty)
     item = element_of(source)
     if isinstance(item, Collection) and item.items is not None and len(item.items) == _PAIR:
@@ -213,39 +199,6 @@ def _sum(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
     return NUMBER if is_float(element) else ANYTHING
 
 
-def _enumerate(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    return Collection(enumerate, pair(INTEGER, element_of(arguments[0]))) if arguments else ANYTHING
-
-
-def _zip(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    return Collection(zip, pair(*map(element_of, arguments))) if arguments else ANYTHING
-
-
-def _pairwise(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    element = element_of(arguments[0]) if arguments else ANYTHING
-    return Collection(GeneratorType, pair(element, element))
-
-
-def _chain(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    return Collection(GeneratorType, join_all(map(element_of, arguments)))
-
-
-def _part(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    """Return the type of a call of ``islice``, which gives elements of its first argument."""
-    return Collection(GeneratorType, element_of(arguments[0]) if arguments else ANYTHING)
-
-
-def _chosen(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    """Return the type of a call of ``takewhile`` or ``dropwhile``."""
-    is_known = len(arguments) == _PAIR
-    return Collection(GeneratorType, element_of(arguments[1]) if is_known else ANYTHING)
-
-
-def _next(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    found = element_of(arguments[0]) if arguments else ANYTHING
-    return join(found, arguments[1]) if len(arguments) > 1 else found
-
-
 def _divmod(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     if len(arguments) != _PAIR or not all(map(is_number, arguments)):
         return ANYTHING
@@ -264,20 +217,12 @@ def _round(arguments: Sequence[Value], keywords: Mapping[str, Value]) -> Value:
     return INTEGER if is_number(only) else ANYTHING
 
 
-def _filter(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    return Collection(filter, element_of(arguments[1])) if len(arguments) == _PAIR else ANYTHING
-
-
 def _from_heap(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     return element_of(arguments[0]) if arguments else ANYTHING
 
 
 def _of_heap(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
     return Collection(list, element_of(arguments[1])) if len(arguments) == _PAIR else ANYTHING
-
-
-def _map(arguments: Sequence[Value], _: Mapping[str, Value]) -> Value:
-    return Collection(map) if arguments else ANYTHING
 
 
 _PATTERN = BuiltinObject(re.Pattern)
@@ -326,6 +271,7 @@ def _random(_: Sequence[Value], __: Mapping[str, Value]) -> Value:
 
 
 _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] = {
+    **OF_ITERABLES,
     "abs": _number,
     "collections.Counter": _counter,
     "collections.OrderedDict": _dict,
@@ -333,22 +279,13 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
     "dict": _dict,
     "dict.fromkeys": _from_keys,
     "divmod": _divmod,
-    "enumerate": _enumerate,
-    "filter": _filter,
     "heapq.heappop": _from_heap,
     "heapq.heappushpop": _from_heap,
     "heapq.heapreplace": _from_heap,
     "heapq.nlargest": _of_heap,
     "heapq.nsmallest": _of_heap,
-    "itertools.chain": _chain,
-    "itertools.dropwhile": _chosen,
-    "itertools.islice": _part,
-    "itertools.pairwise": _pairwise,
-    "itertools.takewhile": _chosen,
-    "map": _map,
     "max": _least,
     "min": _least,
-    "next": _next,
     "random.Random": _random,
     "re.compile": _pattern,
     "re.fullmatch": _match,
@@ -356,7 +293,6 @@ _SPECIAL: Mapping[str, Callable[[Sequence[Value], Mapping[str, Value]], Value]] 
     "re.search": _match,
     "round": _round,
     "sum": _sum,
-    "zip": _zip,
 }
 _PAIR = 2
 
@@ -372,7 +308,7 @@ def method_result(owner: Collection, name: str, arguments: Sequence[Value]) -> V
     """Return the type of what a method of a collection or of a text returns."""
     if owner.python is str:
         return _OF_TEXT.get(name, ANYTHING)
-    if issubclass(owner.python, dict):
+    if issubclass(owner.python, Mapping):
         return _of_dict(owner, name, arguments)
     if name in {"copy", "difference", "intersection"}:
         return owner

@@ -10,6 +10,7 @@ from functools import lru_cache
 
 from composer.behavior_source import Function
 from composer.behavior_source.traversal import walk
+from composer.behavior_types.syntax.lambdas import lambdas_over
 from composer.fast_dataclass import dataclass
 
 
@@ -279,7 +280,10 @@ def _bind(node: ast.AST, found: Bindings) -> None:
         case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
             found.name(name)
         case ast.Call():
-            _bind_keys(node, found)
+            for argument, items in lambdas_over(node):
+                found.elements[argument] = items
+                bound = Binding(items, How.ELEMENT, is_inner=True)
+                found.names.setdefault(argument.arg, []).append(bound)
             match node:
                 case ast.Call(func=ast.Name(id=asking), args=[ast.Name(id=name), *_]):
                     found.asked.update({name} if asking in _ASKING else ())
@@ -368,25 +372,6 @@ def _elements(expression: ast.expr | None, count: int) -> list[ast.expr] | None:
     if any(isinstance(item, ast.Starred) for item in expression.elts):
         return None
     return expression.elts
-
-
-def _bind_keys(call: ast.Call, found: Bindings) -> None:
-    """Bind the argument of the lambda in ``sorted(items, key=lambda item: ...)`` and the like."""
-    match call:
-        case ast.Call(func=ast.Name(id="max" | "min" | "sorted"), args=[items], keywords=keywords):
-            pass
-        case ast.Call(func=ast.Attribute(value=items, attr="sort"), args=[], keywords=keywords):
-            pass
-        case _:
-            return
-    for keyword in keywords:
-        match keyword:
-            case ast.keyword(
-                arg="key", value=ast.Lambda(args=ast.arguments(args=[argument], posonlyargs=[]))
-            ):
-                found.elements[argument] = items
-                binding = Binding(items, How.ELEMENT, is_inner=True)
-                found.names.setdefault(argument.arg, []).append(binding)
 
 
 _ASKING = frozenset({"callable", "getattr", "hasattr", "isinstance", "issubclass", "type"})

@@ -26,21 +26,31 @@ import collections
 import functools
 import itertools
 import math
+import re
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import Enum, StrEnum, auto
+from enum import Enum, IntEnum, StrEnum, auto
 from typing import NamedTuple
 
+import numpy as np
 from composer.behavior import Behavior
 from composer_interfaces.action import Navigate
-from std_msgs.msg import ColorRGBA, String
+from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 
 class State(StrEnum):
     IDLE = "idle"
     BUSY = "busy"
+
+
+NAME = re.compile("[a-z]+")
+
+
+class Gear(IntEnum):
+    LOW = 1
 
 
 class Mode(Enum):
@@ -74,6 +84,12 @@ class Route:
 
     def __iter__(self) -> Iterator[Pose]:
         return iter(self.poses)
+
+    def __getitem__(self, index: int) -> Pose:
+        return self.poses[index]
+
+    def by_name(self) -> Mapping[str, Pose]:
+        return {}
 
 
 class Low:
@@ -183,6 +199,30 @@ MISTAKES = [
     ({"tick": "String(data=math.inf if self.pose else 'a')"}, "invalid-value", "math.inf"),
     ({"tick": "count: Counter[str] = Counter()\nString(data=count['a'])"}, "invalid-value",
      "count['a']"),
+    # what is added to a number, what is grouped, mapped, indexed and iterated over
+    ({"tick": "start = 0.0\nstart += max(self.clock.__dict__)\nPoseStamped(pose=start)"},
+     "invalid-value", "start"),
+    ({"tick": "for _, group in itertools.groupby(self.route):\n    len(group)"}, "invalid-value",
+     "group"),
+    ({"tick": "list(itertools.groupby(self.route, key=lambda p: p.z))"}, "unknown-attribute", "z"),
+    ({"tick": "list(itertools.takewhile(lambda p: p.z, self.route))"}, "unknown-attribute", "z"),
+    ({"tick": "list(filter(lambda p: p.z, self.route))"}, "unknown-attribute", "z"),
+    ({"tick": "print(self.route[0].z)"}, "unknown-attribute", "z"),
+    ({"tick": "for name, pose in self.route.by_name().items():\n    pose.z"},
+     "unknown-attribute", "z"),
+    ({"tick": "for name, pose in self.route.by_name():\n    pose"}, "invalid-value",
+     "self.route.by_name()"),
+    # members and elements of other types, methods of arrays and dicts
+    ({"tick": "Trigger.Response(success=Gear.LOW)"}, "invalid-value", "Gear.LOW"),
+    ({"tick": "String(data=Gear.LOW)"}, "invalid-value", "Gear.LOW"),
+    ({"tick": "names = ['a']\nRoute(names)"}, "call-arguments", "names"),
+    ({"tick": "self.times.update(['a'], [1.0])"}, "call-arguments", "[1.0]"),
+    ({"tick": "NAME.search(Step(State.IDLE, 'a'))"}, "invalid-value", "Step(State.IDLE, 'a')"),
+    ({"tick": "for n in np.zeros(3).tolist:\n    n"}, "invalid-value", "np.zeros(3).tolist"),
+    ({"tick": "PoseStamped().pose = np.zeros(3).tolist()"}, "invalid-value",
+     "np.zeros(3).tolist()"),
+    ({"tick": "rates: list[float] = []\nrates.append(np.eye(3) @ np.zeros(3))"}, "invalid-value",
+     "np.eye(3) @ np.zeros(3)"),
     # what is swapped
     ({"tick": "label, text = 'a', String()\nself.send(text.data, label)"}, "call-arguments",
      "text.data"),
@@ -217,6 +257,9 @@ RIGHT = [
     {"tick": "label, text = 'a', String()\nself.send(label, text.data)"},
     {"tick": "label, data = 'a', 'b'\nself.send(data, label)"},
     {"tick": "a = String()\nlabel = 'a'\nself.send(a.data, label)\nself.send(label, a.data)"},
+    {"tick": "String(data=State.IDLE), Route(tuple([self.pose])), Route([Pose(1)])"},
+    {"tick": "for _, group in itertools.groupby(self.route):\n    len(list(group))"},
+    {"tick": "self.times.update({'a': []}, b=[]), self.times.update([('a', [])])"},
     {"tick": "for axis in 'xy':\n    setattr(self, f'_{axis}', 1.0)\nself._x + self.poses"},
     {"tick": "if hasattr(self, 'poze'):\n    print(self.poze)"},
     {"move": "if not hasattr(self, 'since'):\n    self.since = 1\nprint(self.since)"},
