@@ -63,7 +63,8 @@ def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> It
     for part in parts:
         nodes = part.tree.get("nodes")
         entries = nodes.entries if isinstance(nodes, Mapping) else ()
-        names = [(entry.name, str(entry.key.span)) for entry in entries]
+        named = [entry for entry in entries if "${" not in entry.name]
+        names = [(entry.name, str(entry.key.span)) for entry in named]
         earlier = next((known[name] for name in names if name in known), None)
         if earlier is None:
             known.update(dict.fromkeys(names, part))
@@ -112,6 +113,8 @@ def _items(tree: Tree) -> Iterator[Tree]:
 def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic]:
     name = shown(entry.name)
     label = Label(earlier.key.span, "the other one")
+    if section == "nodes" and "${" in name:
+        return  # what should repeat the nodes is wrong
     if section == "nodes":
         message = f"two nodes are called '{name}'"
         hint = "give an include a 'prefix'"

@@ -172,7 +172,7 @@ def _of_own_class(types: BehaviorTypes, owner: OwnClass | OwnObject, name: str) 
     if isinstance(owner, OwnObject) and is_record(own) and not hasattr(dict, name):
         problem = f"'{own.definition.name}' has no attribute '{name}': it is a dict"
         return Kind.ATTRIBUTE, problem, f"write ['{name}']"
-    if known is None or name in known:
+    if known is None or name in known or (isinstance(owner, OwnClass) and hasattr(type, name)):
         return None
     if is_rclpy(own.home):
         if name.startswith("RMW_QOS_POLICY_"):  # an old name of a member

@@ -81,11 +81,14 @@ def _missing(
 ) -> Iterator[CodeProblem]:
     """Yield where a function returns None. What ends in a loop or a call may know better.
 
-    The handler of an action has to return a result in any case.
+    The handler of an action has to return a result in any case, unless it may raise instead.
     """
     if isinstance(expected, Collection) and _yields(function):
         return
     yield from _empty(function, scope, expected)
+    is_certain = is_certain and not any(
+        isinstance(node, ast.Raise) for node in ast.walk(function.body[-1])
+    )
     ends = is_certain or not may_raise_at_end(function, lambda call: _returns(call, scope))
     if reaches_end(function) and ends:
         yield _without_end(function, scope, expected)

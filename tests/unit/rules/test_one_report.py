@@ -318,6 +318,23 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
         {"system.yaml": SERVER, "code.py": LOOP},
         [("missing-return", "code.py", 5)],
     ),
+    "a handler of an action that raises in its loop": (
+        {"system.yaml": SERVER, "code.py": LOOP + "            raise ValueError\n"},
+        [],
+    ),
+    "what every class has": (
+        {"system.yaml": HELPER, "code.py": RECIPE.replace('fetch("a")', "mro()")},
+        [],
+    ),
+    "a loop over a word, in a file that is included twice": (
+        {
+            "system.yaml": "system: a\ninclude:\n  - {file: part.yaml, prefix: a_}\n"
+            "  - {file: part.yaml, prefix: b_}\n",
+            "part.yaml": "system: part\nnodes:\n  n_${i}:\n    for_each: {i: names}\n"
+            "    on_activate: {log: a}\n",
+        },
+        [("wrong-type", "part.yaml", 4)],
+    ),
     "a number for a message": (
         {"system.yaml": ECHO_BY_CODE, "code.py": NUMBER},
         [("invalid-value", "code.py", 4)],
