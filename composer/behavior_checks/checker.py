@@ -11,7 +11,7 @@ from composer.behavior_checks.attributes.changing_attributes import changing_att
 from composer.behavior_checks.attributes.fixed_attributes import fixed_problems
 from composer.behavior_checks.attributes.misspelled_attributes import misspelled_attributes
 from composer.behavior_checks.attributes.unknown_attributes import attribute_problem
-from composer.behavior_checks.attributes.unset_attributes import unset_attributes
+from composer.behavior_checks.attributes.unset_attributes import late_attributes, unset_attributes
 from composer.behavior_checks.calls.collection_calls import (
     default_problem,
     key_problems,
@@ -129,6 +129,8 @@ def _all_problems(types: BehaviorTypes, source: BehaviorSource) -> Iterator[Code
                 missing.add(problem.message)
     if not is_hosted:  # rclpy calls some callbacks only after another one
         yield from unset_attributes(types)
+    elif isinstance(types, HostedTypes):
+        yield from late_attributes(types)
     yield from changing_attributes(types)
     yield from class_problems(types)
     yield from misspelled_attributes(source)

@@ -61,6 +61,9 @@ from composer.field_types import ANYTHING
 from composer.interfaces import Action, Message, Service
 from composer.source import Span
 
+#: Attributes of arrays that are often taken for methods.
+_DATA = frozenset({"T", "dtype", "ndim", "shape", "size"})
+
 
 @dataclass(frozen=True, slots=True)
 class CallChecker:
@@ -138,16 +141,22 @@ class CallChecker:
         if not uses_numpy(self.scope.home):
             return
         if isinstance(node.func, ast.Attribute):
-            if not self.scope.called_name(node.func):
+            if node.func.attr in _DATA and self._is_array(node.func.value):
+                problem = f"'{node.func.attr}' of an array is not a function"
+                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), "remove '()'")
+            elif not self.scope.called_name(node.func):
                 yield from shape_problems(node, f".{node.func.attr}", self.scope)
-        elif isinstance(node.func, ast.Name) and self.scope.is_local(node.func.id):
-            from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
-                rank_of,
-            )
+        elif isinstance(node.func, ast.Name) and self._is_array(node.func):
+            problem, hint = "an array of numpy is not a function", "write [...] for an index"
+            yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
 
-            if self.scope.type_of(node.func) is ANYTHING and rank_of(node.func, self.scope):
-                problem, hint = "an array of numpy is not a function", "write [...] for an index"
-                yield CodeProblem(Kind.VALUE, problem, self._span(node.func), hint)
+    def _is_array(self, node: ast.expr) -> bool:
+        """Return whether only the shape of an expression shows that it is an array."""
+        from composer.behavior_checks.operations.array_shapes import (  # noqa: PLC0415 (start-up time)
+            rank_of,
+        )
+
+        return self.scope.type_of(node) is ANYTHING and bool(rank_of(node, self.scope))
 
     def _created(self, node: ast.Call, own: OwnClass) -> Iterator[CodeProblem]:
         yield from enumeration_problems(node, own, self.scope)

@@ -12,9 +12,11 @@ from composer.behavior_source.method_body import is_none
 from composer.behavior_source.spans import attribute_span, span_of
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.expressions.function_types import FunctionTypes
+from composer.behavior_types.hosted import HostedTypes
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.syntax.bindings import nodes_of
-from composer.behavior_types.syntax.self_attributes import self_attributes
+from composer.behavior_types.syntax.own_classes import known_attributes
+from composer.behavior_types.syntax.self_attributes import class_attributes, self_attributes
 from composer.behavior_types.values import Self
 
 #: The methods that run before all others.
@@ -31,12 +33,7 @@ def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
     """
     if not types.source.complete or types.self_escapes:
         return
-    methods: dict[str, tuple[Function, FunctionTypes]] = {}
-    for home, known in reversed(types.source.classes):
-        for method in known.methods:
-            scope = types.scope(method, home)
-            if method.node is not None and scope is not None:
-                methods[method.name] = method.node, scope
+    methods = _methods_of(types)
     none, values = _stored(methods)
     first = _reached(_FIRST, methods)
     later = {name: setters for name, setters in values.items() if not setters & first}
@@ -60,6 +57,32 @@ def unset_attributes(types: BehaviorTypes) -> Iterator[CodeProblem]:
         if name not in names:
             yield problem
         names.add(name)
+
+
+def late_attributes(types: HostedTypes) -> Iterator[CodeProblem]:
+    """Yield the attributes of a class that all methods which set them have read before."""
+    if not types.source.complete or types.self_escapes:
+        return
+    methods = _methods_of(types)
+    none, values = _stored(methods)
+    own = {name for _, scope in methods.values() for name in scope.bindings.attributes}
+    own -= class_attributes(types.source, ()) | _in_texts(methods) | none.keys()
+    for base in types.bases:
+        own -= known_attributes(base) or set()
+    known = {name: values[name] for name in own & types.self_attributes & values.keys()}
+    for _, problem in _never_set(methods, known):
+        yield problem
+
+
+def _methods_of(types: BehaviorTypes) -> _Methods:
+    """Return the methods of the class, by name."""
+    methods: dict[str, tuple[Function, FunctionTypes]] = {}
+    for home, known in reversed(types.source.classes):
+        for method in known.methods:
+            scope = types.scope(method, home)
+            if method.node is not None and scope is not None:
+                methods[method.name] = method.node, scope
+    return methods
 
 
 #: An attribute with its problem.

@@ -136,15 +136,25 @@ class ValueChecker:
             return node
         passed = [
             item
-            for call in nodes_of(self.function)
-            if isinstance(call, ast.Call)
-            for item in call.args
+            for use in nodes_of(self.function)
+            for item in _passed(use)
             if isinstance(item, ast.Name) and item.id == node.id and item is not node
         ]
         return node if passed else value.func  # it may be right for what else gets it
 
     def _span(self, node: ast.expr) -> Span:
         return span_of(node, self.scope.home.source)
+
+
+def _passed(node: ast.AST) -> list[ast.expr]:
+    """Return what a call takes or a statement returns."""
+    match node:
+        case ast.Call(args=arguments):
+            return arguments
+        case ast.Return(value=ast.expr() as value):
+            return [value]
+        case _:
+            return []
 
 
 def _is_message(expected: Value) -> bool:

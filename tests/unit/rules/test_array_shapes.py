@@ -134,6 +134,8 @@ def test_shapes_are_those_of_the_arrays(statements: str, count: int, tmp_path: P
          "invalid-value", "rows[rows[:, 0] > 1]"),
         ("scan", "points = np.empty((len(ranges), 2))\npoints = points @ np.eye(2)\npoints(0)",
          "invalid-value", "points"),
+        ("scan", "near = ranges[ranges < 1.0]\nnear = near + 1\nnear.size()", "invalid-value",
+         "near.size"),
         ("scan", "np.arange(ranges)", "invalid-value", "np.arange(ranges)"),
     ],
 )  # fmt: skip

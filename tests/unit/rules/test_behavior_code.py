@@ -48,6 +48,8 @@ MISTAKES = [
     ("reset", "response.sucess = True", "unknown-field", "sucess", "'success'"),
     ("reset", "request.data", "unknown-field", "data", None),
     ("drive", "goal.request.targt", "unknown-field", "targt", "'target'"),
+    ("drive", "end = Navigate.Result()\ngoal.publish_feedback(end)\nreturn end", "invalid-value",
+     "end", None),
     ("drive", "goal.publish_feedback(Navigate.Feedback(x=1))", "unknown-field", "x", None),
     ("drive", "return Navigate.Reslt()", "unknown-field", "Reslt", "'Result'"),
     ("follow", "goal.request.targt", "unknown-field", "targt", "'target'"),

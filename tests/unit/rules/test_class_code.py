@@ -156,6 +156,7 @@ MISTAKES = [
     ("tick", "age = self.get_clock().now() - Time()\nage.seconds", "unknown-attribute", "seconds"),
     ("tick", "point = PointStamped()\npoint.header.stamp = self.get_clock().now()", "invalid-value",
      "self.get_clock().now()"),
+    ("tick", "if self.sent + 1:\n    self.sent = 1", "unknown-attribute", "sent"),
     ("tick", "Duration(1.0)", "call-arguments", "1.0"),
     ("tick", "time.sleep(Duration(seconds=1))", "invalid-value", "Duration(seconds=1)"),
     # Python
