@@ -18,8 +18,8 @@ RULE = register(
         summary="A node subscribes to a topic that it publishes itself.",
         why=(
             "The node receives each of its own messages, which is rarely meant: usually, one of "
-            "the two topics is wrong. Nodes that exchange messages on one topic are not "
-            "reported."
+            "the two topics is wrong. Nodes that exchange messages on one topic, such as alarms, "
+            "are not reported."
         ),
         bad="""\
 system: loops
@@ -53,7 +53,14 @@ def check(context: Context) -> Iterator[Diagnostic]:
         publishers = {end.node.full_name: end for end in channel.sources}
         both = [end for end in channel.sinks if end.node.full_name in publishers]
         names = {end.node.full_name for end in both}
-        if len(names) == 1 and not any(_republishes(channel, end) for end in both):
+        is_shared = all(
+            any(end.node.full_name not in names for end in ends)
+            for ends in (channel.sources, channel.sinks)
+        )
+        sending = [end for end in both if _sends_back(channel, end)]
+        if len(names) != 1 or (is_shared and not sending):
+            continue  # nodes exchange messages
+        if not any(_is_unconditional(end) for end in sending):  # topic-loop reports these
             sink, source = both[0], publishers[both[0].node.full_name]
             place, labels = name_location(sink)
             published = Label(source.port.name.span, f"'{port_name(source)}' publishes them")
@@ -66,11 +73,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-def _republishes(channel: Channel, end: PortOfNode) -> bool:
-    """Return whether each message is published to its own topic; topic-loop reports that."""
+def _sends_back(channel: Channel, end: PortOfNode) -> bool:
+    """Return whether the reaction of a subscription publishes to its own topic."""
     reaction = end.port.reaction(Event.MESSAGE)
-    is_always = reaction is not None and reaction.when is None
-    sent = {send.port.value for send in reaction.publish} if reaction and is_always else set()
+    sent = {send.port.value for send in reaction.publish} if reaction is not None else set()
     return any(
         source.node is end.node and source.port.name.value in sent for source in channel.sources
     )
+
+
+def _is_unconditional(end: PortOfNode) -> bool:
+    reaction = end.port.reaction(Event.MESSAGE)
+    return reaction is not None and reaction.when is None

@@ -19,6 +19,18 @@ nodes:
     subscriptions: {{in: {TALK}, topic: out, when: count > 1, publish: {{out: '{{message}}'}}}}}}
     publishers: {{out: {TALK}}}}}
 """
+SHARED = f"""\
+system: shared
+nodes:
+  source:
+    publishers: {{out: {TALK}}}}}
+    timers: {{tick: {{period_ms: 1000, publish: {{out: {{data: a}}}}}}}}
+  both:
+    publishers: {{out: {TALK}}}}}
+    subscriptions: {{in: {TALK}, topic: out, log: a}}}}
+    timers: {{tick: {{period_ms: 1000, publish: {{out: {{data: a}}}}}}}}
+  sink: {{subscriptions: {{in: {TALK}, topic: out, log: a}}}}}}
+"""
 RESTART = """\
 system: a
 lifecycle: {watch: {max_errors: 2}}
@@ -234,6 +246,7 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
         {"system.yaml": ECHO},
         [("own-publisher", "system.yaml", 7)],
     ),
+    "a topic on which others publish and subscribe too": ({"system.yaml": SHARED}, []),
     "errors are counted in the window only": (
         {"system.yaml": RESTART % "max_attempts: 3"},
         [("unused-restart", "system.yaml", 6)],
