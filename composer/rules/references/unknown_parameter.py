@@ -8,7 +8,7 @@ from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
 from composer.model import Node
 from composer.source import Span
 
@@ -44,10 +44,20 @@ nodes:
 )
 
 
+_SEVERAL = 2
+_SHOWN = 3
+
+
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the values that instances set and the parameters that expressions read."""
+    first = {
+        parameter.name.value: node
+        for node in reversed(context.system.nodes)
+        for parameter in node.parameters
+    }
     for node in context.system.nodes:
-        yield from _unknown(node)
+        moved = _of_another_node(node, first)
+        yield from _unknown(node) if moved is None else (moved,)
     errors = context.once(earlier_errors)
     known = {
         node.name.value: [parameter.name.value for parameter in node.parameters]
@@ -62,6 +72,29 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 span,
                 hint=suggestion(name, known[node_name]),
             )
+
+
+def _of_another_node(node: Node, first: Mapping[str, Node]) -> Diagnostic | None:
+    """Return one report of several values that are all for the parameters of another node.
+
+    ``first`` are the first nodes with parameters of these names.
+    """
+    unknown = [item for item in node.unknown if item.section == "parameters"]
+    names = {item.name.value for item in unknown}
+    if len(names) < _SEVERAL:
+        return None
+    other = first.get(unknown[0].name.value)
+    if other is None or not all(other.parameter(name) for name in names):
+        return None
+    listed = " and ".join(f"'{item.name}'" for item in unknown[:_SEVERAL])
+    labels = (Label(item.name.span, "nor this one") for item in unknown[1 : 1 + _SHOWN])
+    return Diagnostic(
+        RULE,
+        f"node '{node.name}' has no parameters {listed}",
+        unknown[0].name.span,
+        tuple(labels),
+        f"node '{other.name}' has them",
+    )
 
 
 def _unknown(node: Node) -> Iterator[Diagnostic]:

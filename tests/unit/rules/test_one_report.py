@@ -265,6 +265,14 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
         {"system.yaml": NAMED, "values.yaml": VALUES % "far: 3.0"},
         [("duplicate-full-name", "system.yaml", 5)],
     ),
+    "a section of parameters for another node": (
+        {
+            "system.yaml": "system: a\nparameter_files: values.yaml\nnodes:\n"
+            "  n: {parameters: {size: 1.0}}\n  m: {parameters: {near: 1.0, far: 2.0}}\n",
+            "values.yaml": "/n:\n  ros__parameters:\n    near: 3.0\n    far: 4.0\n",
+        },
+        [("unknown-parameter", "values.yaml", 3)],
+    ),
     "a map for a parameter": (
         {
             "system.yaml": NAMED.replace("name: n", "name: m"),
