@@ -17,6 +17,7 @@ from composer.behavior_checks.calls.arguments import (
 )
 from composer.behavior_checks.calls.call import call_problems, uncallable
 from composer.behavior_checks.calls.collection_calls import method_problems
+from composer.behavior_checks.calls.pattern_groups import group_problems
 from composer.behavior_checks.calls.rclpy_calls import rclpy_call
 from composer.behavior_checks.calls.standard_calls import shape_problems
 from composer.behavior_checks.calls.swapped_arguments import swapped_arguments
@@ -130,6 +131,8 @@ class CallChecker:
             if kind_of(found) not in (None, "bytes", "text"):
                 problem = f"'{name}' takes a string, not {shown(found)}"
                 yield CodeProblem(Kind.VALUE, problem, self._span(node.args[0]))
+        if python is re.Match:
+            yield from group_problems(node, name, self.scope)
         is_known = python is ndarray or python.__module__ == "random"
         parameters = method_signature(python, name) if is_known else None
         if parameters is not None:

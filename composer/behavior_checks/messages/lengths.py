@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
@@ -19,6 +20,7 @@ from composer.behavior_types.syntax.literals import integer_constant
 from composer.behavior_types.syntax.names import constant_named
 from composer.behavior_types.syntax.own_classes import is_enumeration, member_values
 from composer.behavior_types.values import (
+    BuiltinObject,
     Collection,
     InterfaceClass,
     ModuleFunction,
@@ -117,6 +119,8 @@ def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Length:
     match call.func:
         case ast.Attribute(value=array, attr="tolist") if not call.args:
             return length_of(array, scope, depth)
+        case ast.Attribute(value=matched, attr="groups") if not call.args:
+            return _of_groups(matched, scope)
     if called in _KEEPING and call.args:
         return length_of(call.args[0], scope, depth)
     if called == "range" and len(call.args) == 1:
@@ -135,6 +139,17 @@ def _of_call(call: ast.Call, scope: FunctionTypes, depth: int) -> Length:
         return _UNKNOWN
     values = list(returned_values(function))
     return _either(length_of(value, inside, depth) for value in values) if values else _UNKNOWN
+
+
+def _of_groups(owner: ast.expr, scope: FunctionTypes) -> Length:
+    """Return how many groups a match has."""
+    from composer.behavior_checks.calls.pattern_groups import (  # noqa: PLC0415 (start-up time)
+        pattern_of,
+    )
+
+    is_match = scope.type_of(owner) == BuiltinObject(re.Match)
+    pattern = pattern_of(owner, scope) if is_match else None
+    return _UNKNOWN if pattern is None else _exactly(pattern.groups)
 
 
 def _of_name(name: str, scope: FunctionTypes, depth: int) -> Length:

@@ -47,6 +47,7 @@ class State(StrEnum):
 
 
 NAME = re.compile("[a-z]+")
+NUMBER = re.compile(r"([0-9]+) *(?P<unit>m|s)")
 
 
 class Gear(IntEnum):
@@ -223,6 +224,13 @@ MISTAKES = [
      "np.zeros(3).tolist()"),
     ({"tick": "rates: list[float] = []\nrates.append(np.eye(3) @ np.zeros(3))"}, "invalid-value",
      "np.eye(3) @ np.zeros(3)"),
+    # groups that a pattern lacks
+    ({"tick": "found = NUMBER.match('a')\nif found:\n    found.group(3)"}, "invalid-value", "3"),
+    ({"tick": "if found := NUMBER.match('a'):\n    found.group('size')"}, "invalid-value",
+     "'size'"),
+    ({"tick": "found = NUMBER.search('a')\nif found:\n    a, b, c = found.groups()"},
+     "invalid-value", "found.groups()"),
+    ({"tick": "found = re.match('(a)', 'a')\nif found:\n    found.start(2)"}, "invalid-value", "2"),
     # what is swapped
     ({"tick": "label, text = 'a', String()\nself.send(text.data, label)"}, "call-arguments",
      "text.data"),
@@ -260,6 +268,10 @@ RIGHT = [
     {"tick": "String(data=State.IDLE), Route(tuple([self.pose])), Route([Pose(1)])"},
     {"tick": "for _, group in itertools.groupby(self.route):\n    len(list(group))"},
     {"tick": "self.times.update({'a': []}, b=[]), self.times.update([('a', [])])"},
+    {
+        "tick": "found = NUMBER.match('a')\nif found:\n    a, b = found.groups()\n"
+        "    found.group(2), found.group('unit'), found.group(), found.group(0, 1)"
+    },
     {"tick": "for axis in 'xy':\n    setattr(self, f'_{axis}', 1.0)\nself._x + self.poses"},
     {"tick": "if hasattr(self, 'poze'):\n    print(self.poze)"},
     {"move": "if not hasattr(self, 'since'):\n    self.since = 1\nprint(self.since)"},
