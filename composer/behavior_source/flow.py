@@ -1,9 +1,13 @@
-"""How a function ends: with a value, without one, or never."""
+"""How a function ends: with a value, without one, or never.
+
+What is known of a function is kept, because checks ask for it at each of its calls.
+"""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 
 from composer.behavior_source.method_body import Function, dotted
 from composer.behavior_source.traversal import children, walk
@@ -20,14 +24,18 @@ _RETURNING = frozenset({"append", "appendleft", "clear", "extend", "insert", "pu
 _ENDS_OR_WAITS = _EXITS | _WAITING_CALLS
 
 
-def empty_returns(function: Function) -> Iterator[ast.Return]:
-    """Yield the ``return`` statements of ``function`` that return None."""
-    for node in _own_nodes(function.body):
-        if isinstance(node, ast.Return) and (
+@lru_cache(maxsize=512)
+def empty_returns(function: Function) -> Sequence[ast.Return]:
+    """Return the ``return`` statements of ``function`` that return None."""
+    return tuple(
+        node
+        for node in _own_nodes(function.body)
+        if isinstance(node, ast.Return)
+        and (
             node.value is None
             or (isinstance(node.value, ast.Constant) and node.value.value is None)
-        ):
-            yield node
+        )
+    )
 
 
 def returned_values(function: Function) -> Iterator[ast.expr]:
@@ -38,13 +46,14 @@ def returned_values(function: Function) -> Iterator[ast.expr]:
             yield node.value
 
 
-def yields(function: Function) -> Iterator[ast.Yield | ast.YieldFrom]:
-    """Yield the ``yield`` expressions of ``function`` itself, which make it a generator."""
-    for node in _own_nodes(function.body):
-        if isinstance(node, ast.Yield | ast.YieldFrom):
-            yield node
+@lru_cache(maxsize=512)
+def yields(function: Function) -> Sequence[ast.Yield | ast.YieldFrom]:
+    """Return the ``yield`` expressions of ``function`` itself, which make it a generator."""
+    nodes = _own_nodes(function.body)
+    return tuple(node for node in nodes if isinstance(node, ast.Yield | ast.YieldFrom))
 
 
+@lru_cache(maxsize=512)
 def reaches_end(function: Function) -> bool:
     """Return whether ``function`` may reach the end of its body, and so return None.
 

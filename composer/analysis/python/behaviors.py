@@ -150,16 +150,22 @@ def escaping_publishers(source: BehaviorSource) -> frozenset[str]:
     return frozenset(port for method in source.methods for port in method.publishing.passed_on)
 
 
-def reached_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
-    """Yield ``method`` and the methods of its class that it calls, directly or through others."""
-    pending, seen = [method], {method.name}
+def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
+    """Yield ``methods`` and those of their class that they call, directly or through others."""
+    pending, seen = list(methods), {method.name for method in methods}
     while pending:
         current = pending.pop()
         yield current
-        for call in current.calls:
-            name = call.name.removeprefix("self.")
-            is_own = call.name.startswith("self.") and not call.deferred
-            callee = source.method(name) if is_own else None
-            if callee is not None and name not in seen:
-                seen.add(name)
+        for callee in called_methods(source, current):
+            if callee.name not in seen:
+                seen.add(callee.name)
                 pending.append(callee)
+
+
+def called_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
+    """Yield the methods of its class that ``method`` itself calls at once."""
+    for call in method.calls:
+        is_own = call.name.startswith("self.") and not call.deferred
+        callee = source.method(call.name.removeprefix("self.")) if is_own else None
+        if callee is not None:
+            yield callee

@@ -8,9 +8,10 @@ from composer.analysis.context import Context
 from composer.analysis.python.behaviors import (
     GENERAL_HANDLERS,
     behaviors,
-    calls_of,
+    called_methods,
     escaping_publishers,
     handlers,
+    reached_methods,
 )
 from composer.behavior_source import BehaviorSource, Call, published_port
 from composer.fast_dataclass import dataclass
@@ -98,22 +99,40 @@ def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]
     Methods called by handlers are not listed separately. Publishers used by nested functions,
     passed on or stored are listed under the name "", because they may publish at any time.
     """
-    calls = {method.name: tuple(calls_of(source, method)) for method in source.methods}
+    entries = [method for method in source.methods if method.name.startswith(_ENTRIES)]
     called_by_handlers = {
         call.name.removeprefix("self.")
-        for name, found in calls.items()
-        if name.startswith(_ENTRIES)
-        for call in found
+        for method in reached_methods(source, *entries)
+        for call in method.calls
         if not call.deferred
     }
     direct = {
-        name: _ports_in(call for call in found if not call.deferred)
-        for name, found in calls.items()
+        name: ports
+        for name, ports in _reached_ports(source).items()
         if name.startswith(_ENTRIES) or name not in called_by_handlers
     }
-    deferred = _ports_in(call for found in calls.values() for call in found if call.deferred)
+    calls = (call for method in source.methods for call in method.calls)
+    deferred = _ports_in(call for call in calls if call.deferred)
     whenever = deferred | escaping_publishers(source)
     return {name: ports for name, ports in {**direct, "": whenever}.items() if ports}
+
+
+def _reached_ports(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
+    """Return the publishers that each method uses itself, or through the methods that it calls."""
+    ports = {}
+    callers: dict[str, list[str]] = {}
+    for method in source.methods:
+        ports[method.name] = _ports_in(call for call in method.calls if not call.deferred)
+        for callee in called_methods(source, method):
+            callers.setdefault(callee.name, []).append(method.name)
+    pending = [name for name, found in ports.items() if found]
+    while pending:
+        name = pending.pop()
+        for caller in callers.get(name, ()):
+            if not ports[name] <= ports[caller]:
+                ports[caller] |= ports[name]
+                pending.append(caller)
+    return ports
 
 
 def _ports_in(calls: Iterable[Call]) -> frozenset[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache
 
 from composer.behavior_source import BehaviorSource, Function, Module
 from composer.behavior_source.traversal import walk
@@ -49,6 +50,11 @@ def escapes(source: BehaviorSource, is_harmless: Callable[[str], bool] = lambda 
 
 def sets_computed_names(source: BehaviorSource) -> bool:
     """Return whether a class sets attributes whose names it computes, so that any may exist."""
+    return any(_sets_computed_names(known.node) for _, known in source.classes)
+
+
+@lru_cache(maxsize=512)
+def _sets_computed_names(class_node: ast.ClassDef) -> bool:
     return any(
         isinstance(node, ast.Call)
         and isinstance(node.func, ast.Name)
@@ -57,8 +63,7 @@ def sets_computed_names(source: BehaviorSource) -> bool:
         and isinstance(node.args[0], ast.Name)
         and node.args[0].id == "self"
         and not isinstance(node.args[1], ast.Constant)
-        for _, known in source.classes
-        for node in walk(known.node.body)
+        for node in walk(class_node.body)
     )
 
 

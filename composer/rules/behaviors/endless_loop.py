@@ -64,9 +64,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Check the loops in the handlers of every behavior, and in the methods that these call."""
     for node, source in context.once(distinct_behaviors):
         names = (*GENERAL_HANDLERS, *(handler.name for handler in handlers(node)))
-        found = [method for name in names if (method := source.method(name)) is not None]
-        reached = {id(item): item for method in found for item in reached_methods(source, method)}
-        for method in reached.values():
+        found = {name: method for name in names if (method := source.method(name)) is not None}
+        for method in reached_methods(source, *found.values()):
             for loop in endless_loops(method.node) if method.node is not None else ():
                 yield _diagnostic(method, loop)
 
