@@ -54,8 +54,8 @@ class ValueChecker:
                 if found and any(self._fits_in(keyword.value, field, *other) for other in wrong):
                     continue  # two values that are swapped are one slip
                 # the same slip in several fields is one, as in ColorRGBA(r=1, g=0, b=0)
-                yield from (problem for problem in found if problem.message not in seen)
-                seen.update(problem.message for problem in found)
+                yield from (problem for problem in found if seen.isdisjoint(_slips(problem)))
+                seen.update(slip for problem in found for slip in _slips(problem))
                 wrong += [(keyword.value, field)] if found else []
             elif keyword.arg != "check_fields":
                 problem = f"{message.name} has no field '{keyword.arg}'"
@@ -162,6 +162,13 @@ def _is_message(expected: Value) -> bool:
     if isinstance(expected, FieldType):
         return not expected.is_array and not expected.is_primitive
     return isinstance(expected, Message)
+
+
+def _slips(problem: CodeProblem) -> Iterator[str]:
+    """Yield what equal slips in two fields have in common: the message, or the conversion."""
+    yield problem.message
+    if problem.hint is not None and " where " in problem.message:
+        yield f"{problem.message.partition(' where ')[0]}: {problem.hint}"
 
 
 def _are_parts(found: Value, expected: Value) -> bool:

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 
 import numpy as np
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 from std_msgs.msg import Bool, String
@@ -92,6 +93,7 @@ MISTAKES = [
     # integers in messages
     ("self.scan.header.stamp.sec += 0.5", "0.5"),
     ("self.scan.header.stamp.sec /= 2", "2"),
+    ("print(Time(sec=self.value(), nanosec=self.value()))", "self.value()"),
     # what returns nothing
     ("for task in self.tasks.sort():\n    pass", "self.tasks.sort()"),
     ("row = self.row.append(1.0)", "self.row.append(1.0)"),
