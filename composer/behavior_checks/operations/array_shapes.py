@@ -180,6 +180,8 @@ class _Reader:
                     found.append(_length(part, side))
                 case _ if self._is_number(part):
                     pass
+                case _ if _is_tuple(self._scope.type_of(part)):
+                    return None  # a name of several indices
                 case _:
                     chosen = self.of(part)
                     if chosen is None or len(chosen) != 1 or len(parts) > 1:
@@ -281,6 +283,10 @@ def is_array(node: ast.expr, scope: FunctionTypes) -> bool:
     if scope.type_of(node) == ARRAY:
         return True
     return scope.type_of(node) is ANYTHING and (rank_of(node, scope) or 0) > 0
+
+
+def _is_tuple(type_: Value) -> bool:
+    return isinstance(type_, Collection) and type_.python is tuple
 
 
 def is_new_axis(node: ast.expr, scope: FunctionTypes) -> bool:

@@ -161,6 +161,7 @@ def test_shapes_that_do_not_fit(
         "Imu().orientation_covariance = self.matrix.ravel()",
         "total = 0.0\nfor w in (WEIGHTS, WEIGHTS):\n    total += w\nif total.any():\n    pass",
         "rows, columns = self.matrix.shape\nself.matrix[rows - 1, columns - 1]",
+        "place = (0, 1)\nif np.isinf(self.matrix[place]) or self.matrix[place] > 1:\n    pass",
         "m = self.matrix\nm = m[0]\nm[2], m @ WEIGHTS\nif m[0] > 1:\n    pass",
         "m = np.zeros(3)\nif WEIGHTS[0]:\n    m = np.zeros((3, 3))\n    m[0, 1]\nm[0]",
         "np.stack([WEIGHTS, WEIGHTS], axis=1), np.sum(WEIGHTS, axis=-1), WEIGHTS.max(axis=0)",
