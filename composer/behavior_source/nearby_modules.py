@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pkgutil
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 
 from composer.behavior_source.modules import module_spec
@@ -58,8 +60,13 @@ def nearby_modules(module: str, folder: Path, project: Project) -> NearbyModules
         folders = tuple(_package_folders(parts[:count], bases))
         if folders:
             return NearbyModules(".".join(parts[:count]), parts[count], _modules_in(folders))
-    installed = tuple(item.name for item in pkgutil.iter_modules())
+    installed = _installed_names(tuple(sys.path))
     return NearbyModules("", parts[0], _modules_in(bases), len(parts) == 1, installed)
+
+
+@lru_cache(maxsize=1)
+def _installed_names(path: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(item.name for item in pkgutil.iter_modules(path))
 
 
 def _closest(name: str, names: tuple[str, ...]) -> str | None:

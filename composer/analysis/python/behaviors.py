@@ -153,19 +153,25 @@ def escaping_publishers(source: BehaviorSource) -> frozenset[str]:
 def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
     """Yield ``methods`` and those of their class that they call, directly or through others."""
     pending, seen = list(methods), {method.name for method in methods}
+    known = methods_by_name(source)
     while pending:
         current = pending.pop()
         yield current
-        for callee in called_methods(source, current):
+        for callee in called_methods(current, known):
             if callee.name not in seen:
                 seen.add(callee.name)
                 pending.append(callee)
 
 
-def called_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
-    """Yield the methods of its class that ``method`` itself calls at once."""
+def methods_by_name(source: BehaviorSource) -> Mapping[str, Method]:
+    """Return the methods as ``source.method`` finds them, for many look-ups."""
+    return {method.name: method for method in reversed(source.methods)}
+
+
+def called_methods(method: Method, known: Mapping[str, Method]) -> Iterator[Method]:
+    """Yield those of the ``known`` methods of its class that ``method`` itself calls at once."""
     for call in method.calls:
         is_own = call.name.startswith("self.") and not call.deferred
-        callee = source.method(call.name.removeprefix("self.")) if is_own else None
+        callee = known.get(call.name.removeprefix("self.")) if is_own else None
         if callee is not None:
             yield callee

@@ -11,6 +11,7 @@ from composer.analysis.python.behaviors import (
     called_methods,
     escaping_publishers,
     handlers,
+    methods_by_name,
     reached_methods,
 )
 from composer.behavior_source import BehaviorSource, Call, published_port
@@ -121,9 +122,10 @@ def _reached_ports(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
     """Return the publishers that each method uses itself, or through the methods that it calls."""
     ports = {}
     callers: dict[str, list[str]] = {}
-    for method in source.methods:
+    known = methods_by_name(source)
+    for method in known.values():
         ports[method.name] = _ports_in(call for call in method.calls if not call.deferred)
-        for callee in called_methods(source, method):
+        for callee in called_methods(method, known):
             callers.setdefault(callee.name, []).append(method.name)
     pending = [name for name, found in ports.items() if found]
     while pending:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Function
@@ -137,7 +138,7 @@ def _missing(
             setters = unset.get(name)
             if setters is None or any(item.startswith("accept_") for item in setters):
                 continue
-            is_early = start in setters and node.lineno < _stored_at(name, methods[start][0])
+            is_early = start in setters and node.lineno < _first_stores(methods[start][0])[name]
             others = setters - {start} if is_early else setters
             is_own = is_early and not others
             if others & reached or not (has_start or is_first or is_own):
@@ -221,7 +222,8 @@ def _read_first(
 ) -> tuple[ast.Attribute, FunctionTypes] | None:
     """Return where an attribute is read in any case before a method sets it, or None."""
     function, scope = methods[setter]
-    read = _read_before(name, function, scope)
+    receiver = scope.bindings.receiver
+    read = None if receiver is None else _reads_before_stores(function, receiver).get(name)
     if read is not None:
         return read, scope
     start = f"accept_{setter.removeprefix('on_')}"
@@ -229,18 +231,20 @@ def _read_first(
     return next((item for item in found if item[0].attr == name), None)
 
 
-def _read_before(name: str, function: Function, scope: FunctionTypes) -> ast.Attribute | None:
-    """Return where a method reads an attribute in any case before it sets it, or None."""
+@lru_cache(maxsize=512)
+def _reads_before_stores(function: Function, receiver: str) -> Mapping[str, ast.Attribute]:
+    """Return where a method reads attributes in any case before it sets them, by their names."""
+    found: dict[str, ast.Attribute] = {}
+    stored: set[str] = set()
     for statement in function.body:
         for node in sorted(_before_body(statement), key=_place):
             match node:
                 case ast.Attribute(value=ast.Name(id=owner), attr=attr, ctx=ast.Load()) if (
-                    attr == name and owner == scope.bindings.receiver
+                    owner == receiver and attr not in stored
                 ):
-                    return node
-        if _stores(statement, name):
-            return None
-    return None
+                    found.setdefault(attr, node)
+        stored.update(node.attr for node in _stores(walk([statement])))
+    return found
 
 
 def _before_body(statement: ast.stmt) -> Iterator[ast.AST]:
@@ -258,20 +262,19 @@ def _before_body(statement: ast.stmt) -> Iterator[ast.AST]:
             yield from evaluated(statement)
 
 
-def _stores(statement: ast.stmt, name: str) -> bool:
-    return any(
-        isinstance(node, ast.Attribute) and node.attr == name and isinstance(node.ctx, ast.Store)
-        for node in walk([statement])
-    )
+def _stores(nodes: Iterable[ast.AST]) -> Iterator[ast.Attribute]:
+    for node in nodes:
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node
 
 
-def _stored_at(name: str, function: Function) -> int:
-    """Return the first line in which a method sets an attribute."""
-    return min(
-        node.lineno
-        for node in nodes_of(function)
-        if isinstance(node, ast.Attribute) and node.attr == name and isinstance(node.ctx, ast.Store)
-    )
+@lru_cache(maxsize=512)
+def _first_stores(function: Function) -> Mapping[str, int]:
+    """Return the first lines in which a method sets attributes, by their names."""
+    found: dict[str, int] = {}
+    for node in _stores(nodes_of(function)):
+        found[node.attr] = min(node.lineno, found.get(node.attr, node.lineno))
+    return found
 
 
 def _in_texts(methods: _Methods) -> set[str]:

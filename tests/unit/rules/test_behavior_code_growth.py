@@ -26,6 +26,7 @@ def test_many_functions_that_call_each_other(tmp_path: Path) -> None:
 
 
 LINES = {
+    "set": "        self.a{0} = {0}\n        x = self.a{0}\n",
     "if": "        if self.a{0}: x{0} = {0}\n",
     "return": "        if self.a: return self.on_tick()\n",
 }
