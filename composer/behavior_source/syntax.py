@@ -59,6 +59,10 @@ class Class:
     dynamic: bool
     node: ast.ClassDef = field(repr=False, compare=False)
 
+    def has(self, method: Method) -> bool:
+        """Return whether the class itself defines ``method``; names are compared first, quickly."""
+        return any(own.name == method.name and own == method for own in self.methods)
+
 
 @dataclass(frozen=True, slots=True)
 class Import:

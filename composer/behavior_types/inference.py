@@ -377,7 +377,7 @@ class BehaviorTypes:
 
     def _class_of(self, method: Method) -> OwnClass | None:
         classes = (OwnClass(known, home) for home, known in self.source.classes)
-        return next((own for own in classes if method in own.definition.methods), None)
+        return next((own for own in classes if own.definition.has(method)), None)
 
     def arguments_of(self, method: Method) -> Mapping[str, Value]:
         """Return the types of the arguments that the composer passes to a handler."""
