@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING
 
@@ -243,7 +243,14 @@ class FunctionTypes:
         bindings = self.bindings.of_name(name)
         if name in self.bindings.computed and name not in self._changing:
             return self._computed(name, bindings, self.bindings.computed[name])
-        return joined((self.bound(binding), binding.how) for binding in bindings)
+        return joined(self._bound_pairs(name, bindings))
+
+    def _bound_pairs(self, name: str, bindings: list[Binding]) -> Iterator[tuple[Value, How]]:
+        """Yield the types of bindings; the annotation of an argument says what it is at first."""
+        is_argument = self.function is not None and name in arguments_of(self.function)
+        for binding in bindings:
+            is_first = is_argument and binding is bindings[0] and len(bindings) > 1
+            yield self.bound(binding), How.VALUE if is_first else binding.how
 
     def _computed(self, name: str, bindings: list[Binding], computed: list[Binding]) -> Value:
         """Return the type of a name that is also computed from its own old value."""
@@ -251,7 +258,7 @@ class FunctionTypes:
         first = joined((self.bound(binding), binding.how) for binding in plain)
         if first is not NONE:
             self._names[name] = first
-        found = joined((self.bound(binding), binding.how) for binding in bindings)
+        found = joined(self._bound_pairs(name, bindings))
         if first in (NONE, found):
             return found
         self._changing.add(name)
@@ -329,6 +336,14 @@ class FunctionTypes:
     def normal(self, type_: FieldType) -> Value:
         """Return the message of a type that is one, so that equal types compare as equal."""
         return fields_of(type_, self.owner.interfaces) or type_
+
+
+def arguments_of(function: Function) -> frozenset[str]:
+    """Return the names of the arguments of a function."""
+    arguments = function.args
+    return frozenset(
+        item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
+    )
 
 
 def _compatible(annotation: Value, given: Value) -> bool:

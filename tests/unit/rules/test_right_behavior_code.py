@@ -12,6 +12,8 @@ from tests.unit.support.behavior_code import found
 RIGHT = [
     ("odometry", "self.publishers.text.publish(String(data=self._text()))"),
     ("odometry", "self.publishers['text'].publish(String())"),
+    ("function", "stamp = str(stamp).split()\nlen(stamp)"),
+    ("function", "def stamp():\n    return 1\nstamp()"),
     ("odometry", "self.parameters['wheel.radius']"),
     ("odometry", "self.publishers.path.publish(Path(header=message.header))"),
     ("odometry", "String(**{'dta': 1})"),
