@@ -10,7 +10,10 @@ from composer.behavior_checks.annotated_values import argument_problem, problem_
 from composer.behavior_checks.attributes.changing_attributes import changing_attributes
 from composer.behavior_checks.attributes.fixed_attributes import fixed_problems
 from composer.behavior_checks.attributes.misspelled_attributes import misspelled_attributes
-from composer.behavior_checks.attributes.unknown_attributes import attribute_problem
+from composer.behavior_checks.attributes.unknown_attributes import (
+    attribute_problem,
+    names_looked_for,
+)
 from composer.behavior_checks.attributes.unset_attributes import late_attributes, unset_attributes
 from composer.behavior_checks.calls.collection_calls import (
     default_problem,
@@ -86,7 +89,9 @@ if TYPE_CHECKING:
 #: Nodes of which only what is around them is checked; most nodes are of these.
 _UNCHECKED = (ast.Constant, ast.Name, ast.arg, ast.arguments, ast.keyword)
 #: Attributes of awaitables that code may use instead of awaiting them.
-_OF_AWAITABLES = frozenset({"add_done_callback", "cancel", "close", "done", "exception", "send"})
+_OF_AWAITABLES = frozenset(
+    {"__await__", "add_done_callback", "cancel", "close", "done", "exception", "send", "throw"}
+)
 
 
 def behavior_problems(
@@ -259,7 +264,7 @@ class _FunctionChecker:
                 yield missing_await(owner, self.function, self.scope)
             return
         found = attribute_problem(self.types, owner, node.attr)
-        if found is not None:
+        if found is not None and node.attr not in names_looked_for(self.function):
             kind, message, hint = found
             span = attribute_span(node, self.scope.home.source)
             if kind is Kind.VALUE:  # the value is wrong where it was stored

@@ -291,7 +291,7 @@ def _names_in(path: Path) -> frozenset[str] | None:
 
 
 def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
-    """Yield the statements of a file, except where a ``try`` handles a failing import."""
+    """Yield the statements of a file, except where a failing import is handled or expected."""
     pending = list(body[::-1])
     while pending:
         node = pending.pop()
@@ -302,6 +302,8 @@ def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
             inner: list[ast.AST] = [*node.handlers, *node.orelse, *node.finalbody]
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
             inner = [*node.orelse]
+        elif isinstance(node, ast.If) and _asks_for_system(node.test):
+            inner = []
         else:
             inner = [item for name in _BODIES for item in getattr(node, name, ())]
         pending.extend(inner[::-1])
@@ -309,6 +311,15 @@ def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
 
 def _is_type_checking(test: ast.expr) -> bool:
     return dotted(test).endswith("TYPE_CHECKING")
+
+
+def _asks_for_system(test: ast.expr) -> bool:
+    """Return whether a condition depends on the version of Python or on the operating system."""
+    names = (item for item in ast.walk(test) if isinstance(item, ast.Attribute))
+    return any(dotted(item) in _OF_SYSTEM for item in names)
+
+
+_OF_SYSTEM = frozenset({"os.name", "sys.implementation.name", "sys.platform", "sys.version_info"})
 
 
 def _problem(

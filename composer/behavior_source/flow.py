@@ -68,7 +68,7 @@ def reaches_end(function: Function) -> bool:
 def may_raise_at_end(
     function: Function, returns: Callable[[ast.Call], bool] = lambda _: False
 ) -> bool:
-    """Return whether ``function`` may never reach its end, because of a loop or a call there.
+    """Return whether ``function`` may never reach its end: a loop, a call or a match is there.
 
     ``returns`` says which other calls are known to return.
     """
@@ -90,6 +90,8 @@ def may_raise_at_end(
                 pending += [body[-1], *orelse[-1:], *finalbody[-1:]]
                 pending += [handler.body[-1] for handler in handlers]
             case ast.Match(cases=cases):
+                if any(isinstance(case.pattern, ast.MatchClass) for case in cases):
+                    return True  # the cases may be all classes that there are
                 pending += [case.body[-1] for case in cases]
     return False
 
@@ -237,8 +239,11 @@ def _leaves(statement: ast.stmt) -> bool:
             found = True
         case ast.If(body=body, orelse=orelse):
             found = not _continues(body) and bool(orelse) and not _continues(orelse)
-        case ast.While(test=test, body=body):
-            found = _is_true(test) and not _has_break(body)
+        case ast.While(test=test, body=body, orelse=orelse):
+            is_endless = _is_true(test) or not _continues(orelse)
+            found = is_endless and not _has_break(body)
+        case ast.For(body=body, orelse=orelse) | ast.AsyncFor(body=body, orelse=orelse):
+            found = not _continues(orelse) and not _has_break(body)
         case ast.With(body=body) | ast.AsyncWith(body=body):
             found = not _continues(body)
         case ast.Match(cases=cases):

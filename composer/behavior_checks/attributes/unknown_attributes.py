@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 from array import array
 from collections.abc import Iterable
+from functools import lru_cache
 from inspect import isabstract
 from types import FunctionType
 
 from composer.behavior_checks.problems import Kind
-from composer.behavior_source import Module
+from composer.behavior_source import Function, Module
 from composer.behavior_types.api import members
 from composer.behavior_types.inference import BehaviorTypes
 from composer.behavior_types.libraries.rclpy_api import is_rclpy
+from composer.behavior_types.syntax.bindings import nodes_of
 from composer.behavior_types.syntax.lineage import lineage
 from composer.behavior_types.syntax.module_names import module_names
 from composer.behavior_types.syntax.own_classes import (
@@ -80,6 +83,17 @@ _OF_DICTS = frozenset({"default_factory", "elements", "most_common", "move_to_en
 
 #: The problem of an attribute: its kind, message and hint.
 Found = tuple[Kind, str, str | None]
+
+
+@lru_cache(maxsize=512)
+def names_looked_for(function: Function) -> frozenset[str]:
+    """Return the attributes that a function asks for by ``hasattr``."""
+    found: set[str] = set()
+    for node in nodes_of(function):
+        match node:
+            case ast.Call(func=ast.Name(id="hasattr"), args=[_, ast.Constant(value=str() as name)]):
+                found.add(name)
+    return frozenset(found)
 
 
 def attribute_problem(types: BehaviorTypes, owner: Value, name: str) -> Found | None:

@@ -16,6 +16,7 @@ from composer import behavior
 from composer.behavior_source import Function, Method
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.libraries.numpy_names import ndarray
+from composer.behavior_types.libraries.rclpy_api import is_rclpy
 from composer.behavior_types.syntax.bindings import CONTEXTS, is_class_method, is_static
 from composer.behavior_types.syntax.lineage import PLAIN_BASES, lineage
 from composer.behavior_types.syntax.own_classes import (
@@ -158,6 +159,8 @@ def constructor(own: OwnClass) -> Signature | None:
             return _of_fields(own)
         case (function, _):
             return signature_of(function, is_bound=True, name=name)
+    if is_rclpy(own.home):
+        return None  # its description leaves out constructors that other methods call
     has_own = any(method.name == "__new__" for method in _methods(own))
     is_plain = lineage(own).others <= PLAIN_BASES and not is_dataclass(own)
     return Signature(name, (), (), frozenset()) if is_plain and not has_own else None

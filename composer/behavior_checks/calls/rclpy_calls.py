@@ -117,7 +117,8 @@ def _class_of_group(node: ast.expr, name: str, scope: FunctionTypes) -> Iterator
 
 def _is_qos_profile(called: ModuleFunction) -> bool:
     profile = rclpy_module().classes["QoSProfile"]
-    return any(method.node is called.node for method in profile.methods)
+    created = (method.node for method in profile.methods if method.name == "__init__")
+    return called.node in created
 
 
 def _qos_problems(call: ast.Call, scope: FunctionTypes) -> Iterator[CodeProblem]:

@@ -25,6 +25,7 @@ from composer.behavior_types.syntax.lineage import RECORDS, lineage
 from composer.behavior_types.syntax.literals import constant_type
 from composer.behavior_types.syntax.own_classes import (
     all_fields,
+    defines,
     fields_of_class,
     has_fields,
     is_enumeration,
@@ -70,10 +71,19 @@ def attribute_of_object(scope: FunctionTypes, owner: OwnObject, name: str) -> Va
             match statement:
                 case ast.AnnAssign(target=ast.Name(id=found), annotation=annotation):
                     if found == name:
-                        return annotation_in(scope, annotation, own.home, owner.parameter)
+                        value = annotation_in(scope, annotation, own.home, owner.parameter)
+                        is_descriptor = isinstance(value, OwnObject) and defines(
+                            value.of, "__get__"
+                        )
+                        return ANYTHING if is_descriptor else value
     if is_named_tuple(of) and name in {"count", "index"}:
         return CollectionMethod(Collection(tuple), name)
     return ANYTHING if is_rclpy(of.home) else _assigned_in(scope, of, name)
+
+
+def _is_descriptor(value: Value) -> bool:
+    """Return whether reading an attribute with this value gives another one."""
+    return isinstance(value, OwnObject) and defines(value.of, "__get__")
 
 
 def annotation_of(scope: FunctionTypes, own: OwnClass, name: str) -> Value:
@@ -228,7 +238,8 @@ def method_value(
         of is not None and not is_rclpy(own.home) and not _may_differ(scope, of, function.name)
     )
     defining = own if is_only else None
-    return ModuleFunction(function, own.home, is_bound=True, parameter=parameter, of=defining)
+    is_bound = function.name != "__new__"
+    return ModuleFunction(function, own.home, is_bound=is_bound, parameter=parameter, of=defining)
 
 
 def attribute_of_class(scope: FunctionTypes, owner: OwnClass, name: str) -> Value:

@@ -45,7 +45,7 @@ CLASSES: Mapping[str, type] = {
 def rclpy_class(full: str) -> OwnClass | None:
     """Return the class of rclpy with that full name, None if it is not known."""
     found = _NAME.fullmatch(full)
-    if found is None:
+    if found is None or found[1].startswith(".impl"):
         return None
     module, name = found.groups()
     name = _ALIASES.get(name, name)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python.behaviors import GENERAL_HANDLERS, distinct_behaviors, handlers
 from composer.behavior_source import Function
 from composer.behavior_source.receivers import lacks_self
+from composer.behavior_source.traversal import walk
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -57,10 +59,11 @@ def check(context: Context) -> Iterator[Diagnostic]:
         for module in source.own_modules:
             for known in module.classes.values():
                 arguments = expected if id(known) in own else {}
+                called = _called_in_body(known.node)
                 for method in known.methods:
-                    if method.node is None or not lacks_self(
-                        method.node, arguments.get(method.name)
-                    ):
+                    if method.node is None or method.name in called:
+                        continue
+                    if not lacks_self(method.node, arguments.get(method.name)):
                         continue
                     yield Diagnostic(
                         RULE,
@@ -68,6 +71,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
                         method.span,
                         hint=_hint(method.node),
                     )
+
+
+def _called_in_body(node: ast.ClassDef) -> frozenset[str]:
+    """Return the functions that the body of a class calls itself: they are not methods."""
+    return frozenset(
+        item.func.id
+        for item in walk(node.body, closed=(ast.FunctionDef, ast.AsyncFunctionDef))
+        if isinstance(item, ast.Call) and isinstance(item.func, ast.Name)
+    )
 
 
 def _hint(function: Function) -> str:
