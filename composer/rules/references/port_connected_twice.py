@@ -53,7 +53,9 @@ def check(context: Context) -> Iterator[Diagnostic]:
     reported: set[tuple[str, int, int]] = set()  # a pattern stands for several ports
     for connection in context.system.connections:
         for endpoint in connection.ends:
-            if context.system.port(endpoint) is None or is_unresolved(connection.name.value):
+            if context.system.port(endpoint) is None or is_unresolved(endpoint.text.value):
+                continue
+            if is_unresolved(connection.name.value):
                 continue
             earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
             difference = _difference(earlier, connection)

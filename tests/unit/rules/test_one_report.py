@@ -349,10 +349,11 @@ MISTAKES: dict[str, tuple[dict[str, str], list[tuple[str, str, int]]]] = {
     ),
     "a loop over a word, in a file that is included twice": (
         {
-            "system.yaml": "system: a\ninclude:\n  - {file: part.yaml, prefix: a_}\n"
-            "  - {file: part.yaml, prefix: b_}\n",
+            "system.yaml": "system: a\ninclude:\n  - {file: part.yaml, prefix: a_, namespace: a}\n"
+            "  - {file: part.yaml, prefix: b_, namespace: b}\n",
             "part.yaml": "system: part\nnodes:\n  n_${i}:\n    for_each: {i: names}\n"
-            "    on_activate: {log: a}\n",
+            f"    publishers: {{out: {TALK}, external: true}}}}\n"
+            "connections:\n  - {topic: x, from: n_*.out}\n",
         },
         [("wrong-type", "part.yaml", 4)],
     ),
