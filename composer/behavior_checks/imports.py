@@ -13,7 +13,7 @@ from composer.behavior_checks.attributes.module_attributes import module_attribu
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module, nearby_modules
 from composer.behavior_source.library import is_standard, standard_names
-from composer.behavior_source.method_body import catches, dotted
+from composer.behavior_source.method_body import asks_for_system, catches, dotted
 from composer.behavior_source.modules import (
     Unreadable,
     is_installed,
@@ -302,7 +302,7 @@ def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
             inner: list[ast.AST] = [*node.handlers, *node.orelse, *node.finalbody]
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
             inner = [*node.orelse]
-        elif isinstance(node, ast.If) and _asks_for_system(node.test):
+        elif isinstance(node, ast.If) and asks_for_system([node.test]):
             inner = []
         else:
             inner = [item for name in _BODIES for item in getattr(node, name, ())]
@@ -311,15 +311,6 @@ def _unguarded(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
 
 def _is_type_checking(test: ast.expr) -> bool:
     return dotted(test).endswith("TYPE_CHECKING")
-
-
-def _asks_for_system(test: ast.expr) -> bool:
-    """Return whether a condition depends on the version of Python or on the operating system."""
-    names = (item for item in ast.walk(test) if isinstance(item, ast.Attribute))
-    return any(dotted(item) in _OF_SYSTEM for item in names)
-
-
-_OF_SYSTEM = frozenset({"os.name", "sys.implementation.name", "sys.platform", "sys.version_info"})
 
 
 def _problem(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 from composer.behavior_source.spans import span_of
-from composer.behavior_source.traversal import children
+from composer.behavior_source.traversal import children, walk
 from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
@@ -95,6 +95,16 @@ def dotted(node: ast.expr) -> str:
     if not isinstance(node, ast.Name):
         return ""
     return ".".join((node.id, *reversed(parts)))
+
+
+#: What differs between versions of Python and operating systems.
+_OF_SYSTEM = frozenset({"os.name", "sys.implementation.name", "sys.platform", "sys.version_info"})
+
+
+def asks_for_system(nodes: Iterable[ast.AST]) -> bool:
+    """Return whether code asks for the version of Python or for the operating system."""
+    attributes = (item for item in walk([*nodes]) if isinstance(item, ast.Attribute))
+    return any(dotted(item) in _OF_SYSTEM for item in attributes)
 
 
 def is_none(node: ast.expr | None) -> bool:

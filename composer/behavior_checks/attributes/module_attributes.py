@@ -10,6 +10,7 @@ from types import BuiltinFunctionType, FunctionType
 from composer.behavior_checks.problems import CodeProblem, Kind
 from composer.behavior_source import Module
 from composer.behavior_source.library import is_standard, standard_names
+from composer.behavior_source.method_body import asks_for_system
 from composer.behavior_source.spans import attribute_span
 from composer.behavior_source.traversal import walk
 from composer.behavior_types.libraries.numpy_names import NUMPY_NAMES
@@ -33,9 +34,24 @@ def module_attributes(module: Module) -> Iterator[CodeProblem]:
         close = nearest(node.attr, names)
         if close is None and full in NUMPY_NAMES:
             continue  # it may be new
+        if _may_be_elsewhere(full, node, module):
+            continue
         message = f"module '{full}' has no '{node.attr}'"
         hint = suggestion(node.attr, names) if close else None
         yield CodeProblem(Kind.IMPORT, message, attribute_span(node, module.source), hint)
+
+
+def _may_be_elsewhere(full: str, node: ast.Attribute, module: Module) -> bool:
+    """Return whether a name may exist in other systems, for which the file has code as well."""
+    if full == "sys" and (node.attr.startswith("last_") or node.attr in {"ps1", "ps2"}):
+        return True  # in an interactive interpreter
+    for item in walk(module.tree.body):
+        match item:
+            case ast.Constant(value=str() as asked) if asked == node.attr:
+                return True  # of 'hasattr'
+            case ast.If(test=test) if asks_for_system([test]) and node in walk([item]):
+                return True
+    return False
 
 
 def _uses(module: Module, names: Collection[str]) -> list[tuple[str, ast.Attribute]]:

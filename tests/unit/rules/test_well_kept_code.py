@@ -8,6 +8,7 @@ from tests.unit.support.checking import diagnostics_in
 
 SYSTEM = "system: demo\nnodes: {lab: {behavior: lab:Lab}}\n"
 CODE = """\
+import os
 import sys
 from composer.behavior import Behavior
 from std_msgs.msg import String
@@ -18,6 +19,7 @@ else:
     Later = None
 if sys.platform == "win32":
     import winreg_of_windows
+    os.startfile("a.txt")
 if sys.version_info < (3, 11):
     import tomli_of_old_python as tomllib
 else:
