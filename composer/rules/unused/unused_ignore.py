@@ -54,14 +54,19 @@ nodes:
 
 _MARK = "compose:"
 #: A comment, not the endpoint of a quoted string: no quote follows.
-_COMMENT = re.compile(r"""(?:^|\s)\#\s*compose:\s*ignore\[(?P<names>[^\]]*)\][^"']*$""")
+_COMMENT = re.compile(
+    r"""(?:^|\s)\#\s*(?P<mark>compose:\s*ignore)\b(?:\[(?P<names>[^\]]*)\])?[^"']*$"""
+)
 _NAME = re.compile(r"[^\s,]+")
 _ONLY_COMMENT = re.compile(r"\s*(#.*)?$")
 
 
 @dataclass(frozen=True, slots=True)
 class Ignore:
-    """A rule, by name or code, that is ignored on a line; ``span`` is its span in the comment."""
+    """A rule, by name or code, that is ignored on a line; ``span`` is its span in the comment.
+
+    The rule is empty if the comment names none.
+    """
 
     rule: str
     line: int
@@ -124,6 +129,9 @@ def _ignores(
 ) -> Iterator[Ignore]:
     """Yield the rules that ``comments`` ignore on ``line``."""
     for number, comment in comments:
+        if not (comment["names"] or "").strip():
+            start, end = comment.span("mark")
+            yield Ignore("", line, Span(source, number, start + 1, end - start))
         for name in _NAME.finditer(comment.string, *comment.span("names")):
             length = name.end() - name.start()
             yield Ignore(name[0], line, Span(source, number, name.start() + 1, length))
@@ -147,6 +155,9 @@ class _Table:
 
 
 def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagnostic:
+    if not ignore.rule:
+        hint = "write the rule in brackets, as in 'compose: ignore[qos-implicit]'"
+        return Diagnostic(RULE, "this comment ignores no rule", ignore.span, hint=hint)
     if is_error:
         message = f"'{shown(ignore.rule)}' is an error here"
         return Diagnostic(RULE, message, ignore.span, hint="errors cannot be ignored; fix it")

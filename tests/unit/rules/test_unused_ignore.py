@@ -39,16 +39,19 @@ def test_a_comment_applies_to_its_line(before: str, behind: str, tmp_path: Path)
     assert rules_broken(text(before, behind), tmp_path) == []
 
 
-@pytest.mark.parametrize(
-    "behind",
-    [
-        "  # compose: ignore",
-        "  # compose: ignore[]",
-        "  # composed: ignore[publisher-without-subscription]",
-    ],
-)
-def test_other_comments_ignore_nothing(behind: str, tmp_path: Path) -> None:
-    assert rules_broken(text(behind=behind), tmp_path) == ["publisher-without-subscription"]
+@pytest.mark.parametrize("names", ["", "[]", " RC324", "[ ] RC324"])
+def test_a_comment_without_a_rule_is_reported(names: str, tmp_path: Path) -> None:
+    found = diagnostics_in(text(behind=f"  # compose: ignore{names}"), tmp_path)
+    assert [(item.rule.name, quoted(item)) for item in found] == [
+        ("publisher-without-subscription", "chatter"),
+        ("unused-ignore", "compose: ignore"),
+    ]
+
+
+@pytest.mark.parametrize("comment", ["composed: ignore[RC324]", "compose: ignored RC324"])
+def test_other_comments_ignore_nothing(comment: str, tmp_path: Path) -> None:
+    found = rules_broken(text(behind=f"  # {comment}"), tmp_path)
+    assert found == ["publisher-without-subscription"]
 
 
 @pytest.mark.parametrize("line", ["log: a# compose: ignore[x]", 'log: "a # compose: ignore[x]"'])
