@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Iterable, Iterator, Mapping, Sequence
 from types import GeneratorType
 
 from composer.behavior_source import Module
+from composer.behavior_source.library import is_standard
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.libraries.numpy_types import numpy_class
 from composer.behavior_types.libraries.rclpy_api import rclpy_class
@@ -93,7 +94,7 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
             return annotated(inner, home, node, interfaces)
         case ast.Subscript(value=ast.Name(id=name)) if own := class_named(name, home):
             return OwnObject(own)
-        case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in _COLLECTIONS:
+        case ast.Subscript(value=ast.Name(id=name), slice=inner) if _is_collection(name, home):
             types = inner.elts if isinstance(inner, ast.Tuple) else [inner]
             parts = [annotated(item, home, node, interfaces) for item in types]
             has_length = not any(_is_ellipsis(item) for item in types)
@@ -125,6 +126,12 @@ def annotated(annotation: ast.expr, home: Module, node: Node, interfaces: Interf
             return OwnObject(own) if own is not None else _named(full, node, interfaces)
         case _:
             return ANYTHING
+
+
+def _is_collection(name: str, home: Module) -> bool:
+    """Return whether a name means a class of Python here, not one of another package."""
+    imported = home.imports.get(name)
+    return name in _COLLECTIONS and (imported is None or is_standard(imported.module))
 
 
 def _collection(python: type, parts: list[Value], *, has_length: bool = True) -> Collection:

@@ -11,6 +11,7 @@ CODE = """\
 import os
 import sys
 from composer.behavior import Behavior
+from rpds import List
 from std_msgs.msg import String
 
 if sys.version_info >= (3, 99):
@@ -24,6 +25,10 @@ if sys.version_info < (3, 11):
     import tomli_of_old_python as tomllib
 else:
     import tomllib
+
+
+def longer(links: List[int]):
+    return links.push_front(1)
 
 
 class Uri:
@@ -104,6 +109,7 @@ class Lab(Behavior):
         self.found = found
         advance(["a"])
         pick(3)
+        longer(List([1]))
         self.newer = Later, tomllib
         Derived()
 
