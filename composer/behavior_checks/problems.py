@@ -31,6 +31,7 @@ class Kind(Enum):
     NONE = "a value that may be None"
     ANNOTATION = "a handler that annotates its argument with another type"
     SIGNATURE = "a callback that does not accept the arguments it is called with"
+    REFUSED = "values of parameters for which 'on_configure' raises"
     PARAMETER = "a parameter that a class reads, but does not declare"
     CONSTRUCTOR = "a constructor that does not call that of Node"
 

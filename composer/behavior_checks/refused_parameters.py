@@ -47,7 +47,7 @@ def refused_parameters(types: BehaviorTypes) -> Iterator[tuple[frozenset[str], C
                 if scope is not None and _is(test, names, scope, is_refused):
                     message = "the values of the parameters make 'on_configure' fail here"
                     span = span_of(test, home.source)
-                    yield frozenset(names), CodeProblem(Kind.VALUE, message, span)
+                    yield frozenset(names), CodeProblem(Kind.REFUSED, message, span)
                     return
 
 
