@@ -12,7 +12,7 @@ from composer.behavior_source.method_body import dotted
 from composer.behavior_source.traversal import children
 from composer.behavior_types.expressions.fillings import plain
 from composer.behavior_types.syntax.bindings import (
-    CONTEXTS,
+    TRANSPARENT,
     bindings_of,
     is_class_method,
     is_static,
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from composer.behavior_types.expressions.function_types import FunctionTypes
     from composer.behavior_types.inference import BehaviorTypes
 
-#: Decorators that leave the arguments of a function as they are.
-_TRANSPARENT = CONTEXTS | {"classmethod", "final", "override", "staticmethod"}
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 
@@ -198,7 +196,7 @@ def _is_related(name: str, own: OwnClass, types: BehaviorTypes) -> bool:
 
 
 def _opened(function: Function, home: Module, own: OwnClass | None) -> Iterator[OpenFunction]:
-    if not {dotted(item) for item in function.decorator_list} <= _TRANSPARENT:
+    if not {dotted(item) for item in function.decorator_list} <= TRANSPARENT:
         return
     arguments = function.args
     positional = [*arguments.posonlyargs, *arguments.args]

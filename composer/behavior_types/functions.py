@@ -5,7 +5,7 @@ from __future__ import annotations
 from composer.behavior_source import Function
 from composer.behavior_source.method_body import dotted
 from composer.behavior_types.libraries.numpy_names import METHODS_OF_ARRAYS, ndarray
-from composer.behavior_types.syntax.bindings import CONTEXTS
+from composer.behavior_types.syntax.bindings import TRANSPARENT
 from composer.behavior_types.values import (
     ApiMethod,
     BuiltinMethod,
@@ -16,15 +16,12 @@ from composer.behavior_types.values import (
     Value,
 )
 
-#: Decorators that give a function again. Others may give anything.
-_GIVE_A_FUNCTION = CONTEXTS | {"classmethod", "final", "override", "staticmethod"}
-
 
 def is_function(value: Value) -> bool:
     """Return whether a value is a function or a method, which was not called."""
     match value:
         case ModuleFunction(node=node):
-            return {dotted(item) for item in node.decorator_list} <= _GIVE_A_FUNCTION
+            return {dotted(item) for item in node.decorator_list} <= TRANSPARENT
         case OwnMethod() | ApiMethod():
             return True
         case CollectionMethod(owner=Collection(python=python), name=name):

@@ -224,6 +224,8 @@ CONTEXTS = frozenset(
     {"asynccontextmanager", "contextlib.asynccontextmanager"}
     | {"contextlib.contextmanager", "contextmanager"}
 )
+#: Decorators that give a function with the same arguments. Others may give anything.
+TRANSPARENT = CONTEXTS | {"classmethod", "final", "override", "staticmethod"}
 
 
 def is_static(function: Function) -> bool:
