@@ -30,11 +30,11 @@ def swapped_arguments(
     """
     if scope.function is None or scope.function is called:
         return
-    names = {name: _last(node) for name, node in signature.bound(call)}
+    given = dict(signature.bound(call))
+    names = {name: _last(node) for name, node in given.items()}
     for first, second in combinations(names, 2):
         if (names[first], names[second]) != (second, first) or len(first) < _SHORTEST > len(second):
             continue
-        given = dict(signature.bound(call))
         parts = set(first.split("_")) & set(second.split("_"))
         is_of_message = any(_is_field(given[name], scope) for name in (first, second))
         if parts or not is_of_message or _turns(call, first, second, signature, scope.function):
