@@ -14,6 +14,9 @@ A behavior is a plain class next to its node type. Handlers are bound by name::
 
 Messages that a handler receives or has published are shared: do not change them.
 
+``from composer.typed import PlannerBehavior`` in place of :class:`Behavior` gives editors and type
+checkers the types of the ports and parameters of node type ``planner``; see ``compose stubs``.
+
 Every handler may be ``async def``. Lifecycle handlers return nothing. An exception makes the
 transition fail: :class:`TransitionFailed` refuses it, and the node keeps its state; any other
 exception is an error, which calls the node's ``on_error`` and leaves the node unconfigured.
@@ -21,8 +24,22 @@ exception is an error, which calls the node's ``on_error`` and leaves the node u
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, Protocol
+from collections.abc import Callable, Coroutine, Mapping
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from builtin_interfaces.msg import Time
+    from geometry_msgs.msg import Transform, TransformStamped
+    from rclpy.node import Node
+
+M = TypeVar("M")
+Req = TypeVar("Req", contravariant=True)
+Res = TypeVar("Res", covariant=True)
+G = TypeVar("G", contravariant=True)
+R = TypeVar("R", covariant=True)
+F = TypeVar("F", contravariant=True)
+Request = TypeVar("Request", covariant=True)
+Feedback = TypeVar("Feedback", covariant=True)
 
 
 class BehaviorError(Exception):
@@ -69,21 +86,23 @@ class TransformExtrapolationError(TransformError):
     """The time is earlier or later than the transforms that were received."""
 
 
-class Publisher(Protocol):
+class Publisher(Protocol[M]):
     """A publisher port. Messages published while the node is inactive are dropped and counted."""
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: M) -> None:
         """Publish ``message``. Do not change it afterwards: receivers share the object."""
 
     @property
-    def message_type(self) -> Any:
+    def message_type(self) -> type[M]:
         """The message class of the topic."""
 
 
-class Client(Protocol):
+class Client(Protocol[Req, Res]):
     """A service client port."""
 
-    def call(self, request: Any, *, timeout_ms: float | None = None) -> Awaitable[Any]:
+    def call(
+        self, request: Req, *, timeout_ms: float | None = None
+    ) -> Coroutine[Any, Any, Res]:
         """Call the service; wait for server and response up to the timeout (default: the port's).
 
         Raises ServerUnavailable, CallTimeout, CallCancelled.
@@ -94,17 +113,17 @@ class Client(Protocol):
         """The service class; ``service_type.Request`` is the request class."""
 
 
-class SentGoal(Protocol):
+class SentGoal(Protocol[R]):
     """A goal that an action server accepted."""
 
-    def result(self, *, timeout_ms: float | None = None) -> Awaitable[GoalResult]:
+    def result(self, *, timeout_ms: float | None = None) -> Coroutine[Any, Any, GoalResult[R]]:
         """Wait for the result of the goal. Raises CallTimeout, CallCancelled."""
 
-    def cancel(self) -> Awaitable[bool]:
+    def cancel(self) -> Coroutine[Any, Any, bool]:
         """Request to cancel the goal; true if the server accepts."""
 
 
-class GoalResult(Protocol):
+class GoalResult(Protocol[R]):
     """The result of a goal; ``status`` is ``succeeded``, ``canceled`` or ``aborted``."""
 
     @property
@@ -112,20 +131,20 @@ class GoalResult(Protocol):
         """The final status, as in action_msgs/msg/GoalStatus but in lower case."""
 
     @property
-    def result(self) -> Any:
+    def result(self) -> R:
         """The action's result message."""
 
 
-class ActionClient(Protocol):
+class ActionClient(Protocol[G, R, Feedback]):
     """An action client port."""
 
     def send_goal(
         self,
-        goal: Any,
+        goal: G,
         *,
-        on_feedback: Callable[[Any], None] | None = None,
+        on_feedback: Callable[[Feedback], object] | None = None,
         timeout_ms: float | None = None,
-    ) -> Awaitable[SentGoal]:
+    ) -> Coroutine[Any, Any, SentGoal[R]]:
         """Send a goal, and wait until the server accepts or rejects it.
 
         Raises ServerUnavailable, CallTimeout, CallCancelled, GoalRejected.
@@ -136,7 +155,7 @@ class ActionClient(Protocol):
         """The action class; ``action_type.Goal`` is the goal class."""
 
 
-class Goal(Protocol):
+class Goal(Protocol[Request, F]):
     """A goal that an action server's handler executes.
 
     If the handler returns without a final status, the goal succeeds, or is canceled if that was
@@ -144,14 +163,14 @@ class Goal(Protocol):
     """
 
     @property
-    def request(self) -> Any:
+    def request(self) -> Request:
         """The goal message."""
 
     @property
     def is_cancel_requested(self) -> bool:
         """True if the client requested to cancel, or the node is leaving the active state."""
 
-    def publish_feedback(self, feedback: Any) -> None:
+    def publish_feedback(self, feedback: F) -> None:
         """Publish feedback to the client."""
 
     def succeed(self) -> None:
@@ -189,10 +208,10 @@ class Clock(Protocol):
     def now(self) -> float:
         """Return the time in seconds."""
 
-    def stamp(self) -> Any:
+    def stamp(self) -> Time:
         """Return the time as a builtin_interfaces/msg/Time, for message headers."""
 
-    def sleep(self, seconds: float) -> Awaitable[None]:
+    def sleep(self, seconds: float) -> Coroutine[Any, Any, None]:
         """Sleep without blocking. Raises CallCancelled if the node leaves the active state."""
 
 
@@ -205,31 +224,33 @@ class Transforms(Protocol):
     between the frames are known. Between two received transforms, values are interpolated.
     """
 
-    def lookup(self, target: str, source: str, *, stamp: Any = None) -> Any:
+    def lookup(
+        self, target: str, source: str, *, stamp: Time | None = None
+    ) -> TransformStamped:
         """Return the transform from ``source`` to ``target``, a TransformStamped.
 
         Raises TransformLookupError, TransformConnectivityError, TransformExtrapolationError.
         """
 
     def wait(
-        self, target: str, source: str, *, stamp: Any = None, timeout_ms: float = 5000.0
-    ) -> Awaitable[Any]:
+        self, target: str, source: str, *, stamp: Time | None = None, timeout_ms: float = 5000.0
+    ) -> Coroutine[Any, Any, TransformStamped]:
         """Wait for a transform up to the timeout, in real time, and return it.
 
         Raises what ``lookup`` raises when the time is over, and CallCancelled.
         """
 
-    def can_lookup(self, target: str, source: str, *, stamp: Any = None) -> bool:
+    def can_lookup(self, target: str, source: str, *, stamp: Time | None = None) -> bool:
         """Return whether ``lookup`` would return a transform now."""
 
-    def transform(self, message: Any, target: str) -> Any:
+    def transform(self, message: M, target: str) -> M:
         """Return a message of geometry_msgs in another frame, at the time of its header.
 
         The message is a PointStamped, Vector3Stamped, QuaternionStamped or PoseStamped; a vector is
         only rotated. Raises what ``lookup`` raises, and TypeError for other messages.
         """
 
-    def broadcast(self, child: str, transform: Any, *, stamp: Any = None) -> None:
+    def broadcast(self, child: str, transform: Transform, *, stamp: Time | None = None) -> None:
         """Broadcast the transform from a declared frame to its parent.
 
         ``transform`` is a geometry_msgs/msg/Transform; by default, ``stamp`` is the current time.
@@ -268,7 +289,7 @@ class Behavior:
     log: Logger
     clock: Clock
     transforms: Transforms  # only if the node has `transforms`
-    node: Any  # an rclpy Node for libraries that need one; what it creates follows the lifecycle
+    node: Node  # an rclpy Node for libraries that need one; what it creates follows the lifecycle
 
 
 Changes = Mapping[str, Any]

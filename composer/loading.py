@@ -1,13 +1,13 @@
 """The static pipeline: from a file to its model and all of its diagnostics.
 
-:func:`_run_pipeline` calls the stages in order. Each stage works on what the one before it
-produced, even if that has errors, so that one run shows every diagnostic.
+:func:`_resolve` and :func:`_check` call the stages in order. Each stage works on what the one
+before it produced, even if that has errors, so that one run shows every diagnostic.
 """
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Map
 from contextlib import contextmanager
 from dataclasses import field
@@ -28,7 +28,8 @@ from composer.project import SETTINGS_FILE, Project
 from composer.project.rule_selection import apply_rule_settings, check_rule_settings
 from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
-from composer.rules import Context, all_checks, run_checks
+from composer.rules import Context, all_checks, reported, run_checks
+from composer.rules.python.type_check import TypeCheck
 from composer.rules.unused.unused_ignore import without_ignored
 from composer.rules.unused.unused_node_type import unused_node_types
 from composer.schema import check_schema, kind_of, kinds
@@ -101,7 +102,7 @@ def load(
     """
     parsed, diagnostics = read_overrides(overrides)
     definitions = _Definitions.of(_real_folder(path), interfaces)
-    return _run_pipeline(_read(path, shown), definitions, parsed, diagnostics)
+    return _check([_resolve(_read(path, shown), definitions, parsed, diagnostics)])[0]
 
 
 @_without_cycle_collection()
@@ -109,13 +110,13 @@ def load_files(paths: Iterable[Path]) -> list[LoadResult]:
     """Load the files. Files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
     by_folder: dict[Path, _Definitions] = {}
-    results = []
+    resolved = []
     for path in paths:
         folder = _real_folder(path)
         if folder not in by_folder:
             by_folder[folder] = _Definitions.with_shared_interfaces(folder, shared)
-        results.append(_run_pipeline(_read(path), by_folder[folder]))
-    return results
+        resolved.append(_resolve(_read(path), by_folder[folder]))
+    return _check(resolved)
 
 
 @_without_cycle_collection()
@@ -124,7 +125,8 @@ def load_bytes(
 ) -> LoadResult:
     """Load a text, such as standard input, as if it were the file ``shown`` in ``folder``."""
     document = _Document(*parse_bytes(content, shown))
-    return _run_pipeline(document, _Definitions.of(_real_folder(folder / shown), interfaces))
+    definitions = _Definitions.of(_real_folder(folder / shown), interfaces)
+    return _check([_resolve(document, definitions)])[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,60 +183,85 @@ class _Merged:
     is_partial: bool = False
 
 
-def _run_pipeline(
+@dataclass(slots=True)
+class _Resolved:
+    """A file with its model, before the rules. ``context`` is None if there is no model."""
+
+    source: SourceFile
+    definitions: _Definitions
+    merged: _Merged
+    diagnostics: list[Diagnostic]
+    context: Context | None = None
+
+
+def _resolve(
     document: _Document,
     definitions: _Definitions,
     overrides: Overrides | None = None,
     override_diagnostics: Iterable[Diagnostic] = (),
-) -> LoadResult:
-    # Document: the caller has parsed the YAML.
-    source = document.source
-    diagnostics = [*document.diagnostics, *override_diagnostics]
-
+) -> _Resolved:
+    """Turn a file into its model."""
     # Kind, includes or inheritance, variables and copies, schema.
     merged = _merge(document, definitions)
-    diagnostics += merged.diagnostics
-
-    # Resolve: tree to model.
-    system = None
-    follow_ups: frozenset[_Identity] = frozenset()
-    if merged.expanded is not None:
-        system, found = resolve(
-            merged.expanded,
-            source,
-            definitions.node_types,
-            folders=merged.folders,
-            overrides=overrides or Overrides(),
-        )
-        diagnostics += found
-
-    # Rules: check the model.
+    diagnostics = [*document.diagnostics, *override_diagnostics, *merged.diagnostics]
+    resolved = _Resolved(document.source, definitions, merged, diagnostics)
+    if merged.expanded is None:
+        return resolved
+    system, found = resolve(
+        merged.expanded,
+        document.source,
+        definitions.node_types,
+        folders=merged.folders,
+        overrides=overrides or Overrides(),
+    )
+    diagnostics += found
     if system is not None:
         errors = tuple(
             item.primary
             for item in diagnostics
             if item.severity is Severity.ERROR or item.rule is PARAMETER_SUBSTITUTION
         )
-        context = Context(
+        resolved.context = Context(
             system,
             definitions.interfaces,
             definitions.node_types,
             errors,
             is_partial=merged.is_partial,
         )
-        diagnostics += run_checks(context)
-        diagnostics = deduplicate(diagnostics, system.nodes)
-        of_project = definitions.project.diagnostics
-        kept = without_follow_ups(diagnostics, context, of_project)
+    return resolved
+
+
+def _check(files: Sequence[_Resolved]) -> list[LoadResult]:
+    """Check the models. The type checker runs over Python code while the rules are evaluated."""
+    contexts = [item.context for item in files if item.context is not None]
+    types = TypeCheck.of(contexts)
+    try:
+        for item in files:
+            if item.context is not None:
+                item.diagnostics += run_checks(item.context)
+        return [_finish(item, types) for item in files]
+    finally:
+        types.close()
+
+
+def _finish(file: _Resolved, types: TypeCheck) -> LoadResult:
+    """Return what is reported of a file in the end."""
+    source, context = file.source, file.context
+    project = file.definitions.project
+    diagnostics = file.diagnostics
+    follow_ups: frozenset[_Identity] = frozenset()
+    if context is not None:
+        diagnostics += reported(context, types.diagnostics(context, diagnostics))
+        diagnostics = deduplicate(diagnostics, context.system.nodes)
+        kept = without_follow_ups(diagnostics, context, project.diagnostics)
         follow_ups = frozenset(map(_identity, diagnostics)).difference(map(_identity, kept))
         diagnostics = kept
 
     # Selection: comments in the files and settings of the project silence diagnostics.
-    diagnostics = add_include_labels(diagnostics, merged.included)
+    diagnostics = add_include_labels(diagnostics, file.merged.included)
     # Comments in a node type may be about rules that only apply to the systems that use it.
-    is_complete = system is not None and not system.node_type
+    is_complete = context is not None and not context.system.node_type
     kept = without_ignored(diagnostics, source, complete=is_complete)
-    project = definitions.project
     all_checks()  # import every rule, so that all names in the settings are known
     selected = [
         *apply_rule_settings(kept, project.settings),
@@ -242,13 +269,13 @@ def _run_pipeline(
         *check_rule_settings(project.settings, tuple(registered_rules())),
     ]
     return LoadResult(
-        system,
+        None if context is None else context.system,
         in_order(selected),
         source,
         project,
-        definitions.node_types,
-        definitions.interfaces,
-        merged.tree,
+        file.definitions.node_types,
+        file.definitions.interfaces,
+        file.merged.tree,
         follow_ups,
     )
 

@@ -53,8 +53,9 @@ _FOLLOWING = {
     "invalid-include": frozenset({"invalid-ros-name", "unknown-node", "unknown-port"}),
     "invalid-namespace": _OF_CONNECTIONS | {"unmatched-parameters"},
     "node-as-behavior": frozenset(
-        {"attribute-kind", "handler-signature", "handler-without-port", "missing-handler"}
-        | {"missing-return", "unknown-attribute", "unused-remapping"}
+        {"call-arguments", "handler-signature", "handler-without-port", "missing-attribute"}
+        | {"missing-handler", "missing-return", "too-early", "type-error", "unknown-attribute"}
+        | {"unused-remapping"}
     ),
     "outside-qos": frozenset({"reliable-sensor-stream", "unreliable-command"}),
     "parameter-file": frozenset({"missing-parameter"}),
@@ -65,6 +66,7 @@ _FOLLOWING = {
     "parameter-type": frozenset({"index-out-of-range", "unusual-rate"}),
     "type-mismatch": frozenset(
         {"handler-annotation", "invalid-value", "port-connected-twice", "unknown-field"}
+        | {"wrong-message-type"}
     ),
     "undeclared-parameter": frozenset({"class-parameter"}),
     "unknown-key": frozenset({"transform-source", "unused-restart"}),

@@ -8,9 +8,7 @@ from typing import TypeAlias
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.python.behaviors import behaviors
-from composer.behavior_checks.messages.frame_uses import BROADCAST, FrameUse, frame_uses
-from composer.behavior_source import BehaviorSource
+from composer.analysis.python_nodes import behaviors
 from composer.diagnostics import Label
 from composer.fast_dataclass import dataclass
 from composer.model import (
@@ -22,6 +20,8 @@ from composer.model import (
     PortKind,
     StaticTransform,
 )
+from composer.python_code.nodes.frames import BROADCAST, FrameUse, frame_uses
+from composer.python_code.source import BehaviorSource
 from composer.source import Located, Span
 from composer.spelling import vocabulary
 
@@ -141,12 +141,12 @@ def uses_of_behaviors(context: Context) -> tuple[tuple[Node, FrameUse], ...]:
     """Return the calls of ``self.transforms`` of all behaviors, with the node that they are for."""
     found: dict[object, tuple[FrameUse, ...]] = {}
     uses = []
-    for node, source in context.once(behaviors):
+    for node, source in behaviors(context):
         if not _mentions_transforms(source):
             continue
         key = (id(source), node.transforms, tuple(sorted(_texts(node).items())))
         if key not in found:
-            found[key] = tuple(frame_uses(node, source, context.interfaces))
+            found[key] = tuple(frame_uses(node, source))
         uses += [(node, use) for use in found[key]]
     return tuple(uses)
 

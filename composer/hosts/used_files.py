@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from composer.behavior_source import find_behavior
 from composer.hosts.inventory import Question
 from composer.model import BehaviorReference, Executable, System
 from composer.project import SETTINGS_FILE, Project
+from composer.python_code.source import find_behavior
 from composer.source import SourceFile
 
 _LONGEST_NAME = 256  # of a file, for Linux

@@ -8,21 +8,20 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from composer.analysis.python.class_interfaces import CREATORS
-from composer.analysis.python.hosted_classes import is_rclpy_node
-from composer.behavior_source import (
+from composer.diagnostics import suggestion
+from composer.fast_dataclass import dataclass
+from composer.importing.found import FoundNode, FoundParameter, FoundPort
+from composer.model import BehaviorReference, PortKind
+from composer.project import Project
+from composer.python_code.nodes.class_interfaces import CREATORS
+from composer.python_code.nodes.classes import is_rclpy_node
+from composer.python_code.source import (
     BehaviorSource,
     Function,
     find_behavior,
     nearby_modules,
-    top_package,
 )
-from composer.diagnostics import suggestion
-from composer.fast_dataclass import dataclass
-from composer.importing.found import FoundNode, FoundParameter, FoundPort
-from composer.importing.python_values import NotLiteral, Scope
-from composer.model import BehaviorReference, PortKind
-from composer.project import Project
+from composer.python_code.source.values import NotLiteral, Scope
 from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
@@ -65,11 +64,10 @@ def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]
     source = find_behavior(BehaviorReference(located, folder))
     _check(source, text, folder)
     reader = _ClassReader([], [], [])
-    for module, known in source.classes:
-        if top_package(module.path) != "rclpy":
-            for method in known.methods:
-                if method.node is not None:
-                    reader.read(Scope(module, known.node, method.node))
+    for module, known in source.classes_outside_ros:
+        for method in known.methods:
+            if method.node is not None:
+                reader.read(Scope(module, known.node, method.node))
     own_module, own = source.classes[0]
     place = f"{shown_path(own_module.path)}:{own.span.line}"
     comments: tuple[str, ...] = (

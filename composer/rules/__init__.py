@@ -1,13 +1,13 @@
-"""The rules: one rule, one file, in one package per subject.
+"""The rules, in one package per subject.
 
-Every module of these packages with a function ``check`` is a rule and is found automatically. Its
-``RULE`` holds the documentation (see CONTRIBUTING for how to add a rule). A check reports one kind
-of problem and skips input that is itself invalid, because another rule reports that.
+Every module of these packages with a function ``check`` is found automatically; it has one rule, or
+a few about the same subject. A rule holds its documentation (see CONTRIBUTING for how to add one).
+A check skips input that is itself invalid, because another rule reports that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -20,23 +20,24 @@ Check = Callable[[Context], Iterator[Diagnostic]]
 
 
 def run_checks(context: Context) -> list[Diagnostic]:
-    """Return the diagnostics of all rules, sorted by location.
+    """Return the diagnostics of all rules, sorted by location."""
+    found = reported(context, (item for check in all_checks() for item in check(context)))
+    return in_order(_without_repeats(found))
 
-    Locations that an earlier stage reported are skipped, and warnings on lines with its errors.
-    """
+
+def reported(context: Context, diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Leave out locations that an earlier stage reported, and warnings on lines with its errors."""
     refused = {location(span) for span in context.refused}
     refused_lines = {(file, line) for file, line, _ in refused}
-    found = [
+    return [
         with_short_values(diagnostic)
-        for check in all_checks()
-        for diagnostic in check(context)
+        for diagnostic in diagnostics
         if location(diagnostic.primary) not in refused
         and (
             diagnostic.severity is Severity.ERROR
             or location(diagnostic.primary)[:2] not in refused_lines
         )
     ]
-    return in_order(_without_repeats(found))
 
 
 def _without_repeats(found: list[Diagnostic]) -> list[Diagnostic]:
@@ -59,4 +60,4 @@ def all_checks() -> tuple[Check, ...]:
     return tuple(module.check for module in modules if hasattr(module, "check"))
 
 
-__all__ = ["Check", "Context", "all_checks", "run_checks"]
+__all__ = ["Check", "Context", "all_checks", "reported", "run_checks"]

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from composer.analysis.context import Context
-from composer.analysis.python.behaviors import (
+from composer.analysis.python_nodes import behaviors
+from composer.fast_dataclass import dataclass
+from composer.model import ImplementationKind, Node, Port, PortKind, Reaction, Timer
+from composer.python_code.nodes.behaviors import (
     GENERAL_HANDLERS,
-    behaviors,
     called_methods,
     escaping_publishers,
     handlers,
     methods_by_name,
     reached_methods,
 )
-from composer.behavior_source import BehaviorSource, Call, published_port
-from composer.fast_dataclass import dataclass
-from composer.model import ImplementationKind, Node, Port, PortKind, Reaction, Timer
+from composer.python_code.source import BehaviorSource, Call, published_port
 
 _ENTRIES = ("on_", "accept_")
 
@@ -38,7 +38,7 @@ def causes(context: Context) -> Causes:
 
     Messages that are published once, in a lifecycle transition, are ignored.
     """
-    sources = {node.name.value: source for node, source in context.once(behaviors)}
+    sources = {node.name.value: source for node, source in behaviors(context)}
     published: dict[int, Mapping[str, frozenset[str]]] = {}
     found: dict[tuple[str, str], tuple[Cause, ...]] = {}
     for node in context.system.nodes:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from composer.behavior_source import Method, find_behavior
 from composer.model import Node, PortKind, Timer
+from composer.python_code.source import Method, find_behavior
 
 
 def timer_rate_hz(node: Node, timer: Timer) -> float | None:

@@ -6,10 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.messages.expressions import ExpressionSite, expression_sites
-from composer.analysis.python.behavior_code import diagnostics_of
 from composer.analysis.spans import part_of_path
-from composer.behavior_checks.messages.elements import counted
-from composer.behavior_checks.problems import Kind
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.expressions import FieldPath
 
@@ -46,7 +43,6 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for site in context.once(expression_sites):
         for path in site.expression.paths:
             yield from _path(site, path)
-    yield from diagnostics_of(context, Kind.INDEX, RULE)
 
 
 def _path(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]:
@@ -58,9 +54,10 @@ def _path(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]:
         return
     value = parameter.value.value
     if isinstance(value, list) and not -len(value) <= index < len(value):
+        count = f"{len(value)} element" + ("" if len(value) == 1 else "s")
         yield Diagnostic(
             RULE,
-            f"parameter '{name}' has no element {index}: it has {counted(len(value))}",
+            f"parameter '{name}' has no element {index}: it has {count}",
             part_of_path(site.span, site.expression, path, 2),
             (Label(parameter.value.span, "its value"),),
             f"indices count from 0, so the last one is {len(value) - 1}" if value else None,

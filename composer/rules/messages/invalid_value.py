@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.endpoints.type_mismatches import certain_field_problems
-from composer.analysis.python.behavior_code import diagnostics_of
-from composer.behavior_checks import Kind
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 
 RULE = register(
@@ -39,8 +37,7 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Report the values that do not fit, in YAML and in behaviors."""
+    """Report the values in YAML that do not fit."""
     for problem in certain_field_problems(context):
         if not problem.missing:
             yield Diagnostic(RULE, problem.message, problem.span, hint=problem.hint)
-    yield from diagnostics_of(context, Kind.VALUE, RULE)

@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from composer.analysis.context import Context
 from composer.analysis.messages.expressions import expression_sites
-from composer.analysis.python.behaviors import behaviors
+from composer.analysis.python_nodes import behaviors
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node, Parameter
 
@@ -63,7 +63,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     }
     code = {
         node.name.value: "\n".join(module.source.text for module in source.own_modules)
-        for node, source in context.once(behaviors)
+        for node, source in behaviors(context)
     }
     for node in derived:
         # The file of a derived type comes before those of its base types.

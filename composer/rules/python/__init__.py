@@ -1,1 +1,1 @@
-"""The Python code of behaviors: syntax, imports, names and types."""
+"""The Python code of behaviors and classes: syntax, imports, names and types."""

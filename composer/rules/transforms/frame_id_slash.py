@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.frames import uses_of_behaviors
 from composer.analysis.messages.reactions import message_templates
-from composer.analysis.python.behavior_code import diagnostics_of
-from composer.behavior_checks import Kind
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Transforms
 from composer.source import Located, Span
@@ -60,7 +58,6 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for _, use in context.once(uses_of_behaviors):
         for frame in use.frames:
             yield from _text(frame.value, frame.span)
-    yield from diagnostics_of(context, Kind.FRAME, RULE)
 
 
 def _frames(transforms: Transforms) -> Iterator[Located[str]]:

@@ -10,7 +10,7 @@ class Counter:
         self.report()
         self.publishers.point.publish()
         self.count == 1
-        self.count = Point()
+        self.count = self.count + "1"
         self.publishers.point.publish(Point(x=1))
         await asyncio.sleep(0.1)
 

@@ -6,6 +6,7 @@ import time
 import rclpy
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
 
 class Talker(Node):
@@ -52,8 +53,8 @@ class Sleeper(Node):
     def __init__(self):
         super().__init__("sleeper")
         self.name = input("name: ")
-        self.client = self.create_client(None, "x")
+        self.client = self.create_client(Trigger, "x")
 
     def tick(self):
         time.sleep(0.5)
-        self.client.call(None)
+        self.client.call(Trigger.Request())

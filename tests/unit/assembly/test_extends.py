@@ -34,7 +34,7 @@ BEHAVIOR = """\
 from composer.behavior import Behavior
 class Sensor(Behavior):
     def on_tick(self):
-        self.publishers.output.publish(None)
+        self.publishers.output.publish(self.publishers.output.message_type())
 """
 SYSTEM = """\
 system: s

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from composer.analysis.python import behavior_code
-from composer.behavior_checks import CodeProblem, behavior_problems
-from composer.model import Node
 from tests.unit.support.checking import diagnostics_in, quoted
 
 
@@ -38,22 +33,6 @@ def test_installed_classes_are_not_checked(tmp_path: Path, monkeypatch: pytest.M
     assert diagnostics_in(system, tmp_path) == []
 
 
-def test_copies_of_a_node_are_checked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    checked = []
-
-    def counted(node: Node, *rest: Any) -> Iterator[CodeProblem]:
-        checked.append(node.name.value)
-        return behavior_problems(node, *rest)
-
-    monkeypatch.setattr(behavior_code, "behavior_problems", counted)
-    (tmp_path / "robot_code.py").write_text("class Code:\n    def on_tick(self):\n        self.a\n")
-    entry = "behavior: robot_code:Code, timers: {tick: {period_ms: 100}}"
-    system = f"system: a\nnodes:\n  a${{i}}: {{for_each: {{i: 20}}, {entry}}}\n"
-    [diagnostic] = diagnostics_in(system, tmp_path)
-    assert diagnostic.rule.name == "unknown-attribute"
-    assert checked == ["a0"]
-
-
 def test_the_modules_that_a_behavior_imports_are_checked_as_well(tmp_path: Path) -> None:
     files = {
         "robot_code.py": "import helper\nfrom tools import units\nclass Code:\n    pass\n",
@@ -79,16 +58,15 @@ def test_the_modules_that_a_behavior_imports_are_checked_as_well(tmp_path: Path)
     ]
 
 
-def test_a_helper_out_of_the_project_is_reported(tmp_path: Path) -> None:
-    (tmp_path / "elsewhere.py").write_text("A = 1\n")
-    project = tmp_path / "project"
-    project.mkdir()
-    (project / "composer.yaml").write_text("nodes: [.]\n")
-    (project / "helper.py").symlink_to(tmp_path / "elsewhere.py")
-    (project / "robot_code.py").write_text("import helper\nclass Code:\n    pass\n")
+def test_a_changed_helper_is_read_again(tmp_path: Path) -> None:
     system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
-    (found,) = diagnostics_in(system, project)
-    assert found.message == "module 'helper' is a symbolic link out of the project"
+    code = "import helper\n\n\nclass Code:\n    def on_configure(self):\n        helper.go()\n"
+    (tmp_path / "robot_code.py").write_text(code, encoding="utf-8")
+    (tmp_path / "helper.py").write_text("def go(speed: float) -> None: ...\n", encoding="utf-8")
+    [found] = diagnostics_in(system, tmp_path)
+    assert (found.rule.name, quoted(found)) == ("call-arguments", "()")
+    (tmp_path / "helper.py").write_text("def go() -> None: ...\n", encoding="utf-8")
+    assert diagnostics_in(system, tmp_path) == []
 
 
 @pytest.mark.parametrize(
@@ -109,5 +87,5 @@ def test_what_is_imported_by_name_is_not_its_module(
     (tmp_path / "robot_code.py").write_text(code, encoding="utf-8")
     system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
     reported = [item for item in diagnostics_in(system, tmp_path) if item.rule.code != "RC434"]
-    assert [item.rule.name for item in reported] == ["unknown-attribute"] * bool(attribute)
+    assert [item.rule.name for item in reported] == ["missing-attribute"] * bool(attribute)
     assert [quoted(item) for item in reported] == [attribute] * bool(attribute)

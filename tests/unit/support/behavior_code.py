@@ -1,17 +1,12 @@
-"""A behavior with places for statements, and the diagnostics in it."""
+"""A behavior with places for statements."""
 
 from __future__ import annotations
-
-from pathlib import Path
-
-from composer.diagnostics import Diagnostic
-from tests.unit.support.checking import diagnostics_in
 
 SYSTEM = """\
 system: demo
 nodes:
   robot:
-    behavior: robot_code:Code
+    behavior: code:Code
     parameters:
       speed: {type: double, default: 1.0}
       names: {type: string_array, default: [a]}
@@ -168,12 +163,11 @@ async def wait(stamp: Time):
 PLACES = ("odometry", "reset", "drive", "configure", "follow", "function")
 
 
-def found(place: str, statement: str, folder: Path) -> list[Diagnostic]:
-    """Return the diagnostics in the code with ``statement`` in ``place``."""
+def code_with(place: str, statement: str) -> str:
+    """Return the code with ``statement`` in ``place``."""
     code = CODE
     for other in PLACES:
         text = statement if other == place else "pass"
         indentation = "    " if other == "function" else "        "
         code = code.replace(f"{{{other}}}", text.replace("\n", f"\n{indentation}"))
-    (folder / "robot_code.py").write_text(code, encoding="utf-8")
-    return diagnostics_in(SYSTEM, folder)
+    return code

@@ -1,1 +1,0 @@
-"""The Python files of behaviors and classes, read as syntax and never imported."""

@@ -1,1 +1,0 @@
-"""Attributes that do not exist, are misspelled, or change their type."""

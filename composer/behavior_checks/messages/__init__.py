@@ -1,1 +1,0 @@
-"""Values that are stored in messages and sent."""

@@ -1,1 +1,0 @@
-"""Operations and statements that fail or have no effect."""

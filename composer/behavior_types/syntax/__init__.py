@@ -1,1 +1,0 @@
-"""What Python files say, read without types: names, bindings, classes and their attributes."""

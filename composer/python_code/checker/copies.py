@@ -1,0 +1,267 @@
+"""Copies of Python files in which classes know their surroundings.
+
+In a copy, a behavior derives from the generated base class of its node type, and arguments of
+handlers and of rclpy callbacks without an annotation get one. Places in it are mapped back.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import field
+from typing import TypeGuard
+
+from composer.fast_dataclass import dataclass
+from composer.python_code.checker.callbacks import callback_signatures
+from composer.python_code.source import Function, Module
+from composer.python_code.source.method_body import dotted, is_none
+from composer.python_code.source.spans import characters
+from composer.python_code.stubs.behaviors import Signature
+
+#: The line that a copy gets, so that annotations can name what they need.
+_IMPORTS = "import composer.behavior, composer.typed, rclpy.action, rclpy.task, typing"
+
+
+@dataclass(frozen=True, slots=True)
+class ClassEdit:
+    """What a class of the project gets: a base class, "" for none, and signatures by method."""
+
+    base: str = ""
+    signatures: Mapping[str, Signature] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Copy:
+    """The text of a copy, and how its lines and columns relate to those of the original file."""
+
+    module: Module
+    text: str
+    inserted_lines: tuple[int, ...]  # of the copy, in order
+    columns: Mapping[int, list[tuple[int, int]]]  # of original lines: column, length
+
+    def is_inserted(self, line: int, column: int) -> bool:
+        """Return whether the original lacks what is at a place of the copy."""
+        places = self.columns.get(self._original_line(line), ())
+        is_inside = any(start <= column < start + length for start, length in places)
+        return line in self.inserted_lines or is_inside
+
+    def _original_line(self, line: int) -> int:
+        return max(line - sum(inserted <= line for inserted in self.inserted_lines), 1)
+
+    def place(self, line: int, column: int) -> tuple[int, int]:
+        """Return the line and column in the original, counted from 1."""
+        line = self._original_line(line)
+        shift = sum(length for start, length in self.columns.get(line, ()) if start <= column)
+        return line, max(column - shift, 1)
+
+
+def edited_copy(
+    module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool
+) -> Copy:
+    """Return the copy of a file. ``classes`` are its classes with a known surrounding."""
+    edits = _Edits(list(module.source.text.split("\n")))
+    names: set[str] = set()
+    for class_ in module.classes.values():
+        edits.remove_unset_attributes(class_.node, stays_none=is_behavior)
+        edit = classes.get(class_.name, ClassEdit())
+        if edit.base and edit.base.rpartition(".")[2] not in class_.bases:
+            edits.add_base(class_.node, edit.base)
+        signatures = {**callback_signatures(class_.node, module), **edit.signatures}
+        for method in class_.methods:
+            signature = signatures.get(method.name)
+            if signature is not None and method.node is not None:
+                edits.annotate(method.node, signature)
+                names.update(_interface_modules(signature))
+    imports = ", ".join((_IMPORTS, *sorted(names)))
+    edits.added.append((_lines_of_head(module.tree), imports))
+    lines, columns = edits.apply()
+    inserted = []
+    for number, (after, text) in enumerate(sorted(edits.added)):
+        lines.insert(after + number, text)
+        inserted.append(after + number + 1)
+    return Copy(module, "\n".join(lines), tuple(inserted), columns)
+
+
+@dataclass(slots=True)
+class _Edits:
+    """Texts to insert, by line and column: lines from 1, columns from 0, in characters."""
+
+    lines: list[str]
+    insertions: list[tuple[int, int, str]] = field(default_factory=list)
+    added: list[tuple[int, str]] = field(default_factory=list)  # lines, after a number of lines
+
+    def remove_unset_attributes(self, node: ast.ClassDef, *, stays_none: bool) -> None:
+        """Remove ``self.last = None`` from the constructor if another method sets a value.
+
+        Otherwise the checker takes None as the type of the attribute, whatever the others set. If
+        ``stays_none``, a method of its own says that the value may be None.
+        """
+        set_elsewhere = set(_attributes_set(node))
+        unset = [item for item in _constructor(node) if _is_unset(item, set_elsewhere)]
+        for item in unset:
+            line = self.lines[item.lineno - 1]
+            start, end = item.col_offset, item.end_col_offset or item.col_offset
+            self.lines[item.lineno - 1] = line[:start] + "pass".ljust(end - start) + line[end:]
+        if unset and stays_none:
+            indentation = " " * node.body[0].col_offset
+            statements = "; ".join(f"{ast.unparse(item.targets[0])} = none" for item in unset)
+            method = f"{indentation}def _composer_unset(self, none: None): {statements}"
+            self.added.append((node.end_lineno or node.lineno, method))
+
+    def apply(self) -> tuple[list[str], Mapping[int, list[tuple[int, int]]]]:
+        """Return the changed lines, and for each line what was inserted where in the result."""
+        columns: dict[int, list[tuple[int, int]]] = {}
+        lines = list(self.lines)
+        shifts: dict[int, int] = {}
+        for line, column, text in sorted(self.insertions):
+            at = column + shifts.get(line, 0)
+            old = lines[line - 1]
+            lines[line - 1] = old[:at] + text + old[at:]
+            columns.setdefault(line, []).append((at + 1, len(text)))
+            shifts[line] = shifts.get(line, 0) + len(text)
+        return lines, columns
+
+    def add_base(self, node: ast.ClassDef, base: str) -> None:
+        """Add the first base class of a class."""
+        given = [*node.bases, *(item.value for item in node.keywords)]
+        if node.bases:
+            first = min(given, key=lambda item: (item.lineno, item.col_offset))
+            self._insert(first.lineno, first.col_offset, f"{base}, ")
+            return
+        line = self.lines[node.lineno - 1]
+        name_ends = line.index(node.name, line.index("class") + len("class")) + len(node.name)
+        rest = line[name_ends:].lstrip()
+        if not rest.startswith("("):
+            self.insertions.append((node.lineno, name_ends, f"({base})"))
+        else:
+            comma = ", " if node.keywords else ""
+            at = line.index("(", name_ends) + 1
+            self.insertions.append((node.lineno, at, f"{base}{comma}"))
+
+    def annotate(self, function: Function, signature: Signature) -> None:
+        """Annotate the arguments of a method, and its result."""
+        arguments = [*function.args.posonlyargs, *function.args.args]
+        if not any(_is_static(decorator) for decorator in function.decorator_list):
+            arguments = arguments[1:]
+        without_default = len(arguments) - len(function.args.defaults)
+        assigned = _assigned_names(function)
+        pairs = zip(arguments, signature.arguments, strict=False)
+        for index, (argument, (_, type_)) in enumerate(pairs):
+            # An argument that the method assigns itself may get a value of another type.
+            end = argument.end_lineno or argument.lineno, argument.end_col_offset or 0
+            if argument.annotation is not None:
+                self._insert(*end, _type_arguments(argument.annotation, type_))
+            elif type_ and argument.arg not in assigned and index < without_default:
+                self._insert(*end, f": {type_}")
+        if function.returns is None and signature.result not in ("", "None"):
+            place = _end_of_signature(function, self.lines)
+            if place is not None:
+                self.insertions.append((*place, f" -> {signature.result}"))
+
+    def _insert(self, line: int, size_bytes: int, text: str) -> None:
+        if not text:
+            return
+        column = characters(self.lines[line - 1], size_bytes)
+        self.insertions.append((line, column, text))
+
+
+def _constructor(node: ast.ClassDef) -> list[ast.stmt]:
+    """Return the statements of the constructor of a class."""
+    found = (item for item in node.body if getattr(item, "name", "") == "__init__")
+    return next((item.body for item in found if isinstance(item, ast.FunctionDef)), [])
+
+
+def _attributes_set(node: ast.ClassDef) -> Iterator[str]:
+    """Yield the attributes that methods set to something else than None."""
+    for item in ast.walk(node):
+        if isinstance(item, ast.Assign) and not is_none(item.value):
+            yield from (dotted(target) for target in item.targets)
+
+
+def _is_unset(statement: ast.stmt, attributes: Container[str]) -> TypeGuard[ast.Assign]:
+    """Return whether a statement is ``self.name = None`` for one of the attributes."""
+    match statement:
+        case ast.Assign(targets=[ast.Attribute() as target], value=ast.Constant(value=None)):
+            is_one_line = statement.end_lineno == statement.lineno
+            return is_one_line and dotted(target) in attributes
+    return False
+
+
+def _interface_modules(signature: Signature) -> Iterator[str]:
+    """Yield the modules that the types of a signature name: ``geometry_msgs.msg``."""
+    for _, type_ in (*signature.arguments, ("", signature.result)):
+        for name in type_.replace("[", " ").replace("]", " ").replace(",", " ").split():
+            parts = name.split(".")
+            if len(parts) > 2 and parts[1] in ("msg", "srv", "action"):
+                yield ".".join(parts[:2])
+
+
+def _type_arguments(annotation: ast.expr, type_: str) -> str:
+    """Return what an annotation such as ``ServerGoalHandle`` lacks: the types in brackets."""
+    name, bracket, rest = type_.partition("[")
+    is_same = dotted(annotation).rpartition(".")[2] == name.rpartition(".")[2]
+    return f"{bracket}{rest}" if is_same else ""
+
+
+def _is_static(decorator: ast.expr) -> bool:
+    return isinstance(decorator, ast.Name) and decorator.id == "staticmethod"
+
+
+def _assigned_names(function: Function) -> frozenset[str]:
+    return frozenset(
+        node.id
+        for node in ast.walk(function)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    )
+
+
+def _end_of_signature(function: Function, lines: list[str]) -> tuple[int, int] | None:
+    """Return the place after the closing parenthesis of a function, None if it is not found.
+
+    It is the last one before the first statement; the colon that follows it ends the signature.
+    """
+    first = function.body[0]
+    start = min([first.lineno, *(item.lineno for item in getattr(first, "decorator_list", ()))])
+    for number in range(start, function.lineno - 1, -1):
+        line = lines[number - 1]
+        if number == start:
+            is_same_line = start == function.lineno
+            line = line[: characters(line, first.col_offset)] if is_same_line else ""
+        code = line.partition("#")[0].rstrip()
+        if code.endswith(":") and code[:-1].rstrip().endswith(")"):
+            return number, len(code[:-1].rstrip())
+    return None
+
+
+def _lines_of_head(tree: ast.Module) -> int:
+    """Return the number of lines before the first statement that may follow an import."""
+    last = 0
+    for statement in tree.body:
+        is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+        is_future = isinstance(statement, ast.ImportFrom) and statement.module == "__future__"
+        if not (is_docstring or is_future):
+            break
+        last = statement.end_lineno or last
+    return last
+
+
+def unchanged_copy(module: Module) -> Copy:
+    """Return a copy without changes."""
+    return Copy(module, module.source.text, (), {})
+
+
+def modules_named(copies: Iterable[Copy]) -> frozenset[str]:
+    """Return the top-level packages that files import or name in annotations."""
+    return frozenset(
+        word
+        for copy in copies
+        for node in ast.walk(copy.module.tree)
+        for word in _imported(node)
+    )
+
+
+def _imported(node: ast.AST) -> Iterator[str]:
+    if isinstance(node, ast.Import):
+        yield from (item.name.partition(".")[0] for item in node.names)
+    elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        yield node.module.partition(".")[0]

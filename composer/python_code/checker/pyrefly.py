@@ -1,0 +1,197 @@
+"""Runs pyrefly, a type checker from PyPI, in a process of its own under limits."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from composer.fast_dataclass import dataclass
+
+#: Kinds that the composer checks itself, or that say nothing about what happens at run time.
+_IGNORED = (
+    "bad-override-param-name",
+    "deprecated",
+    "implicit-import",
+    "missing-import",
+    "missing-source",
+    "missing-source-for-stubs",
+    "not-required-key-access",
+    "redundant-cast",
+    "redundant-condition",
+    "unnecessary-type-conversion",
+    "untyped-import",
+)
+#: Kinds that are off by default and point to mistakes.
+_REPORTED = ("incompatible-comparison", "invalid-format-spec", "unreachable-except-clause")
+_WALL_S = 60.0
+_LIMITS = {
+    resource.RLIMIT_CPU: 60,  # seconds
+    resource.RLIMIT_AS: 3_000_000_000,  # bytes; it maps far more than it uses
+    resource.RLIMIT_FSIZE: 16_000_000,
+    resource.RLIMIT_CORE: 0,
+}
+#: The checker parses newer syntax than an old interpreter does.
+PYTHON_VERSION = max(sys.version_info[:2], (3, 12))
+
+
+class CheckerFailed(Exception):
+    """The checker cannot run or has no result; the message is the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What the checker says about a place in a file; lines and columns count from 1."""
+
+    path: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+    kind: str
+    message: str
+
+
+@dataclass(slots=True)
+class Check:
+    """A check that runs in the background."""
+
+    _folder: tempfile.TemporaryDirectory[str]
+    _process: subprocess.Popen[bytes]
+    _output: Path
+    _errors: Path
+
+    def result(self) -> list[Finding]:
+        """Wait for the findings. Raises CheckerFailed."""
+        try:
+            self._process.wait(timeout=_WALL_S)
+        except subprocess.TimeoutExpired:
+            raise CheckerFailed(f"it took longer than {_WALL_S:.0f} s") from None
+        finally:
+            output, errors = _read(self._output), _read(self._errors)
+            self.close()
+        return _findings(output, errors, self._process.returncode)
+
+    def close(self) -> None:
+        """End the process and remove its files."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        self._folder.cleanup()
+
+
+def start_check(
+    files: Mapping[str, str], checked: Iterable[str], search_paths: Iterable[str]
+) -> Check:
+    """Write the files into a private folder and start the checker. Raises CheckerFailed.
+
+    ``checked`` are the files to report about, ``search_paths`` the folders to import from. All
+    are relative to the private folder.
+    """
+    program = _program()
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise CheckerFailed(f"no temporary folder: {error.strerror}") from None
+    root = Path(folder.name)
+    try:
+        for name, text in files.items():
+            path = root / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text.encode(errors="surrogateescape"))
+        (root / "pyrefly.toml").touch()  # otherwise it looks for settings in the folders above
+        output = root / "output.json"
+        errors = root / "errors.txt"
+        command = [program, *_options(search_paths), "--", *checked]
+        with output.open("wb") as stream, errors.open("wb") as error_stream:
+            process = subprocess.Popen(  # noqa: S603 (a program that is installed with the composer)
+                command,
+                cwd=root,
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=error_stream,
+                env=_environment(root),
+            )
+    except OSError as error:
+        folder.cleanup()
+        raise CheckerFailed(f"it cannot be started: {error.strerror}") from None
+    _limit(process.pid)
+    return Check(folder, process, output, errors)
+
+
+def _program() -> str:
+    """Return the program that was installed with this Python."""
+    beside = Path(sysconfig.get_path("scripts"), "pyrefly")
+    found = str(beside) if beside.is_file() else shutil.which("pyrefly", path=os.defpath)
+    if found is None:
+        raise CheckerFailed("pyrefly is not installed: 'pip install pyrefly'")
+    return found
+
+
+def _options(search_paths: Iterable[str]) -> list[str]:
+    version = ".".join(map(str, PYTHON_VERSION))
+    # The interpreter is not asked for its paths: with the ros wheels it starts twice.
+    options = ["check", "--output-format=json", "--summary=none", "--color=never", "--threads=2"]
+    options += [f"--python-version={version}", "--skip-interpreter-query"]
+    # A list that is empty at first may get publishers of several types.
+    options += ["--infer-with-first-use=false"]
+    options += ["--disable-search-path-heuristics=true", "--use-ignore-files=false"]
+    options += [f"--ignore={kind}" for kind in _IGNORED]
+    options += [f"--error={kind}" for kind in _REPORTED]
+    options += [f"--search-path={path}" for path in search_paths]
+    paths = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
+    paths |= dict.fromkeys(path for path in sys.path if path.endswith("-packages"))
+    return [*options, *(f"--site-package-path={path}" for path in paths if Path(path).is_dir())]
+
+
+def _environment(root: Path) -> dict[str, str]:
+    """Return the environment of the checker: nothing of the user's settings."""
+    return {"HOME": str(root), "PATH": os.defpath, "LANG": "C.UTF-8", "TMPDIR": str(root)}
+
+
+def _limit(process: int) -> None:
+    """Limit what a process may use, where the operating system can."""
+    if hasattr(resource, "prlimit"):
+        for kind, limit in _LIMITS.items():
+            with suppress(OSError):  # it may have ended
+                resource.prlimit(process, kind, (limit, limit))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
+    if code < 0:
+        raise CheckerFailed(f"it was ended by {signal.Signals(-code).name}")
+    try:
+        items: list[dict[str, Any]] = json.loads(output)["errors"]
+        return [
+            Finding(
+                item["path"],
+                item["line"],
+                item["column"],
+                item["stop_line"],
+                item["stop_column"],
+                item["name"],
+                item["description"],
+            )
+            for item in items
+            if item.get("severity", "error") in ("error", "warn")
+        ]
+    except (ValueError, KeyError, TypeError):
+        lines = errors.decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
+        raise CheckerFailed(f"it failed: {lines[-1][:200]}") from None

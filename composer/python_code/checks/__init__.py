@@ -1,0 +1,33 @@
+"""What a type checker cannot find in users' Python: values, callbacks, and uses of the API."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.interfaces import Interfaces
+from composer.model import Node
+from composer.python_code.checks.behaviors import behavior_problems
+from composer.python_code.checks.callbacks import callback_problems
+from composer.python_code.checks.messages import message_problems
+from composer.python_code.checks.methods import missing_returns, missing_self, unused_values
+from composer.python_code.checks.node_classes import node_class_problems
+from composer.python_code.checks.scopes import Code
+from composer.python_code.problems import Problem
+from composer.python_code.source import BehaviorSource
+
+__all__ = ["code_problems"]
+
+
+def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) -> Iterator[Problem]:
+    """Yield the problems of a behavior or of an rclpy class, in the project's files."""
+    code = Code(node, source, interfaces)
+    for scope in code.scopes:
+        yield from message_problems(scope)
+        yield from callback_problems(scope)
+        yield from unused_values(scope)
+    yield from missing_self(code)
+    if node.behavior is not None:
+        yield from behavior_problems(code)
+        yield from missing_returns(code)
+    else:
+        yield from node_class_problems(code)

@@ -1,0 +1,125 @@
+"""Uses of the API of behaviors: too early, with unknown keys, or awaited without need."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+
+from composer.diagnostics import shown, suggestion
+from composer.python_code.checks.scopes import Code, Scope
+from composer.python_code.nodes.behaviors import reached_methods
+from composer.python_code.problems import Family, Problem
+from composer.python_code.source import Method, published_port
+from composer.python_code.source.method_body import argument, dotted
+from composer.python_code.source.spans import span_of
+from composer.python_code.source.traversal import walk
+from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
+
+#: The attributes that the composer sets after the constructor.
+_SET_LATER = frozenset({"clock", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES})
+#: How a goal of an action client ends.
+_STATUS = ("succeeded", "canceled", "aborted")
+_DEFERRED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
+#: Texts that show that a file may run an event loop of asyncio, such as in a thread.
+_RUNS_ASYNCIO = ("asyncio.run", "run_until_complete", "run_forever", "asyncio.Runner")
+
+
+def behavior_problems(code: Code) -> Iterator[Problem]:
+    """Yield the wrong uses of the API in a behavior."""
+    yield from _early_attributes(code)
+    for name in ("on_configure", "on_cleanup"):
+        method = code.source.method(name)
+        for reached in reached_methods(code.source, method) if method is not None else ():
+            yield from _early_calls(name, reached, code)
+    for scope in code.scopes:
+        for node in scope.nodes:
+            match node:
+                case ast.Await(value=ast.Call() as call):
+                    yield from _awaited(call, scope)
+                case ast.Subscript(value=ast.Attribute() as owner, slice=index):
+                    yield from _key(dotted(owner), index, scope)
+                case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
+                    value, words = scope.constant(right), _words(left, scope)
+                    if isinstance(value, str) and words and value not in words:
+                        message, hint = (
+                            f"the value is never '{shown(value)}'",
+                            suggestion(value, words),
+                        )
+                        yield scope.doubt(message, right, hint)
+
+
+def _early_attributes(code: Code) -> Iterator[Problem]:
+    """Yield what a constructor reads although the composer sets it later."""
+    constructor = code.source.method("__init__")
+    names = _SET_LATER - code.assigned - {method.name for method in code.source.methods}
+    for method in reached_methods(code.source, constructor) if constructor is not None else ():
+        nodes = list(walk(method.node.body if method.node else [], closed=_DEFERRED))
+        # A class may be used without the composer, and ask for what is there.
+        if any(isinstance(x, ast.Try) or getattr(x, "id", "") == "hasattr" for x in nodes):
+            continue
+        for node in nodes:
+            match node:
+                case ast.Attribute(value=ast.Name(id="self"), attr=name) if name in names:
+                    message = f"'self.{name}' is not set in the constructor"
+                    span = span_of(node, method.span.file)
+                    yield Problem(Family.EARLY, message, span, "move this to on_configure")
+                    return  # the others have the same cause
+
+
+def _early_calls(handler: str, method: Method, code: Code) -> Iterator[Problem]:
+    """Yield what a method sends, called by a handler while the node is not active."""
+    nodes = walk([method.node] if method.node is not None else [])
+    if any(isinstance(node, ast.Try | ast.If) for node in nodes):
+        return  # it may know
+    for call in method.calls:
+        group, _, rest = call.name.removeprefix("self.").partition(".")
+        port = code.node.port(rest.partition(".")[0]) if group in PORT_ATTRIBUTES else None
+        if port is None or port.always_on or call.deferred:
+            continue
+        message = f"'{handler}' runs while the node is not active: "
+        hint = "move it to on_activate"
+        if published_port(call.name) is not None:
+            message += "the message is dropped"
+            yield Problem(Family.EARLY, message, call.span, hint, is_certain=False)
+        elif call.name.endswith((".call", ".send_goal")):
+            message += "this raises CallCancelled"
+            yield Problem(Family.EARLY, message, call.span, hint)
+
+
+def _awaited(call: ast.Call, scope: Scope) -> Iterator[Problem]:
+    full = scope.full_name(call.func)
+    is_pause = scope.constant(argument(call, 0, "delay")) == 0  # that needs no event loop
+    text = scope.module.source.text
+    if full.startswith("asyncio.") and not is_pause and not any(x in text for x in _RUNS_ASYNCIO):
+        message = f"'{full}' needs the event loop of asyncio, which does not run here"
+        hint = "use self.clock.sleep" if full == "asyncio.sleep" else None
+        yield scope.problem(Family.ASYNCIO, message, call.func, hint)
+
+
+def _key(owner: str, index: ast.expr, scope: Scope) -> Iterator[Problem]:
+    """Yield the constant keys of ports and parameters that the node does not have."""
+    node, key = scope.code.node, scope.constant(index)
+    section = owner.removeprefix("self.") if scope.method is not None and node.complete else ""
+    kind, names = "parameter", [item.name.value for item in node.parameters]
+    if section in PORT_ATTRIBUTES:
+        kind = PORT_ATTRIBUTES[section].value
+        names = [item.name.value for item in node.ports_of(PORT_ATTRIBUTES[section])]
+    elif owner != "self.parameters":
+        return
+    if isinstance(key, str) and key not in names:
+        message = f"the node has no {kind} '{key}'"
+        yield scope.problem(Family.PORT, message, index, suggestion(key, names))
+
+
+def _words(node: ast.expr, scope: Scope) -> Sequence[str]:
+    """Return the texts that a parameter with choices, or the status of a goal, may be."""
+    match node:
+        case ast.Attribute(value=ast.Attribute(value=ast.Name(id="self"), attr="parameters")):
+            parameter = scope.code.node.parameter(node.attr)
+            if parameter is not None and parameter.choices is not None:
+                return [str(choice) for choice in parameter.choices.value]
+        case ast.Attribute(value=ast.Name(id=name), attr="status"):
+            match scope.value(name):
+                case ast.Await(value=ast.Call(func=ast.Attribute(attr="result"))):
+                    return _STATUS
+    return ()

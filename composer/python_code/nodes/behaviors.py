@@ -1,0 +1,183 @@
+"""Behaviors read as syntax: their handlers, calls and unbound methods."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+from composer.fast_dataclass import dataclass
+from composer.model import BehaviorReference, Node, Parameter, Port, PortKind, System
+from composer.python_code.source import BehaviorSource, Call, Method, find_behavior
+from composer.resolve.tree_values import is_opaque
+from composer.source import Located
+
+#: A node that names a behavior, and the source of the behavior.
+NodeBehavior: TypeAlias = tuple[Node, BehaviorSource]
+
+#: Handlers that every behavior may have, with the arguments they are called with.
+GENERAL_HANDLERS: Mapping[str, tuple[str, ...]] = {
+    "on_configure": (),
+    "on_activate": (),
+    "on_deactivate": (),
+    "on_cleanup": (),
+    "on_shutdown": (),
+    "on_error": ("cause",),
+    "on_parameters": ("changes",),
+}
+
+_ARGUMENTS: Mapping[PortKind, tuple[str, ...]] = {
+    PortKind.SUBSCRIPTION: ("message",),
+    PortKind.SERVICE: ("request", "response"),
+    PortKind.ACTION_SERVER: ("goal",),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Handler:
+    """A method that the behavior may define for a port or a timer.
+
+    ``needed`` is true if the port or timer has no reaction of its own.
+    """
+
+    name: str
+    of: Located[str]  # the port's or timer's name
+    kind: str  # "subscription", "timer", ...
+    arguments: tuple[str, ...]
+    needed: bool
+
+
+def behaviors(system: System) -> tuple[NodeBehavior, ...]:
+    """Return every node that names a behavior, with its source; each file is read once."""
+    read: dict[tuple[str, Path], BehaviorSource] = {}
+    pairs = []
+    for node in system.nodes:
+        reference = node.behavior
+        if reference is None or not _is_readable(reference):
+            continue
+        key = (reference.text.value, reference.folder)
+        if key not in read:
+            read[key] = find_behavior(reference)
+        pairs.append((node, read[key]))
+    return tuple(pairs)
+
+
+def distinct_behaviors(pairs: Iterable[NodeBehavior]) -> tuple[NodeBehavior, ...]:
+    """Return one node for each behavior and each set of ports, timers and parameters it is used in.
+
+    Hundreds of copies of a node are equal in all that a rule about Python code needs.
+    """
+    first: dict[object, NodeBehavior] = {}
+    for node, source in pairs:
+        ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
+        parameters = tuple(map(_kind_of, node.parameters))
+        timers = tuple(timer.name.value for timer in node.timers)
+        key = (id(source), node.complete, ports, parameters, timers)
+        first.setdefault(key, (node, source))
+    return tuple(first.values())
+
+
+def _kind_of(parameter: Parameter) -> tuple[object, ...]:
+    """Return what the code may depend on: also the length of a list, and which choice is set."""
+    value = None if parameter.value is None else parameter.value.value
+    is_choice = parameter.choices is not None and isinstance(value, str)
+    known = len(value) if isinstance(value, list) else value if is_choice else None
+    return parameter.name.value, parameter.type.value, known
+
+
+def complete_behaviors(pairs: Iterable[NodeBehavior]) -> tuple[NodeBehavior, ...]:
+    """Return the nodes whose behavior is known completely, with its source."""
+    return tuple(
+        (node, source)
+        for node, source in pairs
+        if source.class_found and source.complete and node.complete
+    )
+
+
+def handlers(node: Node) -> Iterator[Handler]:
+    """Yield the handlers for the ports and timers of a node."""
+    for port in node.ports:
+        arguments = _ARGUMENTS.get(port.kind)
+        if arguments is None:
+            continue
+        yield Handler(f"on_{port.name}", port.name, port.kind.value, arguments, _is_needed(port))
+        if port.kind is PortKind.ACTION_SERVER:
+            yield Handler(f"accept_{port.name}", port.name, port.kind.value, ("request",), False)
+    for timer in node.timers:
+        needed = timer.reaction is None
+        yield Handler(f"on_{timer.name}", timer.name, "timer", (), needed)
+
+
+def _is_needed(port: Port) -> bool:
+    if port.kind is PortKind.ACTION_SERVER and (port.result or port.feedback):
+        return False
+    return not port.reactions
+
+
+def _is_readable(reference: BehaviorReference) -> bool:
+    """Return whether the class can be looked up; a missing one is reported by a rule."""
+    return bool(reference.class_name) and not is_opaque(reference.text.value)
+
+
+_PREFIXES = ("on_", "accept_")
+
+
+def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
+    """Return the methods called ``on_...`` or ``accept_...`` that nothing calls.
+
+    One that the code itself uses, such as ``on_feedback=self.on_progress``, is not a handler.
+    """
+    called = {handler.name for handler in handlers(node)} | GENERAL_HANDLERS.keys()
+    unbound = [
+        method
+        for method in source.methods
+        if method.name.startswith(_PREFIXES) and method.name not in called
+    ]
+    if not unbound:
+        return []
+    used = {
+        inner.attr
+        for module in source.own_modules
+        for inner in ast.walk(module.tree)
+        if isinstance(inner, ast.Attribute)
+    }
+    return [method for method in unbound if method.name not in used]
+
+
+def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:
+    """Yield the calls of ``method``, and those of the methods of its class that it calls."""
+    for reached in reached_methods(source, method):
+        yield from reached.calls
+
+
+def escaping_publishers(source: BehaviorSource) -> frozenset[str]:
+    """Return the publishers that the behavior passes on or stores; their uses are unknown."""
+    return frozenset(port for method in source.methods for port in method.publishing.passed_on)
+
+
+def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
+    """Yield ``methods`` and those of their class that they call, directly or through others."""
+    pending, seen = list(methods), {method.name for method in methods}
+    known = methods_by_name(source)
+    while pending:
+        current = pending.pop()
+        yield current
+        for callee in called_methods(current, known):
+            if callee.name not in seen:
+                seen.add(callee.name)
+                pending.append(callee)
+
+
+def methods_by_name(source: BehaviorSource) -> Mapping[str, Method]:
+    """Return the methods as ``source.method`` finds them, for many look-ups."""
+    return {method.name: method for method in reversed(source.methods)}
+
+
+def called_methods(method: Method, known: Mapping[str, Method]) -> Iterator[Method]:
+    """Yield those of the ``known`` methods of its class that ``method`` itself calls at once."""
+    for call in method.calls:
+        is_own = call.name.startswith("self.") and not call.deferred
+        callee = known.get(call.name.removeprefix("self.")) if is_own else None
+        if callee is not None:
+            yield callee

@@ -1,0 +1,26 @@
+"""Python files of behaviors and classes, parsed instead of imported.
+
+Validation must not run user code, and must work without ROS. So classes, methods and arguments are
+read from the syntax tree. What syntax does not determine (a base class in another package, a class
+decorator, ``__getattr__``) is marked as unknown, and rules do not report it as missing.
+"""
+
+from composer.python_code.source.lookup import BehaviorSource, find_behavior, imported_from
+from composer.python_code.source.method_body import Call, Function
+from composer.python_code.source.nearby_modules import NearbyModules, nearby_modules
+from composer.python_code.source.publishing import published_port
+from composer.python_code.source.syntax import Class, Method, Module
+
+__all__ = [
+    "BehaviorSource",
+    "Call",
+    "Class",
+    "Function",
+    "Method",
+    "Module",
+    "NearbyModules",
+    "find_behavior",
+    "imported_from",
+    "nearby_modules",
+    "published_port",
+]

@@ -1,0 +1,161 @@
+"""Stubs of node types: for each, the base class of its behavior with its ports and handlers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+from composer.fast_dataclass import dataclass
+from composer.interfaces import Action, Interfaces, Message, Service
+from composer.model import Node, Port, PortKind
+from composer.python_code.stubs.messages import python_name
+from composer.typed import SUFFIX
+
+#: The types of parameters in Python.
+PARAMETER_TYPES: Mapping[str, str] = {
+    "bool": "bool",
+    "integer": "int",
+    "double": "float",
+    "string": "str",
+    "byte_array": "list[bytes]",
+    "bool_array": "list[bool]",
+    "integer_array": "list[int]",
+    "double_array": "list[float]",
+    "string_array": "list[str]",
+}
+_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
+#: The attributes of a behavior with ports, and the kinds of port in them.
+PORT_ATTRIBUTES: Mapping[str, PortKind] = {
+    "publishers": PortKind.PUBLISHER,
+    "clients": PortKind.CLIENT,
+    "action_clients": PortKind.ACTION_CLIENT,
+}
+_DEFINITIONS = {"topic": Message, "service": Service, "action": Action}
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The arguments of a handler by name, with their types, and the type of its result."""
+
+    arguments: tuple[tuple[str, str], ...] = ()
+    result: str = "None"
+
+
+def behavior_class_name(name: str) -> str:
+    """Return the name of the base class for a node type: ``SensorDriverBehavior``."""
+    words = re.split(r"_+", name)
+    return "".join(word[:1].upper() + word[1:] for word in words) + SUFFIX
+
+
+def behavior_module(classes: Mapping[str, Node], interfaces: Interfaces) -> str:
+    """Return the stub of ``composer.typed`` with the given classes by name."""
+    lines = [line for name, node in classes.items() for line in _class(name, node, interfaces)]
+    used = sorted(set(re.findall(r"\b([a-z]\w*\.(?:msg|srv|action))\.[A-Z]", "\n".join(lines))))
+    head = [
+        "from collections.abc import Awaitable",
+        "from typing import Any, Literal, overload",
+        "",
+        "import composer.behavior",
+        *(f"import {module}" for module in used),
+        "",
+    ]
+    return "\n".join((*head, *lines, ""))
+
+
+def port_type(port: Port, interfaces: Interfaces) -> str | None:
+    """Return the Python name of a port's type, None if it is unknown."""
+    name = port.interface.value
+    definition = interfaces.find(name)
+    expected = _DEFINITIONS[port.kind.channel.value]
+    return python_name(name) if isinstance(definition, expected) else None
+
+
+def signatures(node: Node, interfaces: Interfaces) -> dict[str, Signature]:
+    """Return the handlers that the behavior of a node may have."""
+    found = {f"on_{timer.name.value}": Signature() for timer in node.timers}
+    for port in node.ports:
+        type_, name = port_type(port, interfaces), port.name.value
+        if type_ is None:
+            continue
+        match port.kind:
+            case PortKind.SUBSCRIPTION:
+                found[f"on_{name}"] = Signature((("message", type_),))
+            case PortKind.SERVICE:
+                arguments = (("request", f"{type_}.Request"), ("response", f"{type_}.Response"))
+                found[f"on_{name}"] = Signature(arguments, f"{type_}.Response")
+            case PortKind.ACTION_SERVER:
+                goal = f"composer.behavior.Goal[{type_}.Goal, {type_}.Feedback]"
+                found[f"on_{name}"] = Signature((("goal", goal),), f"{type_}.Result")
+                found[f"accept_{name}"] = Signature((("request", f"{type_}.Goal"),), "bool")
+    found |= {f"on_{name}": Signature() for name in _TRANSITIONS}
+    found["on_error"] = Signature((("cause", "Exception"),))
+    found["on_parameters"] = Signature((("changes", "composer.behavior.Changes"),))
+    return {name: item for name, item in found.items() if name.isidentifier()}
+
+
+def member_class_name(behavior: str, attribute: str) -> str:
+    """Return the name of the class of ``self.publishers`` or of another group of members."""
+    title = attribute.title().replace("_", "")
+    return f"{behavior.removesuffix(SUFFIX)}{title}"
+
+
+def _class(name: str, node: Node, interfaces: Interfaces) -> Iterator[str]:
+    groups = {attribute: _ports(node, attribute, interfaces) for attribute in PORT_ATTRIBUTES}
+    for attribute, members in groups.items():
+        yield f"class {member_class_name(name, attribute)}:"
+        yield from _properties(members)
+        yield "    def __getitem__(self, name: str, /) -> Any: ..."
+    yield f"class {member_class_name(name, 'parameters')}:"
+    yield from _parameters(node)
+    yield f"class {name}(composer.behavior.Behavior):"
+    if node.description:
+        yield f"    {_docstring(node.description)}"
+    for attribute in (*groups, "parameters"):
+        yield f"    {attribute}: {member_class_name(name, attribute)}"
+    for handler, signature in signatures(node, interfaces).items():
+        arguments = "".join(f", {argument}: {type_}" for argument, type_ in signature.arguments)
+        result = signature.result
+        yield f"    def {handler}(self{arguments}) -> Awaitable[{result}] | {result}: ..."
+
+
+def _docstring(text: str) -> str:
+    """Return a description as a docstring of one line."""
+    plain = " ".join(text.split()).replace("\\", "/").replace('"', "'")
+    return f'"""{plain}"""'
+
+
+def _ports(node: Node, attribute: str, interfaces: Interfaces) -> Iterator[tuple[str, str]]:
+    for port in node.ports_of(PORT_ATTRIBUTES[attribute]):
+        type_ = port_type(port, interfaces)
+        match type_, port.kind:
+            case None, _:
+                yield port.name.value, "Any"
+            case _, PortKind.PUBLISHER:
+                yield port.name.value, f"composer.behavior.Publisher[{type_}]"
+            case _, PortKind.CLIENT:
+                parts = f"{type_}.Request, {type_}.Response"
+                yield port.name.value, f"composer.behavior.Client[{parts}]"
+            case _:
+                parts = f"{type_}.Goal, {type_}.Result, {type_}.Feedback"
+                yield port.name.value, f"composer.behavior.ActionClient[{parts}]"
+
+
+def _properties(members: Iterable[tuple[str, str]]) -> Iterator[str]:
+    for name, type_ in members:
+        if name.isidentifier():
+            yield "    @property"
+            yield f"    def {name}(self) -> {type_}: ..."
+
+
+def _parameters(node: Node) -> Iterator[str]:
+    members = [
+        (parameter.name.value, PARAMETER_TYPES.get(parameter.type.value, "Any"))
+        for parameter in node.parameters
+    ]
+    yield from _properties(members)
+    for name, type_ in members:
+        yield "    @overload"
+        yield f"    def __getitem__(self, name: Literal[{name!r}], /) -> {type_}: ..."
+    if members:
+        yield "    @overload"
+    yield "    def __getitem__(self, name: str, /) -> Any: ..."

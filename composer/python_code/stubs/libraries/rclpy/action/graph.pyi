@@ -1,0 +1,9 @@
+from rclpy.node import Node as Node
+
+def get_action_client_names_and_types_by_node(
+    node: Node, remote_node_name: str, remote_node_namespace: str
+) -> list[tuple[str, list[str]]]: ...
+def get_action_server_names_and_types_by_node(
+    node: Node, remote_node_name: str, remote_node_namespace: str
+) -> list[tuple[str, list[str]]]: ...
+def get_action_names_and_types(node: Node) -> list[tuple[str, list[str]]]: ...

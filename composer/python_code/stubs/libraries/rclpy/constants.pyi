@@ -1,0 +1,1 @@
+S_TO_NS: int

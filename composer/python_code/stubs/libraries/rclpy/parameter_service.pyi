@@ -1,0 +1,4 @@
+from rclpy.node import Node
+
+class ParameterService:
+    def __init__(self, node: Node) -> None: ...

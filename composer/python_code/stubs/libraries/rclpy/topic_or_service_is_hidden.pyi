@@ -1,0 +1,3 @@
+HIDDEN_TOPIC_PREFIX: str
+
+def topic_or_service_is_hidden(name: str) -> bool: ...

@@ -1,0 +1,6 @@
+from typing import Literal
+
+from rclpy.exceptions import InvalidServiceNameException as InvalidServiceNameException
+from rclpy.exceptions import InvalidTopicNameException as InvalidTopicNameException
+
+def validate_full_topic_name(name: str, *, is_service: bool = False) -> Literal[True]: ...

@@ -1,0 +1,221 @@
+"""Stubs of message, service and action packages.
+
+A field accepts more than it gives back: a list of numbers may be assigned where an ``array.array``
+is read. So such a field is a property whose setter has a wider type. A float field refuses ints,
+as ROS sends garbage for them (``Float64(data=3)`` arrives as 5e-324).
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+from composer.interfaces import FLOATS, TEXTS, Action, FieldType, Interfaces, Message, Service
+from composer.interfaces.sources import FOLDERS
+
+#: What all generated modules use, as the module ``_ros``. Only float has both methods of ``Real``:
+#: a parameter annotated ``float`` would accept an int. Scalars of numpy are let through, since
+#: numpy's own annotations rarely say which of them a function returns.
+SUPPORT = '''\
+"""The types that message packages share."""
+
+from collections.abc import Iterator, Set
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+T = TypeVar("T")
+Item = TypeVar("Item", covariant=True)
+Req = TypeVar("Req")
+Res = TypeVar("Res")
+Goal = TypeVar("Goal")
+Result = TypeVar("Result")
+Feedback = TypeVar("Feedback")
+
+class Float(Protocol):
+    """A float: ROS does not convert an int."""
+    def hex(self) -> str: ...
+    def is_integer(self) -> bool: ...
+
+class Scalar(Protocol):
+    """A number of numpy."""
+    @property
+    def dtype(self) -> Any: ...
+    def item(self) -> Any: ...
+
+class Values(Protocol[Item]):
+    """Several values, as a list, a tuple or an array: a text is none."""
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[Item]: ...
+
+Real = Float | Scalar
+Texts = list[str] | tuple[str, ...] | Set[str]
+
+class MessageType:
+    SLOT_TYPES: ClassVar[tuple[Any, ...]]
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]: ...
+
+class Array(list[T]):
+    """An array.array of numbers."""
+    typecode: str
+    itemsize: int
+    def tolist(self) -> list[T]: ...
+    def tobytes(self) -> bytes: ...
+    def __buffer__(self, flags: int, /) -> memoryview: ...
+    def frombytes(self, buffer: Any, /) -> None: ...
+    def fromlist(self, list: list[T], /) -> None: ...
+
+class FixedArray(Generic[T]):
+    """A numpy.ndarray of fixed length."""
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[T]: ...
+    def __contains__(self, value: object, /) -> bool: ...
+    def __getitem__(self, index: Any, /) -> Any: ...
+    def __setitem__(self, index: Any, value: Any, /) -> None: ...
+    def __getattr__(self, name: str, /) -> Any: ...
+    def __add__(self, other: Any, /) -> Any: ...
+    def __radd__(self, other: Any, /) -> Any: ...
+    def __sub__(self, other: Any, /) -> Any: ...
+    def __rsub__(self, other: Any, /) -> Any: ...
+    def __mul__(self, other: Any, /) -> Any: ...
+    def __rmul__(self, other: Any, /) -> Any: ...
+    def __truediv__(self, other: Any, /) -> Any: ...
+    def __matmul__(self, other: Any, /) -> Any: ...
+    def __lt__(self, other: Any, /) -> Any: ...
+    def __le__(self, other: Any, /) -> Any: ...
+    def __gt__(self, other: Any, /) -> Any: ...
+    def __ge__(self, other: Any, /) -> Any: ...
+
+class ServiceType(Generic[Req, Res]):
+    Event: Any
+
+class ActionType(Generic[Goal, Result, Feedback]):
+    Impl: Any
+'''
+
+_HEAD = (
+    "from typing import Final, TypeAlias",
+    "",
+    "import _ros",
+)
+_USED_PACKAGE = re.compile(r"\b([a-z]\w*)\.(?:msg|srv|action)\.[A-Z]")
+
+
+def message_stubs(interfaces: Interfaces, packages: Iterable[str] | None = None) -> dict[str, str]:
+    """Return the stubs of packages and of those whose messages they contain; by default, of all."""
+    by_package = _names_by_package(interfaces)
+    pending = list(by_package if packages is None else packages)
+    files = {"_ros.pyi": SUPPORT}
+    seen: set[str] = set()
+    while pending:
+        package = pending.pop()
+        if package in seen or package not in by_package:
+            continue
+        seen.add(package)
+        files[f"{package}/__init__.pyi"] = ""
+        for folder, names in by_package[package].items():
+            text = _module(interfaces, names)
+            files[f"{package}/{folder}.pyi"] = text
+            pending += _USED_PACKAGE.findall(text)
+    return files
+
+
+def python_name(interface: str) -> str:
+    """Return how a stub names an interface: ``geometry_msgs.msg.Point``."""
+    return interface.replace("/", ".")
+
+
+def _names_by_package(interfaces: Interfaces) -> Mapping[str, Mapping[str, list[str]]]:
+    found: dict[str, dict[str, list[str]]] = {}
+    for folder in FOLDERS:
+        for name in interfaces.names(folder):
+            package = name.partition("/")[0]
+            found.setdefault(package, {}).setdefault(folder, []).append(name)
+    return found
+
+
+def _module(interfaces: Interfaces, names: Iterable[str]) -> str:
+    """Return the text of ``package/msg.pyi`` or of one like it."""
+    lines: list[str] = []
+    for name in names:
+        short = name.rpartition("/")[2]
+        match interfaces.find(name):
+            case Message() as message:
+                lines += _message(short, message)
+            case Service(request=request, response=response):
+                parts = {"Request": request, "Response": response}
+                lines += _with_parts(short, parts, "ServiceType")
+            case Action(goal=goal, result=result, feedback=feedback):
+                parts = {"Goal": goal, "Result": result, "Feedback": feedback}
+                lines += _with_parts(short, parts, "ActionType")
+    text = "\n".join(lines)
+    used = sorted(set(re.findall(r"\b([a-z]\w*\.msg)\.[A-Z]", text)))
+    imports = (f"import {module}" for module in used)
+    return "\n".join((*_HEAD, *imports, "", text, ""))
+
+
+def _with_parts(name: str, parts: Mapping[str, Message], base: str) -> Iterator[str]:
+    for part, message in parts.items():
+        yield from _message(f"{name}_{part}", message)
+    classes = ", ".join(f"{name}_{part}" for part in parts)
+    yield f"class {name}(_ros.{base}[{classes}]):"
+    for part in parts:
+        yield f"    {part}: TypeAlias = {name}_{part}"
+
+
+def _message(name: str, message: Message) -> Iterator[str]:
+    yield f"class {name}(_ros.MessageType):"
+    for constant in message.constants:
+        value = constant.value
+        if constant.type.name == "byte" and isinstance(value, int):
+            value = bytes([value])  # type: ignore[assignment]
+        yield f"    {constant.name}: Final = {value!r}"
+    fields = [item for item in message.fields if not keyword.iskeyword(item.name)]
+    arguments = "".join(f", {item.name}: {_accepted(item.type)} = ..." for item in fields)
+    yield f"    def __init__(self{', *' if arguments else ''}{arguments}) -> None: ..."
+    for item in fields:
+        given, accepted = _given(item.type), _accepted(item.type)
+        if given == accepted:
+            yield f"    {item.name}: {given}"
+            continue
+        yield "    @property"
+        yield f"    def {item.name}(self) -> {given}: ..."
+        yield f"    @{item.name}.setter"
+        yield f"    def {item.name}(self, value: {accepted}) -> None: ..."
+
+
+def _element(type_: FieldType) -> str:
+    if type_.name in TEXTS:
+        return "str"
+    if type_.name in FLOATS:
+        return "float"
+    if type_.name in ("bool", "byte"):
+        return {"bool": "bool", "byte": "bytes"}[type_.name]
+    return "int" if type_.is_primitive else python_name(type_.name)
+
+
+def short_type(type_: FieldType) -> str:
+    """Return the type of a field that is read, without its module."""
+    return _given(type_).rpartition(".")[2]
+
+
+def _given(type_: FieldType) -> str:
+    """Return the type of a field that is read."""
+    element = _element(type_)
+    if not type_.is_array:
+        return element
+    if not type_.is_primitive or element in ("str", "bytes", "bool"):
+        return f"list[{element}]"
+    return f"_ros.{'Array' if type_.array_size is None else 'FixedArray'}[{element}]"
+
+
+def _accepted(type_: FieldType) -> str:
+    """Return the type of a field that is written."""
+    element = _element(type_)
+    if not type_.is_array:
+        return "_ros.Real" if element == "float" else element
+    if element == "str":
+        return "_ros.Texts"
+    if type_.name in ("uint8", "byte"):
+        return f"_ros.Values[{element}] | bytes"
+    return f"_ros.Values[{element}]"

@@ -1,0 +1,191 @@
+"""Handlers: those that are missing, bound to nothing, or do not fit what calls them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.formatting import a
+from composer.analysis.python_nodes import behaviors, complete_behaviors, distinct_behaviors
+from composer.diagnostics import Diagnostic, Label, nearest, suggestion
+from composer.model import ImplementationKind, Node, PortKind
+from composer.python_code.nodes.behaviors import (
+    GENERAL_HANDLERS,
+    Handler,
+    handlers,
+    unbound_handlers,
+)
+from composer.python_code.source import BehaviorSource, Method
+from composer.python_code.source.receivers import lacks_self
+from composer.python_code.source.spans import span_of
+from composer.python_code.source.values import Scope
+from composer.rules.python.definitions import error, on_tick, warning
+from composer.rules.python.uses_of_nodes import HANDLER_ANNOTATION
+from composer.source import Span
+
+MISSING_HANDLER = error(
+    code="RC433",
+    name="missing-handler",
+    summary="A behavior has no method for a port or timer of its node.",
+    why=(
+        "Handlers bind by name: subscription 'scan' calls 'on_scan'. Without the method, "
+        "messages are dropped, timers have no effect, and requests get no response."
+    ),
+    bad=on_tick("pass").replace("on_tick", "on_tock"),
+    good=on_tick("pass"),
+)
+HANDLER_WITHOUT_PORT = error(
+    code="RC434",
+    name="handler-without-port",
+    summary="A behavior has a handler for a port or timer that the node does not have.",
+    why=(
+        "Handlers bind by name: 'on_scan' is called for the port or timer 'scan'. Without "
+        "one, the method is never called. A method that the code itself uses, as in "
+        "on_feedback=self.on_progress, is not a handler."
+    ),
+    bad=on_tick("pass") + "\n    def on_message(self, message):\n        pass\n",
+    good=on_tick("pass"),
+)
+HANDLER_SIGNATURE = error(
+    code="RC435",
+    name="handler-signature",
+    summary="A handler or callback does not accept the arguments it is called with.",
+    why="Every call raises TypeError; for a transition handler, this happens during bring-up.",
+    bad=on_tick("pass").replace("(self)", "(self, timer)"),
+    good=on_tick("pass"),
+)
+IDLE_PORT = warning(
+    code="RC438",
+    name="idle-port",
+    summary="A timer or server has neither a behavior nor a reaction.",
+    why=(
+        "The timer has no effect. The service returns an empty response to every request, "
+        "which looks like a failure or, worse, like success."
+    ),
+    bad="""\
+system: idle
+nodes:
+  planner:
+    services: {reset: {type: std_srvs/srv/Trigger}}
+""",
+    good="""\
+system: idle
+nodes:
+  planner:
+    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+""",
+)
+
+#: What a node without a behavior can do instead, by the kind of its port or timer.
+_REACTIONS = {
+    "timer": "add 'publish', 'call', 'set' or 'log'",
+    PortKind.SERVICE.value: "add 'respond'",
+    PortKind.ACTION_SERVER.value: "add 'result'",
+}
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Compare the ports and timers of nodes with the methods of their behaviors."""
+    for node, source in complete_behaviors(context):
+        yield from _unbound(node, source)
+    for node, source in behaviors(context):
+        yield from _signatures(node, source)
+    for node, source in distinct_behaviors(context):
+        yield from _annotations(node, source)
+    affected = context.once(earlier_errors).nodes
+    for node in context.system.nodes:
+        is_declarative = node.implementation is ImplementationKind.DECLARATIVE
+        if is_declarative and node.complete and node.name.value not in affected:
+            yield from _idle_ports(node)
+
+
+def _unbound(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
+    """Report the ports and timers without a handler, and the handlers without a port."""
+    bound = list(handlers(node))
+    unbound = {method.name: method for method in unbound_handlers(node, source)}
+    missing = [item for item in bound if item.needed and source.method(item.name) is None]
+    for handler in missing:
+        yield _missing(source, handler, unbound)
+    for method in unbound.values():
+        if nearest(method.name, {handler.name for handler in missing}) is not None:
+            continue  # shown by the diagnostic about the missing handler
+        message = f"handler '{method.name}' of '{source.reference.class_name}' matches no port or"
+        label = Label(source.reference.text.span, "the behavior of this node")
+        hint = _hint(node, method.name, [handler.name for handler in bound])
+        yield Diagnostic(HANDLER_WITHOUT_PORT, f"{message} timer", method.span, (label,), hint)
+
+
+def _missing(source: BehaviorSource, handler: Handler, unbound: dict[str, Method]) -> Diagnostic:
+    close = nearest(handler.name, unbound)
+    message = (
+        f"{handler.kind} '{handler.of}' has no handler: "
+        f"'{source.reference.class_name}' has no method '{handler.name}'"
+    )
+    if close is not None:  # a misspelled reference to the port
+        label = Label(handler.of.span, f"the {handler.kind}")
+        hint = f"rename '{close}' to '{handler.name}'"
+        return Diagnostic(MISSING_HANDLER, message, unbound[close].span, (label,), hint)
+    span = source.class_span
+    related = (Label(span, "the behavior class"),) if span is not None else ()
+    hint = f"add 'def {handler.name}({', '.join(('self', *handler.arguments))})'"
+    return Diagnostic(MISSING_HANDLER, message, handler.of.span, related, hint)
+
+
+def _hint(node: Node, name: str, bound: list[str]) -> str | None:
+    stem = name.removeprefix("on_").removeprefix("accept_")
+    port = node.port(stem)
+    if port is not None:
+        return f"'{stem}' is {a(port.kind)}, which has no such handler"
+    return suggestion(name, bound)
+
+
+def _signatures(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
+    place = source.reference.text.span
+    expected = {name: (arguments, place) for name, arguments in GENERAL_HANDLERS.items()}
+    expected |= {item.name: (item.arguments, item.of.span) for item in handlers(node)}
+    for name, (arguments, span) in expected.items():
+        method = source.method(name)
+        if method is None or method.accepts(len(arguments)):
+            continue
+        if method.node is None or not lacks_self(method.node, len(arguments)):
+            yield _wrong_signature(source, method, arguments, span)
+
+
+def _wrong_signature(
+    source: BehaviorSource, method: Method, arguments: tuple[str, ...], span: Span
+) -> Diagnostic:
+    name, class_name = method.name, source.reference.class_name
+    takes = ", ".join(("self", *method.arguments))
+    gets = ", ".join(("self", *arguments))
+    message = f"'{name}' of '{class_name}' is called with ({gets}), but takes ({takes})"
+    label = Label(span, "called here")
+    return Diagnostic(
+        HANDLER_SIGNATURE, message, method.span, (label,), f"write 'def {name}({gets})'"
+    )
+
+
+def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
+    """Report the handlers of subscriptions that annotate another message than they get."""
+    types = {f"on_{port.name}": port.interface for port in node.ports_of(PortKind.SUBSCRIPTION)}
+    for module, known in source.own_classes:
+        for method in known.methods:
+            type_ = types.get(method.name)
+            arguments = method.node.args.args if method.node is not None and type_ else []
+            annotation = arguments[1].annotation if len(arguments) > 1 else None
+            if type_ is None or method.node is None or annotation is None:
+                continue
+            annotated = Scope(module, known.node, method.node).known_interface(annotation)
+            if annotated not in (None, type_.value):
+                message = f"'{method.name}' gets a {type_}, not a {annotated}"
+                label = Label(source.reference.text.span, "the behavior of this node")
+                span = span_of(annotation, module.source)
+                yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,))
+
+
+def _idle_ports(node: Node) -> Iterator[Diagnostic]:
+    for handler in handlers(node):
+        if handler.needed and handler.kind in _REACTIONS:
+            message = f"{handler.kind} '{handler.of}' does nothing"
+            hint = _REACTIONS[handler.kind]
+            yield Diagnostic(IDLE_PORT, message, handler.of.span, hint=hint)

@@ -1,0 +1,207 @@
+"""What the YAML file declares of a node with a class, against what the class creates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.call_settings import call_limits, callback_settings
+from composer.analysis.context import Context
+from composer.analysis.python_nodes import hosted_classes
+from composer.diagnostics import Diagnostic, Label, nearest
+from composer.model import USE_SIM_TIME, Node, ParameterType, Port, PortKind
+from composer.python_code.nodes.class_interfaces import (
+    CreatedPort,
+    all_created_ports,
+    created_ports,
+    declared_parameters,
+    passes_node_on,
+)
+from composer.python_code.nodes.classes import ClassOfNode
+from composer.rules.python.definitions import error, rclpy_class, warning
+from composer.source import Span
+
+
+def _publishing(name: str, type_: str, qos: str) -> str:
+    """Return an example with a declared publisher; the class creates ``range``, a Float32."""
+    return rclpy_class(
+        'self.range = self.create_publisher(Float32, "range", 10)',
+        keys=f"    publishers: {{{name}: {{type: {type_}, qos: {qos}, external: true}}}}\n",
+        head="from std_msgs.msg import Float32\n",
+    )
+
+
+def _declaring(key: str) -> str:
+    """Return an example with a declared parameter; the class declares ``rate_hz``, a double."""
+    return rclpy_class(
+        'self.declare_parameter("rate_hz", 10.0)', keys=f"    parameters: {{{key}}}\n"
+    )
+
+
+_FLOAT = "std_msgs/msg/Float32"
+_LISTENING = (
+    "    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command, external: true%s}}\n"
+)
+_RIGHT_PORT = _publishing("range", _FLOAT, "command")
+_RIGHT_PARAMETER = _declaring("rate_hz: {type: double, default: 5.0}")
+
+CLASS_PORT_MISSING = warning(
+    code="RC499",
+    name="class-port-missing",
+    summary="A node declares a port that its class creates under another name.",
+    why=(
+        "Nothing is sent or received on the port, although connections and other checks rely "
+        "on it. The name is the one that the class uses; 'topic' or 'service' gives it."
+    ),
+    bad=_publishing("rang", _FLOAT, "command"),
+    good=_RIGHT_PORT,
+)
+CLASS_PORT_TYPE = error(
+    code="RC487",
+    name="class-port-type",
+    summary="A port of a node has another type than in its class.",
+    why="The class decides; endpoints of different types on one name never communicate.",
+    bad=_publishing("range", "std_msgs/msg/Float64", "command"),
+    good=_RIGHT_PORT,
+)
+CLASS_PORT_QOS = warning(
+    code="RC493",
+    name="class-port-qos",
+    summary="A port of a node has another QoS than in its class.",
+    why="The class decides, so checks of the declared QoS miss what happens on the topic.",
+    bad=_publishing("range", _FLOAT, "sensor_data"),
+    good=_RIGHT_PORT,
+)
+CLASS_PARAMETER = warning(
+    code="RC485",
+    name="class-parameter",
+    summary="A node sets a parameter that its class does not declare.",
+    why="rclpy ignores it, so that the class uses its default.",
+    bad=_declaring("rate: {type: double, default: 5.0}"),
+    good=_RIGHT_PARAMETER,
+)
+CLASS_PARAMETER_TYPE = error(
+    code="RC486",
+    name="class-parameter-type",
+    summary="A parameter of a node has another type than in its class.",
+    why="rclpy refuses to declare it, with InvalidParameterTypeException.",
+    bad=_declaring("rate_hz: {type: integer, default: 5}"),
+    good=_RIGHT_PARAMETER,
+)
+CLASS_SETTING = error(
+    code="RC468",
+    name="class-setting",
+    summary="A node with a class declares reactions, timers, state or limits of calls.",
+    why=(
+        "The class has callbacks and timers of its own; its ports are declared to be checked "
+        "and connected. What the YAML file says they do would have no effect."
+    ),
+    bad=rclpy_class(keys=_LISTENING % ', log: "{message.data}"'),
+    good=rclpy_class(keys=_LISTENING % ""),
+)
+
+_KINDS = frozenset({PortKind.PUBLISHER, PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.CLIENT})
+_POLICIES = ("reliability", "durability", "depth", "deadline_ms")
+_OF_EVERY_NODE = (USE_SIM_TIME, "start_type_description_service")
+_TYPES = frozenset(item.value for item in ParameterType)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Compare the ports, parameters and settings of nodes with their classes."""
+    for item in hosted_classes(context):
+        if item.node.ports:
+            yield from _missing_ports(item)
+            yield from _different_ports(item)
+        if item.node.parameters:
+            yield from _parameters(item)
+        for what, span in _settings(item.node):
+            message = f"{what} has no effect: node '{item.node.name}' has a class"
+            yield Diagnostic(CLASS_SETTING, message, span, hint="remove it, or write a behavior")
+
+
+def _missing_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
+    """Report the declared ports that are not among those that the class creates."""
+    ports = [port for port in item.node.ports if port.kind in _KINDS]
+    created = all_created_ports(item) if ports else None
+    for port in ports if created is not None else ():
+        names = [other.name or "" for other in created or () if other.kind is port.kind]
+        declared = {_last(other.ros_name.value) for other in ports if other.kind is port.kind}
+        others = [name for name in names if _last(name) not in declared]
+        name = port.ros_name.value
+        # without another name, the class may be one that is not finished
+        if _last(name) in map(_last, names) or not others:
+            continue
+        message = f"class '{item.hosted.reference.class_name}' creates no {port.kind} '{name}'"
+        close = nearest(name, others)
+        listed = " and ".join(f"'{other}'" for other in others)
+        hint = f"did you mean '{close}'?" if close is not None else f"it creates {listed}"
+        yield Diagnostic(CLASS_PORT_MISSING, message, port.ros_name.span, (), hint)
+
+
+def _last(name: str) -> str:
+    return name.rpartition("/")[2]
+
+
+def _different_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
+    """Report the ports that the class creates with another type or QoS."""
+    created = list(created_ports(item))
+    for port in item.node.ports:
+        same = [
+            other
+            for other in created
+            if other.kind is port.kind and other.name == port.ros_name.value
+        ]
+        types = [other for other in same if other.interface is not None]
+        what = f"class '{item.hosted.reference.class_name}' creates {port.kind} '{port.ros_name}'"
+        if types and port.interface.value not in {other.interface for other in types}:
+            message = f"{what} with type {types[0].interface}, not {port.interface}"
+            label = Label(types[0].span, "created here")
+            yield Diagnostic(CLASS_PORT_TYPE, message, port.interface.span, (label,))
+        elif len(same) == 1 and port.qos.known and port.qos.explicit:
+            yield from _different_qos(port, same[0], what)
+
+
+def _different_qos(port: Port, created: CreatedPort, what: str) -> Iterator[Diagnostic]:
+    if created.qos is None:
+        return
+    for policy in _POLICIES:
+        here, there = getattr(port.qos.profile, policy), getattr(created.qos, policy)
+        if here != there:
+            message = f"{what} with {policy} {_value(there)}, not {_value(here)}"
+            label = Label(created.span, "created here")
+            yield Diagnostic(CLASS_PORT_QOS, message, port.qos.own_span(policy), (label,))
+            return  # another profile, most likely
+
+
+def _value(policy: object) -> str:
+    return "unlimited" if policy is None else str(policy)
+
+
+def _parameters(item: ClassOfNode) -> Iterator[Diagnostic]:
+    """Report the parameters that the class does not declare, or with another type."""
+    class_name = item.hosted.reference.class_name
+    declared = declared_parameters(item.source)
+    names = [*declared.types, *_OF_EVERY_NODE]
+    for parameter in item.node.parameters:
+        name, given = parameter.name.value, parameter.type.value
+        if declared.is_complete and name not in names and not name.startswith("qos_overrides."):
+            close = nearest(name, names)
+            if close is not None or not passes_node_on(item.source):
+                message = f"class '{class_name}' declares no parameter '{name}'"
+                hint = f"did you mean '{close}'?" if close is not None else None
+                yield Diagnostic(CLASS_PARAMETER, message, parameter.name.span, hint=hint)
+        type_ = declared.types.get(name)
+        if type_ is not None and given in _TYPES and type_.value != given:
+            message = f"class '{class_name}' declares parameter '{name}' as {type_}, not {given}"
+            label = Label(type_.span, "declared here")
+            yield Diagnostic(CLASS_PARAMETER_TYPE, message, parameter.type.span, (label,))
+
+
+def _settings(node: Node) -> Iterator[tuple[str, Span]]:
+    """Yield what a node declares that only callbacks of a behavior use, with its place."""
+    yield from callback_settings(node)
+    for port in node.ports:
+        for event, reaction in port.reactions:
+            yield f"the reaction of {port.kind} '{port.name}' to its {event}", reaction.span
+        if port.result is not None or port.feedback is not None or port.accept is not None:
+            yield f"the reaction of {port.kind} '{port.name}'", port.span
+        yield from call_limits(port)

@@ -1,0 +1,152 @@
+"""Classes that do what a hosted node cannot: spin, create nodes, block, bring their own context."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.python_nodes import hosted_classes
+from composer.diagnostics import Diagnostic
+from composer.model import ExecutorKind, Node, System
+from composer.python_code.nodes.classes import ClassOfNode, calls_in
+from composer.python_code.source import Call
+from composer.python_code.source.method_body import is_none
+from composer.rules.python.definitions import error, rclpy_class, warning
+
+_IMPORT = "import rclpy\n"
+_ASKING = '\n    def ask(self):\n        return input("name: ")\n'
+
+CLASS_SPINS = error(
+    code="RC464",
+    name="class-spins",
+    summary="The constructor of a class spins its node.",
+    why=(
+        "rclpy.spin returns when the process ends, so the node would never be configured. "
+        "The composer calls the callbacks of the class."
+    ),
+    bad=rclpy_class("rclpy.spin(self)", head=_IMPORT),
+    good=rclpy_class(head=_IMPORT, methods="\n\ndef main():\n    rclpy.spin(Talker())\n"),
+)
+CLASS_SECOND_NODE = error(
+    code="RC465",
+    name="class-second-node",
+    summary="A class creates a second ROS node.",
+    why=(
+        "Nothing would spin the second node, and it would not follow the lifecycle. Every "
+        "node of a system is declared."
+    ),
+    bad=rclpy_class('self.helper = rclpy.create_node("helper")', head=_IMPORT),
+    good=rclpy_class(),
+)
+CLASS_CONTEXT = error(
+    code="RC466",
+    name="class-context",
+    summary="A class gives its node a context or command-line arguments of its own.",
+    why=(
+        "A hosted node joins the ROS graph with the context of the system, and its names and "
+        "parameters come from YAML."
+    ),
+    bad=rclpy_class().replace('("talker")', '("talker", cli_args=["--ros-args"])'),
+    good=rclpy_class(),
+)
+CLASS_BLOCKS = warning(
+    code="RC467",
+    name="class-blocks",
+    summary="A class blocks an executor that other nodes use, or reads from the terminal.",
+    why=(
+        "While a callback sleeps or waits for a response, its thread runs no other callback. "
+        "By default each class has an executor of its own, where it delays nothing else. "
+        "Input from the terminal would keep its node waiting, and so the whole bring-up."
+    ),
+    bad=rclpy_class(methods=_ASKING),
+    good=rclpy_class(methods=_ASKING.replace("input", "str")),
+)
+
+_ALONE = "leave out 'executor': each class then has an event loop of its own"
+_CREATORS = frozenset(
+    {
+        "rclpy.create_node",
+        "rclpy.node.Node",
+        "rclpy.lifecycle.LifecycleNode",
+        "rclpy.lifecycle.Node",
+    }
+)
+#: Arguments of ``Node.__init__`` that a hosted node cannot have, and what to do instead.
+_REFUSED = {
+    "context": "leave it out, or run the program as an 'executable'",
+    "cli_args": "use 'remappings' and 'parameters' of the node",
+}
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Check the calls of all methods of every class."""
+    for item in hosted_classes(context):
+        yield from _constructor(item)
+        yield from _second_nodes(item)
+        yield from _blocking_calls(item, context.system)
+
+
+def _constructor(item: ClassOfNode) -> Iterator[Diagnostic]:
+    name = item.source.reference.class_name
+    constructor = item.constructor
+    for call in constructor.calls if constructor is not None else ():
+        if call.name == "rclpy.spin" and not call.deferred:
+            message = f"the constructor of '{name}' calls rclpy.spin, which never returns"
+            hint = "spin in the main function of the program, or run it as an 'executable'"
+            yield item.diagnostic(CLASS_SPINS, message, call.span, hint)
+    for node, span in calls_in(constructor) if constructor is not None else ():
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "__init__":
+            for keyword in node.keywords:
+                if keyword.arg in _REFUSED and not is_none(keyword.value):
+                    message = f"'{name}' gives its node a '{keyword.arg}' of its own"
+                    yield item.diagnostic(CLASS_CONTEXT, message, span, _REFUSED[keyword.arg])
+
+
+def _second_nodes(item: ClassOfNode) -> Iterator[Diagnostic]:
+    name = item.source.reference.class_name
+    for method in item.methods:
+        for call in method.calls:
+            if call.name in _CREATORS:
+                message = f"'{method.name}' of '{name}' creates a second node"
+                hint = "declare it as a node of the system, or run the program as an 'executable'"
+                yield item.diagnostic(CLASS_SECOND_NODE, message, call.span, hint)
+
+
+def _blocking_calls(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
+    """Report input from the terminal, and waiting where the executor does not allow it."""
+    name = item.source.reference.class_name
+    others = list(_on_same_executor(item.node, system))
+    is_single = _is_single_threaded(item.node, system)
+    for method in item.methods:
+        what = f"'{method.name}' of '{name}'"
+        for call in method.calls:
+            if call.name == "input" and not call.deferred:
+                message = f"{what} reads from the terminal"
+                hint = "run the program in a terminal of its own, outside the system"
+                yield item.diagnostic(CLASS_BLOCKS, message, call.span, hint)
+            elif others and call.name == "time.sleep" and method.name != "__init__":
+                message = f"{what} sleeps, and node '{others[0].name}' waits"
+                yield item.diagnostic(CLASS_BLOCKS, message, call.span, _ALONE)
+            elif is_single and _waits_for_response(call):
+                message = f"{what} waits for a response that its only thread would have to receive"
+                yield item.diagnostic(CLASS_BLOCKS, message, call.span, _ALONE)
+
+
+def _on_same_executor(node: Node, system: System) -> Iterator[Node]:
+    if node.executor is not None:
+        for other in system.nodes:
+            name = other.executor.value if other.executor is not None else None
+            if other is not node and name == node.executor.value:
+                yield other
+
+
+def _is_single_threaded(node: Node, system: System) -> bool:
+    kinds = {item.name.value: item.kind for item in system.executors}
+    kind = kinds.get(node.executor.value) if node.executor is not None else None
+    return kind is ExecutorKind.SINGLE_THREADED
+
+
+def _waits_for_response(call: Call) -> bool:
+    """Return whether it looks like ``self.client.call(request)``."""
+    return call.name.startswith("self.") and call.name.endswith(".call") and not call.awaited

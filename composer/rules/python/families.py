@@ -1,0 +1,113 @@
+"""Turns the problems found in Python files into diagnostics: each family has its rule."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from composer.analysis.context import Context
+from composer.analysis.python_nodes import distinct_behaviors, distinct_classes
+from composer.diagnostics import Diagnostic, Label, Rule, Severity
+from composer.model import Node
+from composer.python_code.checks import code_problems
+from composer.python_code.checks.imports import import_problems
+from composer.python_code.problems import Family, Problem
+from composer.python_code.source import BehaviorSource
+from composer.rules.behaviors import blocking, handlers
+from composer.rules.messages import index_out_of_range, invalid_value, unknown_field
+from composer.rules.python import plain_python, uses_of_nodes
+from composer.rules.transforms import frame_id_slash
+from composer.source import Span
+
+#: What a Python file is for: a behavior, or an rclpy class.
+What: TypeAlias = Literal["behavior", "class"]
+
+RULE_OF: Mapping[Family, Rule] = {
+    Family.PORT: uses_of_nodes.UNKNOWN_ATTRIBUTE,
+    Family.FIELD: unknown_field.RULE,
+    Family.VALUE: invalid_value.RULE,
+    Family.INDEX: index_out_of_range.RULE,
+    Family.MESSAGE_TYPE: uses_of_nodes.WRONG_MESSAGE_TYPE,
+    Family.AWAIT: uses_of_nodes.MISSING_AWAIT,
+    Family.NAME: plain_python.UNDEFINED_NAME,
+    Family.IMPORT: plain_python.UNKNOWN_IMPORT,
+    Family.NOT_INSTALLED: plain_python.MODULE_NOT_INSTALLED,
+    Family.INTERNAL: plain_python.INTERNAL_IMPORT,
+    Family.ATTRIBUTE: plain_python.MISSING_ATTRIBUTE,
+    Family.ARGUMENTS: plain_python.CALL_ARGUMENTS,
+    Family.TYPE: plain_python.TYPE_ERROR,
+    Family.RETURN: uses_of_nodes.MISSING_RETURN,
+    Family.NONE: uses_of_nodes.UNCHECKED_NONE,
+    Family.ANNOTATION: uses_of_nodes.HANDLER_ANNOTATION,
+    Family.UNUSED: plain_python.UNUSED_RESULT,
+    Family.ASYNCIO: uses_of_nodes.ASYNCIO_CALL,
+    Family.BLOCKING: blocking.BLOCKING_CALL,
+    Family.EARLY: uses_of_nodes.TOO_EARLY,
+    Family.FRAME: frame_id_slash.RULE,
+    Family.SELF: plain_python.MISSING_SELF,
+    Family.SIGNATURE: handlers.HANDLER_SIGNATURE,
+    Family.PARAMETER: uses_of_nodes.UNDECLARED_PARAMETER,
+    Family.CONSTRUCTOR: uses_of_nodes.MISSING_CONSTRUCTOR,
+    Family.NOT_CHECKED: plain_python.NOT_CHECKED,
+}
+
+
+def diagnostic(problem: Problem, place: Span, what: What, *, certain: bool = True) -> Diagnostic:
+    """Return the diagnostic of a problem; ``place`` is where the YAML file names the code.
+
+    In a class nothing is an error: it may run as it does today. In a behavior, a problem is only a
+    warning if it is not ``certain``.
+    """
+    rule = RULE_OF[problem.family]
+    is_error = what == "behavior" and certain and problem.is_certain
+    if rule.severity is Severity.ERROR and not is_error:
+        rule = replace(rule, severity=Severity.WARNING)
+    label = Label(place, f"the {what} of this node")
+    return Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
+
+
+def check(context: Context) -> Iterator[Diagnostic]:
+    """Report the problems of the files of behaviors and classes, each once."""
+    for source, what, problem, _ in context.once(_import_problems):
+        yield diagnostic(problem, source.reference.text.span, what)
+    for node, source, what in _sources(context):
+        for problem in code_problems(node, source, context.interfaces):
+            yield diagnostic(problem, source.reference.text.span, what)
+
+
+def names_meant(context: Context) -> frozenset[tuple[str, str]]:
+    """Return files with the names that a wrong import in the file may have been meant to define."""
+    return context.once(_names_meant)
+
+
+def _sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
+    for node, source in distinct_behaviors(context):
+        yield node, source, "behavior"
+    for item in distinct_classes(context):
+        yield item.node, item.source, "class"
+
+
+def _import_problems(
+    context: Context,
+) -> tuple[tuple[BehaviorSource, What, Problem, frozenset[str]], ...]:
+    """Return the problems of the imports in all files, with the names that were meant."""
+    problems: list[tuple[BehaviorSource, What, Problem, frozenset[str]]] = []
+    checked: set[Path] = set()
+    for _, source, what in _sources(context):
+        for module in source.own_modules:
+            if module.path not in checked:
+                checked.add(module.path)
+                folder = source.reference.folder
+                for problem, names in import_problems(module, folder, context.interfaces):
+                    problems.append((source, what, problem, names))
+    return tuple(problems)
+
+
+def _names_meant(context: Context) -> frozenset[tuple[str, str]]:
+    return frozenset(
+        (problem.span.file.path, name)
+        for _, _, problem, names in context.once(_import_problems)
+        for name in names
+    )

@@ -1,0 +1,159 @@
+"""The type checker's findings for the systems that are loaded, as diagnostics of their rules.
+
+The checker runs in the background while the rules of all systems are evaluated. A class that
+several systems use in the same way is checked once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import field
+from typing import TypeAlias
+
+from composer.analysis.context import Context
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.python_nodes import distinct_behaviors, distinct_classes
+from composer.diagnostics import Diagnostic
+from composer.fast_dataclass import dataclass
+from composer.interfaces import Interfaces
+from composer.model import Node
+from composer.python_code.checker import RunningCheck, start
+from composer.python_code.problems import Family, Problem
+from composer.python_code.source import BehaviorSource
+from composer.rules.python.families import RULE_OF, diagnostic, names_meant
+from composer.source import Span
+
+#: What the type checker needs to know of the use of a class; equal uses are checked once.
+_Use: TypeAlias = tuple[object, ...]
+#: Rules about the arguments of a function: names in it, and calls of it, follow from theirs.
+_ABOUT_SIGNATURES = frozenset({"handler-signature", "missing-self"})
+
+
+@dataclass(slots=True)
+class TypeCheck:
+    """The checks of all classes that some systems use, running in the background."""
+
+    _running: list[RunningCheck] = field(default_factory=list)
+    _problems: dict[_Use, list[Problem]] | None = None
+
+    @classmethod
+    def of(cls, contexts: Sequence[Context]) -> TypeCheck:
+        """Start to check the Python code of the systems."""
+        by_interfaces: dict[int, tuple[Interfaces, dict[_Use, tuple[Node, BehaviorSource]]]] = {}
+        for context in contexts:
+            key = id(context.interfaces)
+            _, classes = by_interfaces.setdefault(key, (context.interfaces, {}))
+            for node, source in _classes(context):
+                classes.setdefault(_use(node, source), (node, source))
+        return cls(
+            [
+                start(tuple(classes.values()), interfaces)
+                for interfaces, classes in by_interfaces.values()
+                if classes
+            ]
+        )
+
+    def diagnostics(self, context: Context, reported: Iterable[Diagnostic]) -> list[Diagnostic]:
+        """Wait for the checks, and return what they found in the classes of one system.
+
+        ``reported`` are the diagnostics of the rules. What these are about is not repeated.
+        """
+        if self._problems is None:
+            self._problems = self._collected()
+        others = [*reported]
+        return [
+            diagnostic(problem, source.reference.text.span, _what(node), certain=True)
+            for node, source in _classes(context)
+            for problem in self._problems.get(_use(node, source), ())
+            if not _follows(problem, node, context, others)
+        ]
+
+    def close(self) -> None:
+        """End the checks."""
+        for check in self._running:
+            check.close()
+
+    def _collected(self) -> dict[_Use, list[Problem]]:
+        found: dict[_Use, list[Problem]] = {}
+        for check in self._running:
+            for node, source, problem in check.problems():
+                found.setdefault(_use(node, source), []).append(problem)
+        return found
+
+
+def _classes(context: Context) -> Iterator[tuple[Node, BehaviorSource]]:
+    yield from distinct_behaviors(context)
+    yield from ((item.node, item.source) for item in distinct_classes(context))
+
+
+def _what(node: Node) -> str:
+    return "behavior" if node.behavior is not None else "class"
+
+
+def _use(node: Node, source: BehaviorSource) -> _Use:
+    place = (source.path, source.reference.class_name, source.reference.folder)
+    if node.behavior is None:
+        return place
+    ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
+    parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
+    return (*place, ports, parameters, tuple(timer.name.value for timer in node.timers))
+
+
+def _follows(
+    problem: Problem, node: Node, context: Context, reported: Sequence[Diagnostic]
+) -> bool:
+    """Return whether a problem only follows from what a rule has reported already."""
+    if problem.family is Family.PORT:
+        errors = context.once(earlier_errors)
+        if not node.complete or node.name.value in errors.nodes:
+            return True  # the port may be declared where the file is wrong
+    if problem.family is Family.NAME and _is_meant(problem, context, reported):
+        return True
+    if problem.family is Family.ARGUMENTS and any(
+        item.rule.name in _ABOUT_SIGNATURES
+        and (problem.span.text.endswith(item.primary.text) or item.primary.text in problem.message)
+        for item in reported
+    ):
+        return True
+    rule = RULE_OF[problem.family].code
+    return any(
+        _overlap(problem.span, item.primary)
+        or (item.rule.code == rule and _is_same_line(problem.span, item.primary))
+        for item in reported
+    )
+
+
+def _is_meant(problem: Problem, context: Context, reported: Sequence[Diagnostic]) -> bool:
+    """Return whether a name is missing because of a wrong import or signature."""
+    file, name = problem.span.file.path, problem.span.text
+    if (file, name) in names_meant(context):
+        return True
+    return any(
+        item.rule.name in _ABOUT_SIGNATURES
+        and item.primary.file.path == file
+        and _is_within_function(problem.span, item.primary)
+        for item in reported
+    )
+
+
+def _is_within_function(span: Span, signature: Span) -> bool:
+    """Return whether a place is in the function whose signature is at another one."""
+    if span.line < signature.line:
+        return False
+    lines = span.file.lines[signature.line : span.line]
+    depth = _indentation(span.file.line(signature.line))
+    return all(_indentation(line) > depth for line in lines if line.strip())
+
+
+def _indentation(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def _is_same_line(one: Span, other: Span) -> bool:
+    return one.file.path == other.file.path and one.line == other.line
+
+
+def _overlap(one: Span, other: Span) -> bool:
+    if not _is_same_line(one, other):
+        return False
+    return one.column < other.column + other.length and other.column < one.column + one.length

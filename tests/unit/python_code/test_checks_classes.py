@@ -1,0 +1,366 @@
+"""Classes that are derived from rclpy's Node."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from tests.unit.support.python_checks import check, problems
+
+IMPORTS = """
+import functools
+from functools import partial
+from example_interfaces.action import Fibonacci
+from rclpy.action import ActionClient, ActionServer
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+from tf2_ros import Buffer, TransformListener
+
+"""
+WRONG_CALLBACKS = [
+    "self.create_timer(1.0, lambda event: None)  # SIGNATURE",
+    "self.create_timer(1.0, partial(self.on_service, 1))  # SIGNATURE",
+    "self.create_timer(1.0, functools.partial(self.tick, 1))  # SIGNATURE",
+    "self.create_timer(1.0, self.tick())  # SIGNATURE",
+    "self.create_timer(1.0, callback=self.run())  # SIGNATURE",
+    "self.create_subscription(String, 'a', lambda: None, 10)  # SIGNATURE",
+    "self.create_service(Trigger, 'a', lambda request: None)  # SIGNATURE",
+    "self.client.call_async(1).add_done_callback(lambda: None)  # SIGNATURE",
+    "self.client.send_goal_async(1, feedback_callback=lambda a, b: None)  # SIGNATURE",
+    "ActionServer(self, Fibonacci, 'a', lambda: None)  # SIGNATURE",
+    "ActionServer(self, Fibonacci, 'a', self.run_goal, goal_callback=lambda: None)  # SIGNATURE",
+]
+RIGHT_CALLBACKS = [
+    "self.create_timer(1.0, self.tick)",
+    "self.create_timer(1.0, self.on_optional)",
+    "self.create_timer(1.0, self.anything)",
+    "self.create_timer(1.0, self.static)",
+    "self.create_timer(1.0, lambda: None)",
+    "self.create_timer(1.0, lambda topic='a': None)",
+    "self.create_timer(1.0, partial(self.on_message, None))",
+    "self.create_timer(1.0, partial(self.on_service, response=1, request=2))",
+    "self.create_timer(1.0, partial(self.on_service, *self.arguments))",
+    "self.create_timer(1.0, self.make())",
+    "self.create_timer(1.0, self.callback)",
+    "self.create_timer(1.0, getattr(self, 'on_message'))",
+    "self.create_timer(1.0, self.decorated)",
+    "self.timers.create_timer(1.0, self.on_message)",
+    "self.create_subscription(String, 'a', self.on_message, 10)",
+    "self.create_subscription(String, 'a', lambda message, info: None, 10)",
+    "self.create_subscription(String, 'a', partial(self.on_named, name='a'), 10)",
+    "self.create_service(Trigger, 'a', self.on_service)",
+    "self.create_service(Trigger, 'a', self.on_failing_service)",
+    "self.group = ReentrantCallbackGroup()\n"
+    "self.create_timer(1.0, self.tick, callback_group=self.group)",
+    "self.client.call_async(1).add_done_callback(self.on_message)",
+    "ActionServer(self, Fibonacci, 'a', self.run_goal, goal_callback=lambda request: 1)",
+    "def done(future):\n    pass\nself.future.add_done_callback(done)",
+]
+METHODS = """
+def tick(self):
+    self.count = 1
+def on_message(self, message):
+    self.count = 2
+def on_named(self, message, name):
+    self.count = 3
+def on_service(self, request, response):
+    return response
+def on_failing_service(self, request, response):
+    raise NotImplementedError
+def on_optional(self, event=None):
+    pass
+def anything(self, *arguments):
+    pass
+def make(self):
+    return self.tick
+def run_goal(self, goal_handle):
+    return Fibonacci.Result()
+async def run(self):
+    return 1
+@functools.cache
+def decorated(self, event):
+    pass
+@staticmethod
+def static():
+    pass
+"""
+
+
+def node(body: str) -> str:
+    start = "class Robot(Node):\n    def __init__(self):\n        super().__init__('robot')\n"
+    start += "        self.callback = lambda: None\n"
+    body = textwrap.indent(body, "        ")
+    end = "def module_function(argument):\n    pass\n"
+    return f"{IMPORTS}{start}{body}\n{textwrap.indent(METHODS, '    ')}\n{end}"
+
+
+@pytest.mark.parametrize("body", WRONG_CALLBACKS)
+def test_wrong_callbacks(body: str, tmp_path: Path) -> None:
+    check(node(body), tmp_path, "class")
+
+
+@pytest.mark.parametrize(
+    ("body", "name"),
+    [
+        ("self.create_timer(1.0, self.on_message)", "on_message"),
+        ("self.create_service(Trigger, 'a', callback=self.tick)", "tick"),
+        ("self.create_subscription(String, 'a', self.tick, 10)", "tick"),
+        ("self.create_timer(1.0, module_function)", "module_function"),
+        ("def done():\n    pass\nself.future.add_done_callback(done)", "done"),
+        ("ActionServer(self, Fibonacci, 'a', execute_callback=self.on_service)", "on_service"),
+    ],
+)
+def test_callbacks_are_reported_where_they_are_defined(
+    body: str, name: str, tmp_path: Path
+) -> None:
+    first = problems(node(body), tmp_path, "class")[0]
+    assert (first.family.name, first.span.text) == ("SIGNATURE", name)
+    assert first.message.startswith(f"'{name}' is called with ")
+
+
+@pytest.mark.parametrize("body", RIGHT_CALLBACKS)
+def test_right_callbacks(body: str, tmp_path: Path) -> None:
+    check(node(body), tmp_path, "class")
+
+
+PARAMETERS = [
+    """
+    self.declare_parameter('rate', 1.0)
+    self.get_parameter('rat').value  # PARAMETER
+    self.get_parameter('rate').value
+    self.get_parameter('use_sim_time').value
+    self.get_parameter('qos_overrides./a.depth').value
+    """,
+    """
+    self.declare_parameters('', [('rate', 1.0), ('name', 'a')])
+    self.declare_parameters('arm', [('rate', 1.0)])
+    self.get_parameter('arm.rate').value
+    self.get_parameter('arm.name').value  # PARAMETER
+    """,
+    """
+    RATE = 'rate'
+    self.declare_parameter(RATE, 1.0)
+    self.get_parameter('rate').value
+    self.buffer = TransformListener(Buffer(), self)
+    self.get_parameter('name').value  # PARAMETER
+    """,
+    """
+    for name in self.names:
+        self.declare_parameter(name, 1.0)
+    self.get_parameter('rate').value
+    """,
+    """
+    declare = self.declare_parameter
+    declare('rate', 1.0)
+    self.get_parameter('rate').value
+    """,
+    """
+    helper.declare(self)
+    self.get_parameter('rate').value
+    """,
+    """
+    try:
+        self.get_parameter('rate').value
+    except Exception:
+        pass
+    """,
+    """
+    if self.has_parameter('rate'):
+        self.get_parameter('rate').value
+    """,
+    """
+    self.node.get_parameter('rate')
+    self.get_parameter(self.name)
+    """,
+    """
+    self.declare_parameter('rate', 1.0)
+    rate = self.get_parameter('rate')
+    if rate == 3:  # TYPE
+        pass
+    if not rate:  # TYPE
+        pass
+    while self.get_parameter('rate'):  # TYPE
+        pass
+    f"{rate:.2f}"  # TYPE
+    """,
+    """
+    self.declare_parameter('count', 1)
+    self.declare_parameter('rate', 1.0, self.descriptor)
+    self.declare_parameter('name', self.name)
+    self.get_parameter('count').get_parameter_value().double_value  # TYPE
+    self.get_parameter('count').get_parameter_value().integer_value
+    self.get_parameter('rate').get_parameter_value().integer_value
+    self.get_parameter('name').get_parameter_value().integer_value
+    """,
+    """
+    self.declare_parameter('rate', 1.0)
+    rate = self.get_parameter('rate')
+    if rate.value > 3 and rate is not None:
+        print(f"{rate} {rate.value:.2f}", "%s" % rate, str(rate))
+    1.0 / self.get_parameter('rate').value
+    rate.value == 3.0 or rate.get_parameter_value().double_value
+    """,
+]
+
+
+@pytest.mark.parametrize("body", PARAMETERS)
+def test_parameters(body: str, tmp_path: Path) -> None:
+    check(node(textwrap.dedent(body)), tmp_path, "class")
+
+
+FILES = [
+    """
+    class Robot(Node):
+        def __init__(self):  # CONSTRUCTOR
+            self.rate = 1.0
+    """,
+    """
+    class Base(Node):
+        def __init__(self):
+            Node.__init__(self, 'robot')
+
+    class Robot(Base):
+        def __init__(self):
+            self.rate = 1.0
+    """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            self.start()
+
+        def start(self):
+            super().__init__('robot')
+    """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot', **self.options)
+            self.get_parameter('rate').value
+    """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot', allow_undeclared_parameters=True)
+            self.get_parameter('rate').value
+    """,
+    """
+    class Robot(Node):
+        def get_parameter(self, name):
+            return super().get_parameter(name).value
+
+        def on_tick(self):
+            return self.get_parameter('rate') > 3
+    """,
+    """
+    class Robot(LifecycleNode):
+        def on_configure(self, state):
+            self.publisher = self.create_lifecycle_publisher(String, 'a', 10)
+            return TransitionCallbackReturn.SUCCESS
+
+        def on_activate(self, state):  # CONSTRUCTOR?
+            return TransitionCallbackReturn.SUCCESS
+
+        def on_deactivate(self, state):
+            return super().on_deactivate(state)
+
+        def on_cleanup(self, state):  # RETURN
+            self.publisher = None
+
+        def on_shutdown(self, state):  # RETURN
+            return True
+    """,
+    """
+    class Robot(LifecycleNode):
+        def on_configure(self, state):
+            self.publisher = self.create_lifecycle_publisher(String, 'a', 10)
+            return TransitionCallbackReturn.SUCCESS
+
+        def on_activate(self, state):
+            self.publisher.on_activate(state)
+            return TransitionCallbackReturn.SUCCESS
+
+        def on_cleanup(self, state):
+            return self.clean()
+
+        def on_error(self, state):
+            raise RuntimeError
+    """,
+    """
+    class Robot(LifecycleNode):
+        def on_activate(self, state):
+            return TransitionCallbackReturn.SUCCESS
+    """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot')
+            self.create_service(SetBool, 'a', self.on_a)
+            self.create_service(SetBool, 'b', self.on_b)
+            ActionServer(self, Fibonacci, 'c', self.on_c)
+
+        def on_a(self, request, response):  # RETURN
+            response.success = True
+
+        def on_b(self, request, response):
+            if request.data:
+                return response
+
+        def on_c(self, goal_handle):  # RETURN
+            goal_handle.succeed()
+    """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot')
+            self.client = ActionClient(self, Fibonacci, 'a')
+
+        def on_tick(self):
+            self.client.wait_for_server
+            self.on_tick  # UNUSED
+            self.publisher.publish  # UNUSED
+            self.client == 1  # UNUSED
+
+        def helper():  # SELF?
+            pass
+    """,
+    """
+    class Robot(Node):
+        def build():
+            return 1
+
+        def names(kind):
+            return [kind]
+
+        NAMES = names('a')
+
+    Robot.build()
+    """,
+    """
+    class Robot(Node):
+        def create_timer(self, callback, seconds):
+            return super().create_timer(seconds, callback)
+
+        def on_tick(self):
+            self.create_timer(lambda: None, lambda event: None)
+    """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot')
+            self.create_subscription(String, 'a', self.on_a, 10)
+
+        def on_a(self, message):
+            if message.data == 3:  # VALUE?
+                pass
+    """,
+]
+
+
+@pytest.mark.parametrize("text", FILES)
+def test_classes(text: str, tmp_path: Path) -> None:
+    check(IMPORTS + textwrap.dedent(text), tmp_path, "class")

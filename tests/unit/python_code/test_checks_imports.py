@@ -1,0 +1,100 @@
+"""Imports that fail, that may fail elsewhere, and those that need not succeed."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from composer.interfaces import Interfaces
+from composer.python_code.checks.imports import import_problems
+from composer.python_code.problems import Family
+from composer.python_code.source.syntax import read_module
+
+
+@cache
+def interfaces() -> Interfaces:
+    return Interfaces.load()
+
+
+HELPERS = {"motor.py": "SPEED = 1\n\n\ndef start(): ...\n", "arms/__init__.py": "LEFT = 1\n"}
+
+
+def found(code: str, folder: Path) -> list[tuple[Family, str, str | None]]:
+    for name, text in {**HELPERS, "code.py": code}.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    module = read_module(folder / "code.py", "code.py")
+    problems = (problem for problem, _ in import_problems(module, folder, interfaces()))
+    return [(item.family, item.span.text, item.hint) for item in problems]
+
+
+FAIL = [
+    ("import nmpy", "nmpy", "did you mean 'numpy'?"),
+    ("import maths", "maths", "did you mean 'math'?"),
+    ("import moter", "moter", "did you mean 'motor'?"),
+    ("import os.pth", "pth", None),
+    ("import xml.etre", "etre", "did you mean 'etree'?"),
+    ("import arms.gripper", "gripper", None),
+    ("from .moter import SPEED", ".moter", None),
+    ("from motor import SPED", "SPED", "did you mean 'SPEED'?"),
+    ("from .motor import SPED", "SPED", "did you mean 'SPEED'?"),
+    ("from std_msgs.mgs import String", "mgs", "did you mean 'msg'?"),
+    ("from std_msgs.msg import Strin", "Strin", "did you mean 'String'?"),
+    ("from std_msgs.msg import Twist", "Twist", "import it from 'geometry_msgs.msg'"),
+    ("from std_srvs.msg import Trigger", "Trigger", "import it from 'std_srvs.srv'"),
+    ("import geometry_msg.msg", "geometry_msg", "did you mean 'geometry_msgs'?"),
+    ("from composer.behavior import CallCanceled", "CallCanceled", "did you mean 'CallCancelled'?"),
+    ("from composer.behaviour import Goal", "composer.behaviour",
+     "did you mean 'composer.behavior'?"),
+    ("from composer.typed import Driver", "Driver", "valid here: Behavior, SUFFIX"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "text", "hint"), FAIL)
+def test_imports_that_fail(code: str, text: str, hint: str | None, tmp_path: Path) -> None:
+    assert found(code, tmp_path) == [(Family.IMPORT, text, hint)]
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import fastkalman",
+        "from mars_msgs.msg import Crater",
+        "import sys\nsys.path.insert(0, '/opt/tools')\nimport meter",
+        "import importlib\nimportlib.import_module('a')\nimport moter",
+    ],
+)
+def test_modules_that_may_be_elsewhere(code: str, tmp_path: Path) -> None:
+    [(family, _, hint)] = found(code, tmp_path)
+    assert family is Family.NOT_INSTALLED
+    assert "did you mean" not in str(hint)
+
+
+def test_an_internal_module(tmp_path: Path) -> None:
+    [(family, text, _)] = found("from composer.names import join", tmp_path)
+    assert (family, text) == (Family.INTERNAL, "composer.names")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import math, os.path, collections.abc, xml.etree, motor, arms",
+        "from motor import SPEED, start",
+        "from . import motor",
+        "from .motor import start",
+        "from arms import LEFT, __doc__",
+        "import rclpy, numpy.linalg, tf2_ros",
+        "from std_srvs.srv import Trigger, Trigger_Request",
+        "from std_msgs.msg import *",
+        "from composer.behavior import Goal, Changes",
+        "from composer.typed import DriverBehavior",
+        "try:\n    import fast\nexcept ImportError:\n    fast = None",
+        "from contextlib import suppress\nwith suppress(ImportError):\n    import fast",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import fast",
+        "import os\nif os.environ.get('OLD'):\n    from motor import SPED\nelse:\n    import fast",
+    ],
+)
+def test_imports_that_succeed_or_need_not(code: str, tmp_path: Path) -> None:
+    assert found(code, tmp_path) == []
