@@ -41,7 +41,7 @@ help:
 	@echo "make lint          run lint, type and layer checks only"
 	@echo "make format        format the Python code"
 	@echo "make generate      write everything that is generated: schemas, reference pages, pictures"
-	@echo "make pictures      take the pictures of the dashboard in docs/pictures; needs Chromium"
+	@echo "make pictures      take the pictures of the dashboard and the editor in docs/pictures; needs Chromium, Node.js"
 	@echo "make docs          build the documentation as a site in build/site"
 	@echo "make bench         run the benchmarks"
 	@echo "make profile       profile $(SYSTEM) for $(PROFILE_SECONDS) seconds (SYSTEM=... PROFILE_SECONDS=...)"
@@ -96,9 +96,10 @@ generate: $(READY)
 	@$(BIN)/python tools/write_rules.py
 	@$(BIN)/python tools/draw_pictures.py
 
-# Not part of generate: no two versions of Chromium draw the same pixels.
+# Not part of generate: they need Chromium, of which no two versions draw the same pixels, and npm packages.
 pictures: $(READY) $(STAMPS)/dev
 	@$(BIN)/python tools/draw_dashboard.py
+	@$(BIN)/python tools/draw_editor.py
 
 docs: $(STAMPS)/dev
 	@$(BIN)/mkdocs build --quiet --strict

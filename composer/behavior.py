@@ -100,9 +100,7 @@ class Publisher(Protocol[M]):
 class Client(Protocol[Req, Res]):
     """A service client port."""
 
-    def call(
-        self, request: Req, *, timeout_ms: float | None = None
-    ) -> Coroutine[Any, Any, Res]:
+    def call(self, request: Req, *, timeout_ms: float | None = None) -> Coroutine[Any, Any, Res]:
         """Call the service; wait for server and response up to the timeout (default: the port's).
 
         Raises ServerUnavailable, CallTimeout, CallCancelled.
@@ -224,9 +222,7 @@ class Transforms(Protocol):
     between the frames are known. Between two received transforms, values are interpolated.
     """
 
-    def lookup(
-        self, target: str, source: str, *, stamp: Time | None = None
-    ) -> TransformStamped:
+    def lookup(self, target: str, source: str, *, stamp: Time | None = None) -> TransformStamped:
         """Return the transform from ``source`` to ``target``, a TransformStamped.
 
         Raises TransformLookupError, TransformConnectivityError, TransformExtrapolationError.

@@ -108,6 +108,28 @@ def load(
 @_without_cycle_collection()
 def load_files(paths: Iterable[Path]) -> list[LoadResult]:
     """Load the files. Files of one project share its interfaces."""
+    return _check(_resolve_files(paths))
+
+
+@_without_cycle_collection()
+def load_models(paths: Iterable[Path]) -> list[LoadResult]:
+    """Load the files without checking them; ``diagnostics`` are those of reading them."""
+    return [
+        LoadResult(
+            None if item.context is None else item.context.system,
+            item.diagnostics,
+            item.source,
+            item.definitions.project,
+            item.definitions.node_types,
+            item.definitions.interfaces,
+            item.merged.tree,
+        )
+        for item in _resolve_files(paths)
+    ]
+
+
+def _resolve_files(paths: Iterable[Path]) -> list[_Resolved]:
+    """Turn files into their models. Files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
     by_folder: dict[Path, _Definitions] = {}
     resolved = []
@@ -116,7 +138,7 @@ def load_files(paths: Iterable[Path]) -> list[LoadResult]:
         if folder not in by_folder:
             by_folder[folder] = _Definitions.with_shared_interfaces(folder, shared)
         resolved.append(_resolve(_read(path), by_folder[folder]))
-    return _check(resolved)
+    return resolved
 
 
 @_without_cycle_collection()

@@ -46,6 +46,21 @@ def is_typo(name: str, other: str) -> bool:
     return end > 0 and max(map(len, parts)) == 1
 
 
+def edit_distance(name: str, other: str) -> int:
+    """Return how many letters to insert, remove, replace or swap to get the other name."""
+    rows = [list(range(len(other) + 1))]
+    for row, letter in enumerate(name):
+        current = [row + 1]
+        for column, wanted in enumerate(other):
+            costs = [current[-1] + 1, rows[-1][column + 1] + 1]
+            costs.append(rows[-1][column] + (letter != wanted))
+            if row and column and (letter, name[row - 1]) == (other[column - 1], wanted):
+                costs.append(rows[-2][column - 1] + 1)
+            current.append(min(costs))
+        rows.append(current)
+    return rows[-1][-1]
+
+
 def _shared(name: str, other: str) -> int:
     """Return the number of letters that the names have in common at the start."""
     pairs = enumerate(zip(name, other, strict=False))

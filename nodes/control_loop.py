@@ -6,10 +6,10 @@ import threading
 
 from std_msgs.msg import String
 
-from composer.behavior import Behavior
+from composer.typed import ControlLoopBehavior
 
 
-class ControlLoop(Behavior):
+class ControlLoop(ControlLoopBehavior):
     """Publish the name of the thread in every cycle: it is always the same."""
 
     def on_cycle(self) -> None:

@@ -8,10 +8,10 @@ import zlib
 
 from std_msgs.msg import String
 
-from composer.behavior import Behavior
+from composer.typed import FrameProcessorBehavior
 
 
-class FrameProcessor(Behavior):
+class FrameProcessor(FrameProcessorBehavior):
     """Compress a frame each time the timer fires; callbacks may overlap on several threads."""
 
     def on_configure(self) -> None:

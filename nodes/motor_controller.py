@@ -10,13 +10,14 @@ from composer_interfaces.srv import PlanTrajectory
 from geometry_msgs.msg import Point, Twist
 from nav_msgs.msg import Odometry, Path
 
-from composer.behavior import Behavior, CallCancelled, CallError, Goal
+from composer.behavior import CallCancelled, CallError, Goal
+from composer.typed import MotorControllerBehavior
 
 ODOMETRY_TIMEOUT_S = 2.0  # a goal may arrive before the first odometry
 RETRY_S = 1.0  # pause before the next request after the planner has refused one
 
 
-class MotorController(Behavior):
+class MotorController(MotorControllerBehavior):
     """Track a path: command the velocity of the path plus a position correction."""
 
     def on_activate(self) -> None:
@@ -81,7 +82,7 @@ class MotorController(Behavior):
         target: Point = goal.request.target
         started_at_m = self.distance_traveled
         self.reference, reason = await self._plan(target, goal.request.max_velocity)
-        if self.reference is None:
+        if self.reference is None or self.position is None:
             goal.abort()
             return Navigate.Result(message=reason)
         length = max(_distance(self.position, target), self.parameters.tolerance)
@@ -133,6 +134,8 @@ class MotorController(Behavior):
         return velocity_x, velocity_y
 
     def _arrived(self, reference: Reference) -> bool:
+        if self.position is None:
+            return False
         return _distance(self.position, reference.end) <= self.parameters.tolerance
 
 

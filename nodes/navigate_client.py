@@ -6,10 +6,11 @@ from composer_interfaces.action import Navigate
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
-from composer.behavior import Behavior, CallError, GoalRejected, SentGoal
+from composer.behavior import CallError, GoalRejected, SentGoal
+from composer.typed import NavigateClientBehavior
 
 
-class NavigateClient(Behavior):
+class NavigateClient(NavigateClientBehavior):
     """Send one goal after each activation and publish its outcome."""
 
     def on_activate(self) -> None:

@@ -7,10 +7,11 @@ import math
 from composer_interfaces.action import Navigate
 from geometry_msgs.msg import Point
 
-from composer.behavior import Behavior, Goal
+from composer.behavior import Goal
+from composer.typed import NavigatorBehavior
 
 
-class Navigator(Behavior):
+class Navigator(NavigatorBehavior):
     """Move at the goal's velocity, publish feedback after each step, and stop when canceled."""
 
     def on_activate(self) -> None:

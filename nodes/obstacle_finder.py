@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from geometry_msgs.msg import PointStamped
 
-from composer.behavior import Behavior, TransformError
+from composer.behavior import TransformError
+from composer.typed import ObstacleFinderBehavior
 
 
-class ObstacleFinder(Behavior):
+class ObstacleFinder(ObstacleFinderBehavior):
     """Transform each detection from the frame of its sensor to the map."""
 
     async def on_detections(self, message: PointStamped) -> None:

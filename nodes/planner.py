@@ -9,12 +9,12 @@ from composer_interfaces.srv import PlanTrajectory
 from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Odometry, Path
 
-from composer.behavior import Behavior
+from composer.typed import PlannerBehavior
 
 NANOSECONDS = 1_000_000_000
 
 
-class Planner(Behavior):
+class Planner(PlannerBehavior):
     """Sample the line from start to goal, evenly in time, at the maximum velocity allowed."""
 
     def on_activate(self) -> None:
@@ -29,26 +29,19 @@ class Planner(Behavior):
         self, request: PlanTrajectory.Request, response: PlanTrajectory.Response
     ) -> PlanTrajectory.Response:
         """Return a path, or the reason why there is none."""
-        reason = self._refusal(request)
+        if self.odometry is None:
+            response.message = "no odometry received yet: the frame of the path is unknown"
+            return response
+        reason = _refusal(request)
         if reason is None:
-            response.path = self._path(request)
+            response.path = self._path(request, self.odometry.header.frame_id)
             response.success = True
             response.message = f"{len(response.path.poses)} points"
         else:
             response.message = reason
         return response
 
-    def _refusal(self, request: PlanTrajectory.Request) -> str | None:
-        if self.odometry is None:
-            return "no odometry received yet: the frame of the path is unknown"
-        if not request.max_velocity > 0.0:
-            return f"max_velocity must be above 0 m/s, not {request.max_velocity}"
-        points = (request.start, request.goal)
-        if not all(math.isfinite(value) for p in points for value in (p.x, p.y, p.z)):
-            return "start and goal must be finite"
-        return None
-
-    def _path(self, request: PlanTrajectory.Request) -> Path:
+    def _path(self, request: PlanTrajectory.Request, frame_id: str) -> Path:
         start, goal = request.start, request.goal
         velocity = min(request.max_velocity, self.parameters.max_velocity)
         period_s = self.parameters.sample_period_ms / 1000.0
@@ -56,7 +49,7 @@ class Planner(Behavior):
         steps = max(1, math.ceil(length / (velocity * period_s)))
         yaw = math.atan2(goal.y - start.y, goal.x - start.x)
         path = Path()
-        path.header.frame_id = self.odometry.header.frame_id
+        path.header.frame_id = frame_id
         path.header.stamp = self.clock.stamp()
         for step in range(steps + 1):
             pose = PoseStamped()
@@ -67,6 +60,15 @@ class Planner(Behavior):
             pose.pose.orientation.w = math.cos(yaw / 2.0)
             path.poses.append(pose)
         return path
+
+
+def _refusal(request: PlanTrajectory.Request) -> str | None:
+    if not request.max_velocity > 0.0:
+        return f"max_velocity must be above 0 m/s, not {request.max_velocity}"
+    points = (request.start, request.goal)
+    if not all(math.isfinite(value) for p in points for value in (p.x, p.y, p.z)):
+        return "start and goal must be finite"
+    return None
 
 
 def _between(start: Point, goal: Point, share: float) -> Point:

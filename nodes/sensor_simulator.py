@@ -7,10 +7,10 @@ import math
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from composer.behavior import Behavior
+from composer.typed import SensorSimulatorBehavior
 
 
-class SensorSimulator(Behavior):
+class SensorSimulator(SensorSimulatorBehavior):
     """Integrate the commanded velocity under an acceleration limit."""
 
     def on_activate(self) -> None:

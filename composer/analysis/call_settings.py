@@ -16,9 +16,15 @@ def callback_settings(node: Node) -> Iterator[tuple[str, Span]]:
         yield f"state '{name}'", name.span
     for event, reaction in node.reactions:
         yield f"'on_{event}'", reaction.span
+    for port in node.ports:
+        for event, reaction in port.reactions:
+            yield f"the reaction of {port.kind} '{port.name}' to its {event}", reaction.span
+        if port.result is not None or port.feedback is not None or port.accept is not None:
+            yield f"the reaction of {port.kind} '{port.name}'", port.span
+        yield from _call_limits(port)
 
 
-def call_limits(port: Port) -> Iterator[tuple[str, Span]]:
+def _call_limits(port: Port) -> Iterator[tuple[str, Span]]:
     """Yield the limits that a client port sets, as text and place."""
     limits = (("timeout_ms", port.timeout_ms), ("result_timeout_ms", port.result_timeout_ms))
     for name, located in limits:

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.frame_uses import BROADCAST, FrameUse, frame_uses
 from composer.analysis.python_nodes import behaviors
 from composer.diagnostics import Label
 from composer.fast_dataclass import dataclass
@@ -20,7 +21,6 @@ from composer.model import (
     PortKind,
     StaticTransform,
 )
-from composer.python_code.nodes.frames import BROADCAST, FrameUse, frame_uses
 from composer.python_code.source import BehaviorSource
 from composer.source import Located, Span
 from composer.spelling import vocabulary

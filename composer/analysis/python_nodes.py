@@ -19,11 +19,6 @@ def distinct_behaviors(context: Context) -> tuple[NodeBehavior, ...]:
     return context.once(_distinct_behaviors)
 
 
-def complete_behaviors(context: Context) -> tuple[NodeBehavior, ...]:
-    """Return the nodes whose behavior is known completely, with its source."""
-    return of_behaviors.complete_behaviors(behaviors(context))
-
-
 def hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:
     """Return every node with a class, and the source of the class."""
     return context.once(_hosted_classes)
@@ -42,7 +37,10 @@ def _behaviors(context: Context) -> tuple[NodeBehavior, ...]:
 
 
 def _distinct_behaviors(context: Context) -> tuple[NodeBehavior, ...]:
-    return of_behaviors.distinct_behaviors(behaviors(context))
+    first: dict[object, NodeBehavior] = {}
+    for node, source in behaviors(context):
+        first.setdefault(of_behaviors.use_of(node, source), (node, source))
+    return tuple(first.values())
 
 
 def _hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:

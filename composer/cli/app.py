@@ -44,6 +44,7 @@ COMMANDS = {
         "export": "files.export",
         "interfaces": "files.interfaces",
         "schema": "files.schema",
+        "stubs": "files.stubs",
     },
     "Commands for ROS 2": {
         "lifecycle": "ros.lifecycle",

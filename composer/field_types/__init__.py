@@ -18,6 +18,7 @@ unknown. Unknown types never cause a problem, and one mistake causes one problem
 
 from composer.field_types.checker import FieldChecker
 from composer.field_types.constants import constant_problem
+from composer.field_types.enumerators import enumerator_problem, enumerators
 from composer.field_types.types import (
     ANYTHING,
     BOOL,
@@ -57,6 +58,8 @@ __all__ = [
     "Word",
     "constant_problem",
     "described",
+    "enumerator_problem",
+    "enumerators",
     "fields_of",
     "is_bool",
     "is_number",

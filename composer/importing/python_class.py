@@ -8,20 +8,19 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from composer.analysis.class_ports import CREATORS, qos_profile
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.model import BehaviorReference, PortKind
 from composer.project import Project
-from composer.python_code.nodes.class_interfaces import CREATORS
-from composer.python_code.nodes.classes import is_rclpy_node
 from composer.python_code.source import (
     BehaviorSource,
     Function,
     find_behavior,
     nearby_modules,
 )
-from composer.python_code.source.values import NotLiteral, Scope
+from composer.python_code.source.values import NotLiteral, Scope, scopes_in
 from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
@@ -64,10 +63,8 @@ def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]
     source = find_behavior(BehaviorReference(located, folder))
     _check(source, text, folder)
     reader = _ClassReader([], [], [])
-    for module, known in source.classes_outside_ros:
-        for method in known.methods:
-            if method.node is not None:
-                reader.read(Scope(module, known.node, method.node))
+    for scope in scopes_in(source.classes):
+        reader.read(scope)
     own_module, own = source.classes[0]
     place = f"{shown_path(own_module.path)}:{own.span.line}"
     comments: tuple[str, ...] = (
@@ -108,7 +105,7 @@ def _check(source: BehaviorSource, text: str, folder: Path) -> None:
             f"the source of '{text}' cannot be read: it is compiled or made at run time",
             "use --construct to run its constructor",
         )
-    if source.complete and not is_rclpy_node(source):
+    if source.complete and not source.is_rclpy_node:
         raise ClassNotFound(
             f"class '{name}' is not derived from rclpy's Node",
             "a class without ROS is the 'behavior' of a node type: 'compose new node' creates one",
@@ -163,7 +160,8 @@ class _ClassReader:
         qos = None
         if "qos_profile" in given:
             qos = self._try(
-                lambda: scope.qos(given["qos_profile"]), f"{place}: the QoS of {kind} {port_name}"
+                lambda: qos_profile(scope, given["qos_profile"]),
+                f"{place}: the QoS of {kind} {port_name}",
             )
         known = {(port.kind, port.name) for port in self.ports}
         if (kind, port_name) not in known:

@@ -65,6 +65,7 @@ class Interfaces:
         self._reading: set[str] = set()  # a definition, and those that contain it
         self._installed: dict[str, Interface | None] = {}
         self._packages: frozenset[str] | None = None
+        self._names: dict[str, tuple[str, ...]] = {}
 
     @classmethod
     def load(cls, folders: Iterable[Path] = ()) -> Interfaces:
@@ -164,7 +165,10 @@ class Interfaces:
 
     def names(self, folder: str) -> tuple[str, ...]:
         """Return the names of all interfaces in ``folder`` (msg, srv or action), sorted."""
-        return tuple(sorted({name for source in self._sources for name in source.names(folder)}))
+        if folder not in self._names:
+            names = {name for source in self._sources for name in source.names(folder)}
+            self._names[folder] = tuple(sorted(names))
+        return self._names[folder]
 
     def _look_up(self, name: str) -> Interface | InvalidDefinition | None:
         if name not in self._found:

@@ -36,6 +36,7 @@ class Family(Enum):
     CONSTRUCTOR = "a constructor or transition that does not call that of its base class"
     SELF = "a method that lacks self"
     INDEX = "an element that an array does not have"
+    SYNTAX = "code that Python refuses to compile"
     NOT_CHECKED = "code that was not checked"
 
 

@@ -1,14 +1,16 @@
-"""A client of yaml-language-server, as editors are: JSON-RPC over standard input and output."""
+"""A client of language servers, as editors are: JSON-RPC over standard input and output."""
 
 from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 CURSOR = "|"
+_ERROR = 1
 _CAPABILITIES = {
     "textDocument": {
         "completion": {"completionItem": {"documentationFormat": ["markdown"]}},
@@ -16,7 +18,8 @@ _CAPABILITIES = {
     },
     "workspace": {"configuration": True},
 }
-_SETTINGS = {"validate": True, "hover": True, "completion": True, "schemaStore": {"enable": False}}
+#: The settings of yaml-language-server, by section.
+_YAML = {"validate": True, "hover": True, "completion": True, "schemaStore": {"enable": False}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +39,25 @@ class Cursor:
 class LanguageServer:
     """A running language server."""
 
-    def __init__(self, program: Path) -> None:
+    def __init__(
+        self, program: Path, root: Path | None = None, settings: Mapping[str, Any] | None = None
+    ) -> None:
+        """Start the server in a workspace, with its settings by section."""
+        self._settings = {"yaml": _YAML} if settings is None else settings
         self._process = subprocess.Popen(
             ["node", str(program), "--stdio"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
         self._requests = 0
         self._documents = 0
         self._diagnostics: dict[str, list[dict[str, Any]]] = {}
-        parameters = {"processId": None, "rootUri": None, "capabilities": _CAPABILITIES}
+        uri = None if root is None else root.as_uri()
+        folders = [] if root is None else [{"uri": uri, "name": root.name}]
+        parameters = {
+            "processId": None,
+            "rootUri": uri,
+            "workspaceFolders": folders,
+            "capabilities": _CAPABILITIES,
+        }
         self._request("initialize", parameters)
         self._notify("initialized", {})
 
@@ -57,8 +71,15 @@ class LanguageServer:
         self._documents += 1
         uri = f"file:///test/{self._documents}.yaml"
         text = f"# yaml-language-server: $schema={schema.as_uri()}\n{text}"
+        return self._open(uri, "yaml", text)
+
+    def open_python(self, path: Path, text: str) -> Cursor:
+        """Open a Python file with this text; return the position of ``|``."""
+        return self._open(path.as_uri(), "python", text)
+
+    def _open(self, uri: str, language: str, text: str) -> Cursor:
         before, _, after = text.partition(CURSOR)
-        document = {"uri": uri, "languageId": "yaml", "version": 1, "text": before + after}
+        document = {"uri": uri, "languageId": language, "version": 1, "text": before + after}
         self._notify("textDocument/didOpen", {"textDocument": document})
         return Cursor(uri, before.count("\n"), len(before.rpartition("\n")[2]))
 
@@ -74,9 +95,21 @@ class LanguageServer:
 
     def diagnostics(self, cursor: Cursor) -> list[str]:
         """Wait for the diagnostics of a document, and return their messages."""
+        return [item["message"] for item in self.awaited_diagnostics(cursor)]
+
+    def errors(self, cursor: Cursor) -> dict[int, str]:
+        """Wait for the diagnostics of a document; return the errors by line, counted from 1."""
+        return {
+            item["range"]["start"]["line"] + 1: item["message"]
+            for item in self.awaited_diagnostics(cursor)
+            if item["severity"] == _ERROR
+        }
+
+    def awaited_diagnostics(self, cursor: Cursor) -> list[dict[str, Any]]:
+        """Wait for the diagnostics of a document, and return them."""
         while cursor.uri not in self._diagnostics:
             self._handle(self._receive())
-        return [item["message"] for item in self._diagnostics[cursor.uri]]
+        return self._diagnostics[cursor.uri]
 
     def _request(self, method: str, parameters: dict[str, Any]) -> Any:
         self._requests += 1
@@ -95,7 +128,7 @@ class LanguageServer:
         match message.get("method"):
             case "workspace/configuration":
                 items = message["params"]["items"]
-                found = [_SETTINGS if item.get("section") == "yaml" else {} for item in items]
+                found = [self._settings.get(item.get("section"), {}) for item in items]
                 self._send({"id": message["id"], "result": found})
             case "textDocument/publishDiagnostics":
                 self._diagnostics[message["params"]["uri"]] = message["params"]["diagnostics"]

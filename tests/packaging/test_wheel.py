@@ -16,6 +16,7 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
 
     for path in (
         "composer/py.typed",
+        "composer/python_code/stubs/libraries/rclpy/node.pyi",
         "composer/share/interfaces/action/Navigate.action",
         "composer/share/nodes/planner.py",
         "composer/share/nodes/planner.yaml",

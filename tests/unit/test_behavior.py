@@ -8,7 +8,10 @@ from typing import Any
 
 import pytest
 
+import composer.typed
 from composer.behavior import Behavior
+from composer.typed import ArmBehavior
+from composer.typed import PlannerBehavior as Base
 
 
 class Counter(Behavior):
@@ -40,3 +43,13 @@ def test_any_attribute_may_be_set(kind: type[Any]) -> None:
 def test_what_was_not_set_is_missing() -> None:
     with pytest.raises(AttributeError, match="publishers"):
         _ = Counter().publishers
+
+
+def test_every_class_of_composer_typed_is_the_base_class() -> None:
+    assert ArmBehavior is Base is Behavior
+
+
+@pytest.mark.parametrize("name", ["Planner", "planner_behavior", "_Behaviors"])
+def test_composer_typed_has_nothing_else(name: str) -> None:
+    with pytest.raises(AttributeError, match=name):
+        getattr(composer.typed, name)

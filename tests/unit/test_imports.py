@@ -25,7 +25,8 @@ def _imported_modules(path: Path) -> Iterator[str]:
 def _is_allowed(module: str) -> bool:
     package, *rest = module.split(".")
     is_interface = rest[:1] in (["msg"], ["srv"], ["action"])
-    return module == "composer.behavior" or is_interface or package in sys.stdlib_module_names
+    is_api = module in ("composer.behavior", "composer.typed")
+    return is_api or is_interface or package in sys.stdlib_module_names
 
 
 def test_there_are_behaviors_to_look_at() -> None:
@@ -41,6 +42,7 @@ def test_a_node_type_imports_the_behavior_protocol_and_messages_only(path: Path)
     ("module", "allowed"),
     [
         ("composer.behavior", True),
+        ("composer.typed", True),
         ("math", True),
         ("__future__", True),
         ("geometry_msgs.msg", True),

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from composer import spelling
-from composer.spelling import LONGEST_NAME, Vocabulary, is_typo, vocabulary
+from composer.spelling import LONGEST_NAME, Vocabulary, edit_distance, is_typo, vocabulary
 
 MANY = [f"camera_{number}_driver" for number in range(3000)]
 
@@ -95,3 +95,11 @@ def test_no_more_names_are_compared_among_many(monkeypatch: pytest.MonkeyPatch) 
 )
 def test_one_wrong_letter_of_a_longer_word_is_a_typo(name: str, other: str, expected: bool) -> None:
     assert is_typo(name, other) is expected
+
+
+@pytest.mark.parametrize(
+    ("name", "other", "distance"),
+    [("numpy", "numpy", 0), ("nmpy", "numpy", 1), ("nupmy", "numpy", 1), ("moter", "meta", 3)],
+)
+def test_edit_distance(name: str, other: str, distance: int) -> None:
+    assert edit_distance(name, other) == edit_distance(other, name) == distance

@@ -11,9 +11,7 @@ from composer.model import ImplementationKind, Node, Port, PortKind, Reaction, T
 from composer.python_code.nodes.behaviors import (
     GENERAL_HANDLERS,
     called_methods,
-    escaping_publishers,
     handlers,
-    methods_by_name,
     reached_methods,
 )
 from composer.python_code.source import BehaviorSource, Call, published_port
@@ -114,7 +112,7 @@ def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]
     }
     calls = (call for method in source.methods for call in method.calls)
     deferred = _ports_in(call for call in calls if call.deferred)
-    whenever = deferred | escaping_publishers(source)
+    whenever = deferred | _passed_on(source)
     return {name: ports for name, ports in {**direct, "": whenever}.items() if ports}
 
 
@@ -122,10 +120,9 @@ def _reached_ports(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
     """Return the publishers that each method uses itself, or through the methods that it calls."""
     ports = {}
     callers: dict[str, list[str]] = {}
-    known = methods_by_name(source)
-    for method in known.values():
+    for method in source.methods:
         ports[method.name] = _ports_in(call for call in method.calls if not call.deferred)
-        for callee in called_methods(method, known):
+        for callee in called_methods(source, method):
             callers.setdefault(callee.name, []).append(method.name)
     pending = [name for name, found in ports.items() if found]
     while pending:
@@ -135,6 +132,14 @@ def _reached_ports(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
                 ports[caller] |= ports[name]
                 pending.append(caller)
     return ports
+
+
+def _passed_on(source: BehaviorSource) -> frozenset[str]:
+    """Return the publishers that a behavior passes on or stores; their uses are unknown."""
+    names = (name for method in source.methods for name in method.body.mentioned)
+    stored = (name.removesuffix(".publish") for name in names)
+    parts = (name.removeprefix("self.publishers.") for name in stored if name.count(".") == 2)
+    return frozenset(name for name in parts if "." not in name)
 
 
 def _ports_in(calls: Iterable[Call]) -> frozenset[str]:

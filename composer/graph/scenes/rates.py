@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import ast
+from collections.abc import Iterator, Mapping
 
 from composer.model import Node, PortKind, Timer
-from composer.python_code.source import Method, find_behavior
+from composer.python_code.source import Method, find_behavior, published_port
+
+#: Statements that may leave a method early.
+_EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)
 
 
 def timer_rate_hz(node: Node, timer: Timer) -> float | None:
@@ -25,7 +29,7 @@ def publishing_rates_hz(node: Node) -> dict[str, float]:
     for port in node.ports_of(PortKind.PUBLISHER):
         name = port.name.value
         timers = [timer for timer in node.timers if _always_publishes(timer, name, handlers)]
-        elsewhere = sum(name in method.publishing.anywhere for method in handlers.values())
+        elsewhere = sum(f"self.publishers.{name}" in _names(method) for method in handlers.values())
         by_handler = sum(timer.reaction is None for timer in timers)
         if len(timers) != 1 or elsewhere != by_handler or _is_answered_with(node, name):
             continue
@@ -57,4 +61,22 @@ def _always_publishes(timer: Timer, port: str, handlers: Mapping[str, Method]) -
             send.port.value == port for send in timer.reaction.publish
         )
     handler = handlers.get(f"on_{timer.name.value}")
-    return handler is not None and port in handler.publishing.always
+    return handler is not None and [*_unconditional(handler)].count(port) == 1
+
+
+def _names(method: Method) -> frozenset[str]:
+    """Return the first three parts of the names in a method: ``self.publishers.status``."""
+    names = (*(call.name for call in method.calls), *method.body.mentioned)
+    return frozenset(".".join(name.split(".")[:3]) for name in names)
+
+
+def _unconditional(method: Method) -> Iterator[str]:
+    """Yield the ports that unconditional statements publish to, up to the first possible exit."""
+    names = {call.node: call.name for call in method.calls}
+    for statement in method.node.body if method.node is not None else ():
+        if isinstance(statement, ast.Expr):
+            port = published_port(names.get(statement.value, ""))  # type: ignore[call-overload]
+            if port is not None:
+                yield port
+        elif any(isinstance(inner, _EXITS) for inner in ast.walk(statement)):
+            return

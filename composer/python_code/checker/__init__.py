@@ -6,13 +6,14 @@ that its node type generates, and handlers and callbacks get annotated arguments
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import field
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import Node
-from composer.python_code.checker.findings import problems_of
+from composer.python_code.checker.findings import SYNTAX_KINDS, problems_of
 from composer.python_code.checker.project import CheckedFile, FileSet, file_sets
 from composer.python_code.checker.pyrefly import Check, CheckerFailed, start_check
 from composer.python_code.problems import Family, Problem
@@ -33,7 +34,7 @@ class RunningCheck:
     interfaces: Interfaces
     waiting: list[FileSet]
     running: list[tuple[Check, dict[str, CheckedFile], FileSet]] = field(default_factory=list)
-    failures: list[tuple[CheckedFile, str]] = field(default_factory=list)
+    found: list[tuple[Node, BehaviorSource, Problem]] = field(default_factory=list)
 
     def fill(self) -> None:
         """Start as many checks as may run side by side."""
@@ -41,32 +42,52 @@ class RunningCheck:
             files = self.waiting.pop(0)
             copies = files.copies()
             texts = {name: item.copy.text for name, item in copies.items()}
-            stubs = files.stubs((item.copy for item in copies.values()), self.interfaces)
+            texts |= {name: item[0].span.file.text for name, item in files.broken.items()}
+            stubs = files.stubs(self.interfaces)
             try:
-                check = start_check({**texts, **stubs}, copies, files.search_paths())
+                check = start_check({**texts, **stubs}, texts, files.search_paths())
             except CheckerFailed as error:
-                self.failures.append((next(iter(copies.values())), str(error)))
+                self._failed(files, copies, error)
                 self.waiting.clear()  # the next one would fail as well
                 return
             self.running.append((check, copies, files))
 
+    def _failed(
+        self, files: FileSet, copies: Mapping[str, CheckedFile], error: CheckerFailed
+    ) -> None:
+        """Report once that the checker does not work, and what is wrong without it."""
+        for item in copies.values() if not self.found else ():
+            message = f"the type checker did not check the Python code: {error}"
+            problem = Problem(Family.NOT_CHECKED, message, Span(item.copy.module.source, 1, 1))
+            self.found.append((item.node, item.source, problem))
+            break
+        self._add_broken(files, files.broken)
+
+    def _add_broken(self, files: FileSet, refused: Container[str]) -> None:
+        """Report the files that Python cannot parse, those that the checker can parse as info."""
+        for name, (broken, node, source) in files.broken.items():
+            problem = Problem(Family.SYNTAX, broken.message, broken.span)
+            if name not in refused:
+                version = ".".join(map(str, sys.version_info[:2]))
+                message = f"this Python, {version}, cannot parse the file, which needs a newer one"
+                hint = "Jazzy's Python is 3.12"
+                problem = Problem(Family.NOT_CHECKED, message, broken.span, hint)
+            self.found.append((node, source, problem))
+
     def problems(self) -> list[tuple[Node, BehaviorSource, Problem]]:
         """Wait for all checks, and return what they found, each with the node it is about."""
-        found: list[tuple[Node, BehaviorSource, Problem]] = []
         while self.running:
             check, copies, files = self.running.pop(0)
             try:
                 findings = check.result()
             except CheckerFailed as error:
-                self.failures.append((next(iter(copies.values())), str(error)))
-                findings = []
-            found += problems_of(findings, copies, files.behaviors, self.interfaces)
+                self._failed(files, copies, error)
+            else:
+                refused = {item.path for item in findings if item.kind in SYNTAX_KINDS}
+                self._add_broken(files, refused)
+                self.found += problems_of(findings, copies, files.behaviors, self.interfaces)
             self.fill()
-        for item, reason in self.failures[:1]:
-            message = f"the type checker did not check the Python code: {reason}"
-            span = Span(item.copy.module.source, 1, 1)
-            found.append((item.node, item.source, Problem(Family.NOT_CHECKED, message, span)))
-        return found
+        return self.found
 
     def close(self) -> None:
         """End all checks."""

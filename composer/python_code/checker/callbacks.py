@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
-from dataclasses import field
+from collections.abc import Iterable, Iterator, Mapping
 
-from composer.fast_dataclass import dataclass
 from composer.python_code.source import Module
-from composer.python_code.source.method_body import argument, dotted
+from composer.python_code.source.trees import argument, dotted
 from composer.python_code.stubs.behaviors import Signature
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
@@ -20,10 +18,7 @@ _OF_ACTION_SERVERS = {
     "cancel_callback": (None, ("goal_handle", _HANDLE), ""),
     "handle_accepted_callback": (None, ("goal_handle", _HANDLE), ""),
 }
-_OF_ACTIONS = frozenset({"get_result_async", "send_goal_async"})
 _FEEDBACK = "rclpy.action.client._FeedbackMessage[{0}.Feedback]"
-#: The functions that create clients, with the position and name of the argument for their type.
-_CLIENTS = {"create_client": (0, "srv_type"), "ActionClient": (1, "action_type")}
 _FUTURES = {
     "call_async": "rclpy.task.Future[{0}.Response]",
     "send_goal_async": f"rclpy.task.Future[{_SENT_GOAL}]",
@@ -31,44 +26,31 @@ _FUTURES = {
 }
 
 
-@dataclass(slots=True)
-class _Names:
-    """Where a class stores clients and futures, as written, each with its type."""
-
-    clients: dict[str, str] = field(default_factory=dict)
-    futures: dict[str, str] = field(default_factory=dict)
-    actions: list[str] = field(default_factory=list)
-
-    @property
-    def action(self) -> str:
-        """The only action that the class has clients for, else ""."""
-        return self.actions[0] if len(set(self.actions)) == 1 else ""
-
-    def client_of(self, call: ast.Call) -> str:
-        """Return the type of the client whose method is called; "" if it is unknown."""
-        known = self.clients.get(dotted(call.func).rpartition(".")[0], "")
-        return known or (self.action if _last(call.func) in _OF_ACTIONS else "")
-
-    def future_of(self, call: ast.Call) -> str:
-        """Return the type of the future that a call returns; "" if it is unknown."""
-        client = self.client_of(call)
-        return _FUTURES.get(_last(call.func), "").format(client) if client else ""
-
-
 def callback_signatures(node: ast.ClassDef, module: Module) -> dict[str, Signature]:
     """Return the methods of a class that it passes to rclpy, with what they are called with.
 
-    A method that is passed as a callback of several types is left out.
+    A method that is passed as a callback of several types is left out. A callback of a client or
+    future has a known type if the class has clients of one service, or of one action, only.
     """
     found: dict[str, set[Signature]] = {}
-    names = _names(node, module)
-    for call in ast.walk(node):
-        for name, signature in _of_call(call, module, names) if isinstance(call, ast.Call) else ():
+    calls = [item for item in ast.walk(node) if isinstance(item, ast.Call)]
+    service = _only(
+        _type(argument(x, 0, "srv_type"), module) for x in _named("create_client", calls)
+    )
+    action = _only(
+        _type(argument(x, 1, "action_type"), module) for x in _named("ActionClient", calls)
+    )
+    clients = {"call_async": service, "send_goal_async": action, "get_result_async": action}
+    futures = dict(_futures(node))
+    for call in calls:
+        for name, signature in _of_call(call, module, clients, futures):
             found.setdefault(name, set()).add(signature)
     return {name: items.pop() for name, items in found.items() if len(items) == 1}
 
 
-def _of_call(call: ast.Call, module: Module, names: _Names) -> Iterator[tuple[str, Signature]]:
+def _of_call(
+    call: ast.Call, module: Module, clients: Mapping[str, str], futures: Mapping[str, str]
+) -> Iterator[tuple[str, Signature]]:
     match _last(call.func):
         case "create_subscription":
             type_ = _type(argument(call, 0, "msg_type"), module)
@@ -84,14 +66,16 @@ def _of_call(call: ast.Call, module: Module, names: _Names) -> Iterator[tuple[st
                 at = len(call.args) if position is None else position
                 yield from _bound(argument(call, at, keyword), type_, (taken,), result)
         case "send_goal_async":
-            type_ = names.client_of(call)
             callback = argument(call, 1, "feedback_callback")
-            yield from _bound(callback, type_, (("feedback_message", _FEEDBACK),))
+            feedback = (("feedback_message", _FEEDBACK),)
+            yield from _bound(callback, clients["send_goal_async"], feedback)
         case "add_done_callback" if isinstance(call.func, ast.Attribute):
             receiver = call.func.value
-            is_call = isinstance(receiver, ast.Call)
-            future = names.future_of(receiver) if is_call else names.futures.get(dotted(receiver))
-            yield from _bound(argument(call, 0, "callback"), future or "", (("future", "{0}"),))
+            made = futures.get(dotted(receiver), "")
+            if isinstance(receiver, ast.Call):
+                made = _last(receiver.func)
+            future = (("future", _FUTURES.get(made, "")),)
+            yield from _bound(argument(call, 0, "callback"), clients.get(made, ""), future)
 
 
 def _bound(
@@ -112,24 +96,23 @@ def _bound(
         yield name.removeprefix("self."), Signature(taken, result.format(type_))
 
 
-def _names(node: ast.ClassDef, module: Module) -> _Names:
-    names = _Names()
-    assigned = [
-        (dotted(item.targets[0]), item.value)
-        for item in ast.walk(node)
-        if isinstance(item, ast.Assign) and isinstance(item.value, ast.Call)
-    ]
-    for name, call in assigned:
-        made = _last(call.func)
-        if name and made in _CLIENTS:
-            names.clients[name] = _type(argument(call, *_CLIENTS[made]), module)
-            names.actions += [names.clients[name]] if made == "ActionClient" else []
-    futures: dict[str, set[str]] = {}
-    for name, call in assigned:
-        if name and _last(call.func) in _FUTURES:
-            futures.setdefault(name, set()).add(names.future_of(call))
-    names.futures = {name: types.pop() for name, types in futures.items() if len(types) == 1}
-    return names
+def _futures(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    """Yield the names of futures in a class, each with the method that has returned it."""
+    for item in ast.walk(node):
+        match item:
+            case ast.Assign(targets=[target], value=ast.Call(func=function)):
+                if _last(function) in _FUTURES:
+                    yield dotted(target), _last(function)
+
+
+def _named(name: str, calls: list[ast.Call]) -> Iterator[ast.Call]:
+    yield from (call for call in calls if _last(call.func) == name)
+
+
+def _only(types: Iterable[str]) -> str:
+    """Return the type if there is one only, else ""."""
+    found = {*types}
+    return found.pop() if len(found) == 1 else ""
 
 
 def _last(node: ast.expr) -> str:

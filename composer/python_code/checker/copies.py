@@ -7,15 +7,14 @@ handlers and of rclpy callbacks without an annotation get one. Places in it are 
 from __future__ import annotations
 
 import ast
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import field
 from typing import TypeGuard
 
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.source import Function, Module
-from composer.python_code.source.method_body import dotted, is_none
-from composer.python_code.source.spans import characters
+from composer.python_code.source.trees import characters, dotted, is_none
 from composer.python_code.stubs.behaviors import Signature
 
 #: The line that a copy gets, so that annotations can name what they need.
@@ -55,9 +54,7 @@ class Copy:
         return line, max(column - shift, 1)
 
 
-def edited_copy(
-    module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool
-) -> Copy:
+def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool) -> Copy:
     """Return the copy of a file. ``classes`` are its classes with a known surrounding."""
     edits = _Edits(list(module.source.text.split("\n")))
     names: set[str] = set()
@@ -66,7 +63,8 @@ def edited_copy(
         edit = classes.get(class_.name, ClassEdit())
         if edit.base and edit.base.rpartition(".")[2] not in class_.bases:
             edits.add_base(class_.node, edit.base)
-        signatures = {**callback_signatures(class_.node, module), **edit.signatures}
+        callbacks = {} if is_behavior else callback_signatures(class_.node, module)
+        signatures = {**callbacks, **edit.signatures}
         for method in class_.methods:
             signature = signatures.get(method.name)
             if signature is not None and method.node is not None:
@@ -123,10 +121,8 @@ class _Edits:
 
     def add_base(self, node: ast.ClassDef, base: str) -> None:
         """Add the first base class of a class."""
-        given = [*node.bases, *(item.value for item in node.keywords)]
         if node.bases:
-            first = min(given, key=lambda item: (item.lineno, item.col_offset))
-            self._insert(first.lineno, first.col_offset, f"{base}, ")
+            self._insert(node.bases[0].lineno, node.bases[0].col_offset, f"{base}, ")
             return
         line = self.lines[node.lineno - 1]
         name_ends = line.index(node.name, line.index("class") + len("class")) + len(node.name)
@@ -243,25 +239,3 @@ def _lines_of_head(tree: ast.Module) -> int:
             break
         last = statement.end_lineno or last
     return last
-
-
-def unchanged_copy(module: Module) -> Copy:
-    """Return a copy without changes."""
-    return Copy(module, module.source.text, (), {})
-
-
-def modules_named(copies: Iterable[Copy]) -> frozenset[str]:
-    """Return the top-level packages that files import or name in annotations."""
-    return frozenset(
-        word
-        for copy in copies
-        for node in ast.walk(copy.module.tree)
-        for word in _imported(node)
-    )
-
-
-def _imported(node: ast.AST) -> Iterator[str]:
-    if isinstance(node, ast.Import):
-        yield from (item.name.partition(".")[0] for item in node.names)
-    elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-        yield node.module.partition(".")[0]

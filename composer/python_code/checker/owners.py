@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -14,11 +15,14 @@ from composer.interfaces.definitions import parts
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.problems import Family
-from composer.python_code.stubs.messages import short_type
+from composer.python_code.source import Module
+from composer.python_code.source.trees import dotted
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES, member_class_name
+from composer.python_code.stubs.messages import short_type
 
-#: Names of ROS 1 and of other libraries, with what ROS 2 has instead.
-_OTHER_NAMES = {"nsec": "nanosec", "nsecs": "nanosec", "secs": "sec"}
+#: Names of ROS 1, with what ROS 2 has instead.
+_ROS_1_NAMES = {"nsec": "nanosec", "nsecs": "nanosec", "secs": "sec"}
+_PARTS = {"msg": (), "srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +39,8 @@ class Owner:
         return f"{self.name} has no {self.what} '{name}'"
 
     def hint(self, name: str) -> str | None:
-        """Return the attribute that was meant."""
-        other = _OTHER_NAMES.get(name)
+        """Return the attribute that was meant by a wrong one."""
+        other = _ROS_1_NAMES.get(name, "")
         if other in self.members:
             return f"did you mean '{other}'?"
         if self.what == "attribute":
@@ -52,34 +56,22 @@ class Owners:
         self.interfaces = interfaces
         self._behaviors = behaviors
 
-    def named(self, name: str, *, with_api: bool) -> Owner | None:
+    def named(self, name: str, module: Module, *, with_api: bool) -> Owner | None:
         """Return the owner with the short name of a class, None for classes of others.
 
-        Names of the API for behaviors are also names of rclpy.
+        Names of the API for behaviors are also names of rclpy. A message is looked for first in
+        the packages that the module imports.
         """
         if name in self._groups:
             return self._groups[name]
-        if name in self._messages:
-            return self.message(self._messages[name])
+        full = self._full_name(name, module)
+        if full is not None:
+            return self.message(full)
         api = getattr(behavior, name, None) if with_api else None
-        if inspect.isclass(api) and api.__module__ == behavior.__name__:
-            names = tuple(item for item in dir(api) if not item.startswith("_"))
-            return Owner(Family.PORT, f"{name} of composer.behavior", "attribute", names)
-        return None
-
-    @cached_property
-    def attributes(self) -> frozenset[str]:
-        """The attributes that the composer sets."""
-        return frozenset(name for name in behavior.Behavior.__slots__ if name[0] != "_")
-
-    @cached_property
-    def exceptions(self) -> frozenset[str]:
-        """The names that behaviors may import from ``composer.behavior``."""
-        return frozenset(
-            name
-            for name, item in vars(behavior).items()
-            if inspect.isclass(item) and item.__module__ == behavior.__name__
-        )
+        if not (inspect.isclass(api) and api.__module__ == behavior.__name__):
+            return None
+        names = tuple(item for item in dir(api) if not item.startswith("_"))
+        return Owner(Family.PORT, f"{name} of composer.behavior", "attribute", names)
 
     def message(self, name: str) -> Owner | None:
         """Return a message, or a part of a service or action, by its full name."""
@@ -87,8 +79,7 @@ class Owners:
         if definition is None:
             return None
         constants = (constant.name for constant in definition.constants)
-        members = (*definition.field_names, *constants)
-        return Owner(Family.FIELD, name, "field", members)
+        return Owner(Family.FIELD, name, "field", (*definition.field_names, *constants))
 
     def field_type(self, interface: str, name: str) -> str | None:
         """Return the type of a field as definitions write it, None if it is not known."""
@@ -96,22 +87,36 @@ class Owners:
         found = definition.field(name) if definition is not None else None
         return str(found.type) if found is not None else None
 
-    def with_field(self, name: str, expected: str) -> str | None:
-        """Return a message that has a field of this name and type."""
-        for full in self._messages.values():
+    def with_field(self, target: ast.Attribute, expected: str, module: Module) -> str | None:
+        """Return a message with such a field, best one named as in ``header.stamp``."""
+        short, parent = expected.rpartition(".")[2], dotted(target.value).rpartition(".")[2]
+        every = self._by_use((full for names in self.messages.values() for full in names), module)
+        for full in sorted(every, key=lambda full: not full.lower().endswith(f"/{parent}")):
             definition = self._definition(full)
-            found = definition.field(name) if definition is not None else None
-            if found is not None and short_type(found.type) == expected.rpartition(".")[2]:
+            found = definition.field(target.attr) if definition is not None else None
+            if found is not None and short_type(found.type) == short:
                 return full
         return None
 
-    def interface(self, text: str) -> str:
+    def shown(self, type_: str, module: Module) -> str:
         """Return how messages name a type: an interface by its full name."""
-        plain = text.removeprefix("type[").removesuffix("]")
-        full = self._messages.get(plain)
+        plain = type_.removeprefix("type[").removesuffix("]").rpartition(".")[2]
+        full = self._full_name(plain, module)
         if full is None:
-            return text
-        return f"the class {full}" if text.startswith("type[") else full
+            return type_
+        return f"the class {full}" if type_.startswith("type[") else full
+
+    @cached_property
+    def attributes(self) -> frozenset[str]:
+        """The attributes that the composer sets, as code names them."""
+        names = behavior.Behavior.__slots__
+        return frozenset(f"self.{name}" for name in names if name[0] != "_")
+
+    @cached_property
+    def api_names(self) -> frozenset[str]:
+        """The classes that behaviors may import from ``composer.behavior``."""
+        classes = inspect.getmembers(behavior, inspect.isclass)
+        return frozenset(name for name, item in classes if item.__module__ == behavior.__name__)
 
     def _definition(self, name: str) -> Message | None:
         """Return a message by its full name, or the part ``package/srv/Name_Request``."""
@@ -120,34 +125,41 @@ class Owners:
         whole = self.interfaces.find(base) if found is None and base else None
         return found if whole is None else parts(whole).get(part.lower())
 
+    def _full_name(self, short: str, module: Module) -> str | None:
+        return next(iter(self._by_use(self.messages.get(short, ()), module)), None)
+
+    def _by_use(self, names: Iterable[str], module: Module) -> list[str]:
+        """Return interfaces, those of packages that the module or a port uses first."""
+        used = {item.module.partition(".")[0] for item in module.imports.values()}
+        ports = (port for node in self._behaviors.values() for port in node.ports)
+        used |= {port.interface.value.partition("/")[0] for port in ports}
+        return sorted(names, key=lambda name: name.partition("/")[0] not in used)
+
     @cached_property
     def _groups(self) -> dict[str, Owner]:
-        """The generated classes with ports and parameters."""
+        """The generated classes with ports and parameters, by name."""
         groups = {}
         for base, node in self._behaviors.items():
             for attribute, kind in PORT_ATTRIBUTES.items():
-                names = _names(port.name.value for port in node.ports_of(kind))
-                owner = Owner(Family.PORT, f"node '{node.name}'", kind.value, names)
-                groups[member_class_name(base, attribute)] = owner
-            names = _names(parameter.name.value for parameter in node.parameters)
-            owner = Owner(Family.PORT, f"node '{node.name}'", "parameter", names)
-            groups[member_class_name(base, "parameters")] = owner
+                names = (port.name.value for port in node.ports_of(kind))
+                groups[member_class_name(base, attribute)] = _group(node, kind.value, names)
+            names = (parameter.name.value for parameter in node.parameters)
+            groups[member_class_name(base, "parameters")] = _group(node, "parameter", names)
         return groups
 
     @cached_property
-    def _messages(self) -> dict[str, str]:
-        """The full names of messages and parts, by the names of their classes."""
-        found: dict[str, str] = {}
+    def messages(self) -> dict[str, list[str]]:
+        """The full names of messages and of parts, by the names of their classes."""
+        found: dict[str, list[str]] = {}
         for folder in FOLDERS:
             for name in self.interfaces.names(folder):
                 short = name.rpartition("/")[2]
-                if folder == "msg":
-                    found.setdefault(short, name)
-                    continue
-                names = ("Request", "Response") if folder == "srv" else ("Goal", "Result", "Feedback")
-                found.update((f"{short}_{part}", f"{name}_{part}") for part in names)
+                found.setdefault(short, []).extend([name] if folder == "msg" else [])
+                for part in _PARTS[folder]:
+                    found.setdefault(f"{short}_{part}", []).append(f"{name}_{part}")
         return found
 
 
-def _names(names: Iterable[str]) -> tuple[str, ...]:
-    return tuple(name for name in names if name.isidentifier())
+def _group(node: Node, what: str, names: Iterable[str]) -> Owner:
+    members = tuple(name for name in names if name.isidentifier())
+    return Owner(Family.PORT, f"node '{node.name}'", what, members)

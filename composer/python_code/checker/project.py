@@ -6,36 +6,36 @@ check: each gets a check of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import ast
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
 from composer import behavior
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
+from composer.interfaces.sources import FOLDERS
 from composer.model import Node
-from composer.python_code.checker.copies import ClassEdit, Copy, edited_copy, modules_named
+from composer.python_code.checker.copies import ClassEdit, Copy, edited_copy
 from composer.python_code.source import BehaviorSource, Module
+from composer.python_code.source.lookup import BrokenModule
 from composer.python_code.stubs.behaviors import (
     behavior_class_name,
     behavior_module,
     signatures,
 )
 from composer.python_code.stubs.messages import message_stubs
+from composer.typed import SUFFIX
 
 _FILES = "files"
 _STUBS = "stubs"
 #: The stubs of libraries that come with the composer.
 LIBRARIES = Path(__file__).parent.parent / "stubs" / "libraries"
-#: What the stubs of rclpy and of the API of behaviors use.
-_ALWAYS_NEEDED = (
-    "action_msgs",
-    "builtin_interfaces",
-    "geometry_msgs",
-    "lifecycle_msgs",
-    "rcl_interfaces",
-    "type_description_interfaces",
-    "unique_identifier_msgs",
+#: What the API of behaviors uses, and the packages that the stubs of rclpy use.
+_API_MESSAGES = ("builtin_interfaces/msg/Time", "geometry_msgs/msg/TransformStamped")
+_RCLPY_PACKAGES = frozenset(
+    {"action_msgs", "builtin_interfaces", "lifecycle_msgs", "rcl_interfaces", "rosgraph_msgs"}
+    | {"unique_identifier_msgs"}
 )
 
 
@@ -53,7 +53,8 @@ class FileSet:
     """The files of one check.
 
     ``behaviors`` are the generated base classes by name, each with its node. ``folders`` are the
-    folders from which modules are imported, by their top-level names.
+    folders from which modules are imported, by their top-level names. ``broken`` are the files that
+    this Python cannot parse: the checker knows newer syntax.
     """
 
     behaviors: dict[str, Node] = field(default_factory=dict)
@@ -61,6 +62,7 @@ class FileSet:
     modules: dict[Path, tuple[Module, Node, BehaviorSource]] = field(default_factory=dict)
     folders: dict[str, Path] = field(default_factory=dict)
     search: dict[Path, None] = field(default_factory=dict)
+    broken: dict[str, tuple[BrokenModule, Node, BehaviorSource]] = field(default_factory=dict)
 
     def accepts(self, source: BehaviorSource) -> bool:
         """Return whether the files of a class can be in this check."""
@@ -75,6 +77,8 @@ class FileSet:
         """Add the class of a node, with the files that it imports."""
         reference = source.reference
         self.search |= dict.fromkeys((reference.folder, *reference.node_folders))
+        for broken in source.broken:
+            self.broken[f"{_FILES}{broken.path.as_posix()}"] = (broken, node, source)
         for module in source.own_modules:
             self.modules.setdefault(module.path, (module, node, source))
             name, folder = _import_root(module)
@@ -100,15 +104,32 @@ class FileSet:
             found[f"{_FILES}{path.as_posix()}"] = CheckedFile(copy, node, source)
         return found
 
-    def stubs(self, copies: Iterable[Copy], interfaces: Interfaces) -> dict[str, str]:
+    def stubs(self, interfaces: Interfaces) -> dict[str, str]:
         """Return the stubs that the files need, by their names below the folder of the check."""
-        ports = (port for node in self.behaviors.values() for port in node.ports)
-        packages = {port.interface.value.partition("/")[0] for port in ports}
-        packages |= modules_named(copies) & interfaces.packages()
-        files = message_stubs(interfaces, (*sorted(packages), *_ALWAYS_NEEDED))
+        names = {port.interface.value for node in self.behaviors.values() for port in node.ports}
+        names.update(_API_MESSAGES)
+        packages: set[str] = set()
+        typed: set[str] = set()  # also the class of a base type, of which a node type inherits
+        for module, _, _ in self.modules.values():
+            for imported, name in _imports(module.tree):
+                package, _, folder = imported.partition(".")
+                if package == "rclpy" or "self.node" in module.source.text:
+                    packages |= _RCLPY_PACKAGES
+                if imported == "composer.typed" and name.endswith(SUFFIX):
+                    typed.add(name)
+                if folder in FOLDERS and name not in ("", "*"):
+                    names |= {f"{package}/{folder}/{name}", f"{package}/{folder}/{_whole(name)}"}
+                else:
+                    packages.add(package)
+        packages &= interfaces.packages()
+        every = (name for folder in FOLDERS for name in interfaces.names(folder) if packages)
+        names.update(name for name in every if name.partition("/")[0] in packages)
+        files = message_stubs(interfaces, sorted(names))
         files["composer/__init__.pyi"] = ""
         files["composer/behavior.pyi"] = Path(behavior.__file__).read_text(encoding="utf-8")
-        files["composer/typed.pyi"] = behavior_module(self.behaviors, interfaces)
+        files["composer/typed.pyi"] = behavior_module(
+            self.behaviors, interfaces, sorted(typed - self.behaviors.keys())
+        )
         return {f"{_STUBS}/{name}": text for name, text in files.items()}
 
     def search_paths(self) -> list[str]:
@@ -124,7 +145,7 @@ def file_sets(
     """Return the sets of files in which all classes are checked."""
     sets: list[FileSet] = []
     for node, source in classes:
-        if not source.own_modules:
+        if not (source.own_modules or source.broken):
             continue  # installed packages are not checked
         fitting = next((item for item in sets if item.accepts(source)), None)
         if fitting is None:
@@ -141,6 +162,20 @@ def _unused_name(node: Node, taken: Mapping[str, Node]) -> str:
     while name in taken:
         name = f"Another{name}"
     return name
+
+
+def _imports(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """Yield the modules that a file imports anywhere, with the name that it takes from each."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((item.name, "") for item in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from ((node.module, item.name) for item in node.names)
+
+
+def _whole(name: str) -> str:
+    """Return the service or action of a part such as ``Trigger_Request``."""
+    return name.partition("_")[0]
 
 
 def _import_root(module: Module) -> tuple[str, Path]:

@@ -11,19 +11,19 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 from composer.fast_dataclass import dataclass
+from composer.python_code.checker.cache import entry_of, keep_entry, read_entry
 
 #: Kinds that the composer checks itself, or that say nothing about what happens at run time.
 _IGNORED = (
     "bad-override-param-name",
     "deprecated",
     "implicit-import",
-    "missing-import",
     "missing-source",
     "missing-source-for-stubs",
     "not-required-key-access",
@@ -35,9 +35,11 @@ _IGNORED = (
 #: Kinds that are off by default and point to mistakes.
 _REPORTED = ("incompatible-comparison", "invalid-format-spec", "unreachable-except-clause")
 _WALL_S = 60.0
+#: The files that the checker writes.
+_OUTPUTS = ("output.json", "errors.txt")
 _LIMITS = {
     resource.RLIMIT_CPU: 60,  # seconds
-    resource.RLIMIT_AS: 3_000_000_000,  # bytes; it maps far more than it uses
+    resource.RLIMIT_AS: 1_000_000_000,  # bytes; it maps about 400 MB and uses 60
     resource.RLIMIT_FSIZE: 16_000_000,
     resource.RLIMIT_CORE: 0,
 }
@@ -64,69 +66,83 @@ class Finding:
 
 @dataclass(slots=True)
 class Check:
-    """A check that runs in the background."""
+    """A check that runs in the background, or whose result was kept from an earlier one."""
 
-    _folder: tempfile.TemporaryDirectory[str]
-    _process: subprocess.Popen[bytes]
-    _output: Path
-    _errors: Path
+    _entry: Path
+    _kept: list[dict[str, Any]] | None = None
+    _folder: tempfile.TemporaryDirectory[str] | None = None
+    _process: subprocess.Popen[bytes] | None = None
 
     def result(self) -> list[Finding]:
         """Wait for the findings. Raises CheckerFailed."""
+        if self._kept is not None:
+            return _findings(self._kept)
+        if self._process is None or self._folder is None:
+            raise CheckerFailed("it was not started")
         try:
             self._process.wait(timeout=_WALL_S)
         except subprocess.TimeoutExpired:
             raise CheckerFailed(f"it took longer than {_WALL_S:.0f} s") from None
         finally:
-            output, errors = _read(self._output), _read(self._errors)
+            output, errors = (_read(Path(self._folder.name, name)) for name in _OUTPUTS)
             self.close()
-        return _findings(output, errors, self._process.returncode)
+        found = _parsed(output, errors, self._process.returncode)
+        keep_entry(self._entry, found)
+        return _findings(found)
 
     def close(self) -> None:
         """End the process and remove its files."""
-        if self._process.poll() is None:
+        if self._process is not None and self._process.poll() is None:
             self._process.kill()
             self._process.wait()
-        self._folder.cleanup()
+        if self._folder is not None:
+            self._folder.cleanup()
 
 
 def start_check(
     files: Mapping[str, str], checked: Iterable[str], search_paths: Iterable[str]
 ) -> Check:
-    """Write the files into a private folder and start the checker. Raises CheckerFailed.
+    """Start to check files, unless it is kept what the checker said about them.
 
     ``checked`` are the files to report about, ``search_paths`` the folders to import from. All
-    are relative to the private folder.
+    are relative to a private folder that the files are written into. Raises CheckerFailed.
     """
+    arguments = [*_options(search_paths), "--", *checked]
+    entry = entry_of(files, (*arguments, *_state_of_packages()))
+    kept = read_entry(entry)
+    if kept is not None:
+        return Check(entry, kept)
     program = _program()
     try:
         folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
     except OSError as error:
         raise CheckerFailed(f"no temporary folder: {error.strerror}") from None
-    root = Path(folder.name)
     try:
-        for name, text in files.items():
-            path = root / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(text.encode(errors="surrogateescape"))
-        (root / "pyrefly.toml").touch()  # otherwise it looks for settings in the folders above
-        output = root / "output.json"
-        errors = root / "errors.txt"
-        command = [program, *_options(search_paths), "--", *checked]
-        with output.open("wb") as stream, errors.open("wb") as error_stream:
-            process = subprocess.Popen(  # noqa: S603 (a program that is installed with the composer)
-                command,
-                cwd=root,
-                stdin=subprocess.DEVNULL,
-                stdout=stream,
-                stderr=error_stream,
-                env=_environment(root),
-            )
+        process = _start([program, *arguments], Path(folder.name), files)
     except OSError as error:
         folder.cleanup()
         raise CheckerFailed(f"it cannot be started: {error.strerror}") from None
     _limit(process.pid)
-    return Check(folder, process, output, errors)
+    return Check(entry, None, folder, process)
+
+
+def _start(command: list[str], root: Path, files: Mapping[str, str]) -> subprocess.Popen[bytes]:
+    """Write the files into a folder, and start the checker in it. Raises OSError."""
+    for name, text in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(text.encode(errors="surrogateescape"))
+    (root / "pyrefly.toml").touch()  # otherwise it looks for settings in the folders above
+    with ExitStack() as stack:
+        output, errors = (stack.enter_context((root / name).open("wb")) for name in _OUTPUTS)
+        return subprocess.Popen(  # noqa: S603 (a program that is installed with the composer)
+            command,
+            cwd=root,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=errors,
+            env=_environment(root),
+        )
 
 
 def _program() -> str:
@@ -149,9 +165,20 @@ def _options(search_paths: Iterable[str]) -> list[str]:
     options += [f"--ignore={kind}" for kind in _IGNORED]
     options += [f"--error={kind}" for kind in _REPORTED]
     options += [f"--search-path={path}" for path in search_paths]
+    return [*options, *(f"--site-package-path={path}" for path in _package_folders())]
+
+
+def _package_folders() -> list[str]:
+    """Return the folders of installed packages."""
     paths = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
     paths |= dict.fromkeys(path for path in sys.path if path.endswith("-packages"))
-    return [*options, *(f"--site-package-path={path}" for path in paths if Path(path).is_dir())]
+    return [path for path in paths if Path(path).is_dir()]
+
+
+def _state_of_packages() -> Iterator[str]:
+    """Yield what changes if a package is installed, with what the checker imports it from."""
+    for path in _package_folders():
+        yield f"{path} {Path(path).stat().st_mtime_ns}"
 
 
 def _environment(root: Path) -> dict[str, str]:
@@ -174,11 +201,21 @@ def _read(path: Path) -> bytes:
         return b""
 
 
-def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
+def _parsed(output: bytes, errors: bytes, code: int) -> list[dict[str, Any]]:
+    """Return the errors that the checker has printed. Raises CheckerFailed."""
     if code < 0:
         raise CheckerFailed(f"it was ended by {signal.Signals(-code).name}")
     try:
-        items: list[dict[str, Any]] = json.loads(output)["errors"]
+        found: list[dict[str, Any]] = json.loads(output)["errors"]
+    except (ValueError, KeyError, TypeError):
+        lines = errors.decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
+        raise CheckerFailed(f"it failed: {lines[-1][:200]}") from None
+    return found
+
+
+def _findings(found: Iterable[Mapping[str, Any]]) -> list[Finding]:
+    """Return the errors as findings. Raises CheckerFailed."""
+    try:
         return [
             Finding(
                 item["path"],
@@ -189,9 +226,8 @@ def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
                 item["name"],
                 item["description"],
             )
-            for item in items
-            if item.get("severity", "error") in ("error", "warn")
+            for item in found
+            if item["severity"] in ("error", "warn")
         ]
-    except (ValueError, KeyError, TypeError):
-        lines = errors.decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
-        raise CheckerFailed(f"it failed: {lines[-1][:200]}") from None
+    except (KeyError, TypeError):
+        raise CheckerFailed("its output has an unknown form") from None

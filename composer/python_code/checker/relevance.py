@@ -1,364 +1,247 @@
 """Which findings of the type checker point to a mistake, and which only to loose typing.
 
-Code that runs today has wrong annotations, attributes that change their kind, and values whose type
-depends on a condition. A finding that follows from one of these is left out. In rclpy classes, which
-run today, only findings about ROS and those that no annotation can cause are kept.
+Code that runs today has wrong annotations, attributes that change their kind, and values whose
+type depends on a condition. A finding that follows from one of these is left out. In rclpy classes,
+which run today, only findings about ROS and those that no annotation can cause are kept.
 """
 
 from __future__ import annotations
 
 import ast
 import re
-from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator
-from functools import cached_property
+from collections.abc import Container, Iterable
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.checker.copies import Copy
+from composer.python_code.checker.code_index import CodeIndex, arguments_of
 from composer.python_code.checker.pyrefly import Finding
-from composer.python_code.source import Module
-from composer.python_code.source.method_body import dotted
-from composer.python_code.source.spans import span_of
+from composer.python_code.source.trees import dotted, is_none
 from composer.source import Span
 
-#: Kinds about annotations and definitions: the code runs as before.
-_LOOSE_KINDS = frozenset(
-    {
-        "attribute-assign-on-never",
-        "bad-class-definition",
-        "bad-dataclass-descriptor",
-        "bad-function-definition",
-        "bad-override",
-        "bad-override-mutable-attribute",
-        "bad-specialization",
-        "bad-typed-dict",
-        "bad-typed-dict-key",
-        "implicit-abstract-class",
-        "inconsistent-inheritance",
-        "inconsistent-overload",
-        "invalid-annotation",
-        "invalid-inheritance",
-        "invalid-syntax",
-        "invalid-type-alias",
-        "invalid-type-var",
-        "invalid-variance",
-        "missing-override-decorator",
-        "non-exhaustive-match",
-        "not-a-type",
-        "parse-error",
-        "reveal-type",
-        "unexpected-never",
-        "unimported-directive",
-        "unresolvable-dunder-all",
-        "unsafe-overlap",
-        "unsupported-dynamic-base",
-    }
-)
-#: Kinds that are certain whatever the annotations say.
+#: Kinds that are certain in any class, whatever the annotations say.
 _CERTAIN_KINDS = frozenset(
-    {
-        "bad-argument-count",
-        "bad-raise",
-        "not-callable",
-        "missing-argument",
-        "missing-module-attribute",
-        "unexpected-keyword",
-        "unknown-name",
-        "unused-coroutine",
-    }
+    {"bad-argument-count", "bad-raise", "missing-argument", "missing-module-attribute"}
+    | {"not-callable", "unexpected-keyword", "unknown-name", "unused-coroutine"}
 )
+#: Kinds that are kept in any code.
+_ALWAYS = frozenset({"invalid-syntax", "missing-module-attribute", "parse-error"})
 #: Kinds that are kept in classes if they are about a type of ROS.
-_ABOUT_TYPES = frozenset(
-    {
-        "bad-argument-type",
-        "bad-assignment",
-        "bad-index",
-        "not-iterable",
-        "unsupported-operation",
-    }
+_KINDS_ABOUT_TYPES = frozenset(
+    {"bad-argument-type", "bad-assignment", "bad-index", "not-iterable", "unsupported-operation"}
 )
-_NUMPY = re.compile(r"\b(?:ndarray|dtype|numpy|(?:un)?signedinteger|floating|bool_|generic\[)")
-_OF_ROS = re.compile(
+#: All kinds that may be mistakes; the others are about annotations and definitions.
+_KINDS = (
+    _CERTAIN_KINDS
+    | _KINDS_ABOUT_TYPES
+    | {"bad-context-manager", "bad-keyword-argument", "bad-match", "bad-return", "bad-unpacking"}
+    | {"incompatible-comparison", "invalid-argument", "invalid-format-spec", "missing-attribute"}
+    | {"no-matching-overload", "not-async", "read-only", "regex", "unbound-name"}
+    | {"unreachable-except-clause"}
+)
+_NUMPY = r"\b(?:ndarray|dtype|numpy|(?:un)?signedinteger|floating|bool_|generic\[)"
+_ROS = (
     r"in function `(?:rclpy|\w+\.(?:msg|srv|action))\."
-    r"|`(?:Time|Duration|Parameter|Future\[|Client\[|Publisher\[|rclpy\.|Argument `[A-Z]\w+`)"
+    r"|`(?:Time|Duration|Parameter|Future\[|Client\[|Publisher\[|rclpy\.)"
+    r"|between `Literal\['[^`]*` and `(?:int|float)`"
 )
+#: A missing module of rclpy; the composer checks other imports itself.
+_KNOWN_PACKAGE = r"`rclpy\."
 _BUILTINS = frozenset(
-    {"bool", "bytes", "dict", "float", "int", "list", "object", "set", "str", "tuple", "Enum"}
+    {"Enum", "bool", "bytes", "dict", "float", "int", "list", "object", "set", "str", "tuple"}
 )
-_GIVEN = re.compile(r"Argument `(?P<given>.+?)` is not assignable to parameter")
-_OWNER = re.compile(r"(?:Object of class|Class) `(?P<owner>[\w.@]+)` has no (?:class )?attribute")
+_GIVEN = r"Argument `(?P<given>.+?)` is not assignable to parameter"
+_OWNER = r"(?:Object of class|Class) `(?P<owner>[\w.@]+)` has no (?:class )?attribute"
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Relevance:
-    """What is known about the code of one file, and about all findings in it."""
+    """Decides about the findings in one file.
 
-    module: Module
+    ``reassigned`` are the names and own attributes that get values of several types, ``attributes``
+    those that any class of the project defines.
+    """
+
+    code: CodeIndex
     is_class: bool  # an rclpy class, in contrast to a behavior
-    #: The names and own attributes that get values of several types.
     reassigned: frozenset[str]
-    #: The attributes that any class of the project defines.
-    defined: frozenset[object]
-    facts: _Facts
+    attributes: frozenset[str]
+    messages: Container[str]
 
     @classmethod
     def of(
-        cls, copy: Copy, findings: Iterable[Finding], *, is_class: bool, own: Iterable[Module]
+        cls,
+        code: CodeIndex,
+        changed_lines: Iterable[int],
+        others: Iterable[CodeIndex],
+        messages: Container[str],
+        *,
+        is_class: bool,
     ) -> Relevance:
-        """Return what decides about the findings in a file; ``own`` are the project's modules."""
-        facts = _Facts(copy.module)
-        lines = {
-            copy.place(finding.line, finding.column)[0]
-            for finding in findings
-            if finding.kind == "bad-assignment"
-        }
-        defined = frozenset(name for other in own for name in _defined_attributes(other.tree))
-        return cls(copy.module, is_class, frozenset(facts.assigned_in(lines)), defined, facts)
+        """Return what decides in a file with assignments of several types in ``changed_lines``."""
+        targets = (dotted(x) for line in changed_lines for x, _ in code.assigned_at(line))
+        names = (name.removeprefix("self.") for name in targets)
+        reassigned = frozenset(name for name in names if name and "." not in name)
+        attributes = (name for other in (code, *others) for name in other.attributes_set())
+        return cls(code, is_class, reassigned, frozenset(attributes), messages)
 
     def keeps(self, finding: Finding, span: Span) -> bool:
         """Return whether a finding points to a mistake."""
         kind, message = finding.kind, finding.message
-        is_module = message.startswith(("No attribute", "Could not import"))
-        is_numpy = _NUMPY.search(message) is not None and kind != "unknown-name"
-        if kind in _LOOSE_KINDS or (is_numpy and not is_module):
-            return False
+        if kind == "unknown-name":
+            # Names after 'global' may be set later, annotations of attributes are not evaluated.
+            line = span.file.line(span.line)
+            return re.match(r"\s*(global |nonlocal |self\.\w+\s*:)", line) is None
+        if kind == "missing-import":
+            return re.search(_KNOWN_PACKAGE, message) is not None
+        if kind in _ALWAYS or message.startswith("No attribute"):
+            return True
+        return not self._is_loose_code(kind, message, span) and self._is_kept(kind, message, span)
+
+    def _is_loose_code(self, kind: str, message: str, span: Span) -> bool:
+        """Return whether the code is such that a finding in its line says little."""
+        if kind not in _KINDS or re.search(_NUMPY, message) or self.code.is_guarded(span.line):
+            return True
+        names = self.code.names_in(span.line)
+        return not self.reassigned.isdisjoint(re.findall(r"\w+", span.text)) or any(
+            self._has_several_classes(name, span.line) for name in names
+        )
+
+    def _is_kept(self, kind: str, message: str, span: Span) -> bool:
         if kind == "unbound-name":
             return not self.is_class and "may be" not in message
-        if kind == "unknown-name":
-            return not self._is_unevaluated(span)
-        if any(word in self.reassigned for word in re.findall(r"\w+", span.text)):
+        node = self.code.expression_at(span)
+        if kind == "missing-attribute":
+            return self._keeps_attribute(message, node)
+        given = re.search(_GIVEN, message)
+        if given is not None and self._is_loose(given["given"], node):
             return False
-        if kind == "missing-attribute" and not is_module:
-            return self._keeps_attribute(message, span)
-        given = _GIVEN.search(message)
-        if given is not None and _is_one_of_several(given["given"]):
-            return False
-        if self.has_several_values(span) or self._is_annotated_argument(span):
-            return False
-        called = self.facts.called_with.get((span.line, span.column, span.length))
-        if called is not None and self._has_several_values(called):
-            return False
-        if given is not None and given["given"] == "int" and span.text.endswith("]"):
-            return False  # an element of a list that got other values later
-        if not self.is_class or kind in _CERTAIN_KINDS or is_module:
+        if not self.is_class or kind in _CERTAIN_KINDS:
             return True
-        return kind in _ABOUT_TYPES and _OF_ROS.search(message) is not None
+        is_ros = re.search(_ROS, message) is not None
+        is_message = given is not None and self._is_message(given["given"])
+        return kind in _KINDS_ABOUT_TYPES and (is_ros or is_message)
 
-    def _keeps_attribute(self, message: str, span: Span) -> bool:
-        owner = _OWNER.search(message)
+    def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
+        owner = re.search(_OWNER, message)
         name = owner["owner"] if owner is not None else ""
-        node = self._node_at(span)
         if isinstance(node, ast.Attribute):
             if node.attr.startswith("_") and not node.attr.startswith("__"):
-                return False  # fields have such names, too
-            if self.has_several_values(span):
-                return False
-            if name in self.module.classes or name.startswith("Self@"):
-                is_stored = not isinstance(node.ctx, ast.Load)
-                return node.attr not in self.defined and not is_stored and not self._sets_names
+                return name in self.code.module.classes and node.attr not in self.attributes
+            if name in self.code.module.classes or name.startswith("Self@"):
+                is_read = isinstance(node.ctx, ast.Load)
+                is_defined = node.attr in self.attributes or self.code.sets_computed_names
+                return is_read and not is_defined
             if name in _BUILTINS and isinstance(node.value, ast.Subscript):
                 return False  # one of the values of a mixed dict or list
-        if self.is_class:
-            return name not in _BUILTINS and name != "NoneType" and not self._is_plain_store(node)
-        return True
-
-    def _is_plain_store(self, node: ast.AST | None) -> bool:
-        """Return whether an attribute is set, which most objects allow; messages do not."""
-        is_stored = isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load)
-        return is_stored and dotted(node.value).startswith("server")  # type: ignore[union-attr]
-
-    def has_several_values(self, span: Span) -> bool:
-        """Return whether a name in an expression is assigned values of different calls."""
-        node = self._node_at(span)
-        return node is not None and self._has_several_values(node)
-
-    def _has_several_values(self, node: ast.expr) -> bool:
-        for part in ast.walk(node):
-            name = dotted(part) if isinstance(part, ast.Attribute | ast.Name) else ""
-            if _differ(self.facts.calls_assigned_to(name, node.lineno)):
-                return True
-        return False
-
-    def _is_annotated_argument(self, span: Span) -> bool:
-        """Return whether a value is an argument whose annotation may be wrong."""
-        if not self.is_class:
-            return False
-        return span.text in self.facts.stored_arguments or any(
-            span.text == argument.arg and first <= span.line <= last
-            for argument, first, last in self.facts.annotated
-        )
-
-    def _is_unevaluated(self, span: Span) -> bool:
-        """Return whether a name is in an annotation that Python does not evaluate."""
-        line = span.file.line(span.line)
-        if line.lstrip().startswith(("global ", "nonlocal ")):
+        if not self.is_class or name not in _BUILTINS | {"NoneType"}:
             return True
+        value = node.value if isinstance(node, ast.Attribute) else None
+        is_field = isinstance(value, ast.Attribute) and value.attr not in self.attributes
+        return is_field and name != "NoneType"
+
+    def _has_several_classes(self, name: str, line: int) -> bool:
+        """Return whether a name gets objects of different classes.
+
+        Which one it has may depend on a condition, such as the distribution of ROS.
+        """
+        classes: set[str] = set()
+        for value in self.code.values_of(name, line):
+            made = dotted(value.func) if isinstance(value, ast.Call) else ""
+            last = made.rpartition(".")[2]
+            if made in self.code.alternative_imports:
+                return True
+            if isinstance(value, ast.Call) and last.startswith("create_"):
+                classes.add(ast.unparse(value.args[0]) if value.args else last)
+            elif last[:1].isupper():
+                classes.add(made)
+        return len(classes) > 1
+
+    def _is_message(self, name: str) -> bool:
+        """Return whether a class is a message, and not one of the project with such a name."""
+        imported = self.code.module.imports.get(name)
+        return name in self.messages and (imported is None or imported.module.endswith(".msg"))
+
+    def _is_loose(self, given: str, node: ast.expr | None) -> bool:
+        """Return whether the value of an argument may have the right type after all."""
+        if not given.startswith("("):  # not a function
+            if self.is_class and "Unknown" in given:
+                return True
+            members = [item for item in given.split(" | ") if item not in ("Any", "Unknown")]
+            if len(members) > 1 and "None" not in members:
+                return True
+        if node is None:
+            return False
+        if given == "int" and isinstance(node, ast.Subscript):
+            return True  # an element of a list that got other values later
+        return self.is_class and self._is_annotated_argument(node)
+
+    def _is_annotated_argument(self, node: ast.expr) -> bool:
+        """Return whether a value is an argument, or stores one, whose annotation may be wrong."""
+        name = dotted(node)
+        values = self.code.values_of(name, node.lineno) if name.startswith("self.") else ()
+        used = {name, *(dotted(value) for value in values)}
         return any(
-            node.lineno <= span.line <= (node.end_lineno or node.lineno)
-            and span.column > node.col_offset
-            and span.column <= (node.end_col_offset or 0) + 1
-            for node in self.facts.unevaluated
-        )
-
-    @property
-    def _sets_names(self) -> bool:
-        return self.facts.sets_names
-
-    def _node_at(self, span: Span) -> ast.AST | None:
-        return self.facts.by_place.get((span.line, span.column, span.length))
-
-
-class _Facts:
-    """The syntax of one file, by what findings need to know."""
-
-    def __init__(self, module: Module) -> None:
-        self.module = module
-
-    @cached_property
-    def by_place(self) -> dict[tuple[int, int, int], ast.AST]:
-        """The expressions of one line by line, column and length; the outermost of equal ones."""
-        places: dict[tuple[int, int, int], ast.AST] = {}
-        for node in ast.walk(self.module.tree):
-            if isinstance(node, ast.expr):
-                span = span_of(node, self.module.source)
-                places.setdefault((span.line, span.column, span.length), node)
-        return places
-
-    def assigned_in(self, lines: Collection[int]) -> Iterator[str]:
-        """Yield the local names and own attributes that the given lines assign."""
-        for node in ast.walk(self.module.tree):
-            if isinstance(node, ast.Assign | ast.AnnAssign | ast.AugAssign) and node.lineno in lines:
-                for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
-                    name = dotted(target)
-                    if "." not in name.removeprefix("self."):
-                        yield name.removeprefix("self.")
-
-    def calls_assigned_to(self, name: str, line: int) -> set[str]:
-        """Return the calls whose values a name gets where a line sees it, with what they take."""
-        scopes = self.functions if "." not in name else self.classes
-        around = [scope for scope in scopes if scope[0] <= line <= scope[1]]
-        first, last = max(around, default=(0, 2**31))
-        return {text for at, text in self.values.get(name, ()) if first <= at <= last}
-
-    @cached_property
-    def functions(self) -> list[tuple[int, int]]:
-        """The first and last line of each function."""
-        return list(_lines(self.module.tree, ast.FunctionDef, ast.AsyncFunctionDef))
-
-    @cached_property
-    def classes(self) -> list[tuple[int, int]]:
-        """The first and last line of each class."""
-        return list(_lines(self.module.tree, ast.ClassDef))
-
-    @cached_property
-    def values(self) -> dict[str, list[tuple[int, str]]]:
-        """The calls whose values each name gets: their lines, and texts with the first argument."""
-        found: dict[str, list[tuple[int, str]]] = defaultdict(list)
-        for node in ast.walk(self.module.tree):
-            if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
-                first = node.value.args[:1]
-                text = ast.unparse(node.value.func) + "".join(map(ast.unparse, first))
-                for target in node.targets:
-                    found[dotted(target)].append((node.lineno, text))
-        return found
-
-    @cached_property
-    def annotated(self) -> list[tuple[ast.arg, int, int]]:
-        """The arguments with annotations, each with the lines of its function."""
-        return [
-            (argument, node.lineno, node.end_lineno or node.lineno)
-            for node in ast.walk(self.module.tree)
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-            for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
-            if argument.annotation is not None
-        ]
-
-    @cached_property
-    def stored_arguments(self) -> frozenset[str]:
-        """The attributes that get the value of an annotated argument, as written."""
-        names = {argument.arg for argument, _, _ in self.annotated}
-        return frozenset(
-            ast.unparse(node.targets[0])
-            for node in ast.walk(self.module.tree)
-            if isinstance(node, ast.Assign)
-            and isinstance(node.value, ast.Name)
-            and node.value.id in names
-        )
-
-    @cached_property
-    def called_with(self) -> dict[tuple[int, int, int], ast.expr]:
-        """The functions that are called, by the place of each of their arguments."""
-        found = {}
-        for node in ast.walk(self.module.tree):
-            if isinstance(node, ast.Call):
-                for item in (*node.args, *(keyword.value for keyword in node.keywords)):
-                    span = span_of(item, self.module.source)
-                    found[span.line, span.column, span.length] = node.func
-        return found
-
-    @cached_property
-    def unevaluated(self) -> list[ast.expr]:
-        """The annotations that Python does not evaluate."""
-        future = self.module.imports.get("annotations")
-        postponed = future is not None and future.module == "__future__"
-        return list(_unevaluated(self.module.tree, postponed=postponed))
-
-    @cached_property
-    def sets_names(self) -> bool:
-        """Whether the file sets attributes by computed names."""
-        return any(
-            (isinstance(node, ast.Call) and dotted(node.func) == "setattr")
-            or (isinstance(node, ast.Attribute) and node.attr == "__dict__")
-            for node in ast.walk(self.module.tree)
+            argument.arg in used and argument.annotation is not None
+            for function in self.code.functions
+            if f"self.{function.name}" not in self.code.passed_on  # rclpy decides about callbacks
+            for argument in arguments_of(function)
         )
 
 
-def _lines(tree: ast.Module, *kinds: type[ast.stmt]) -> Iterator[tuple[int, int]]:
-    for node in ast.walk(tree):
-        if isinstance(node, kinds):
-            yield node.lineno, node.end_lineno or node.lineno
+_STARTS = frozenset({"__init__", "on_configure", "on_activate"})
+_LONGEST = 60  # characters of an expression in a message
 
 
-def _is_one_of_several(type_: str) -> bool:
-    """Return whether a value may have several types, of which one may be right."""
-    if type_.startswith("("):  # a function
-        return False
-    members = [item for item in type_.split(" | ") if item not in ("Any", "Unknown")]
-    return len(members) > 1 and "None" not in members
+def unguarded_value(code: CodeIndex, span: Span, message: str) -> str | None:
+    """Return the value at a place that may be None as it is written, None if it is checked.
+
+    The type checker forgets at each call what another method has checked. So an attribute counts
+    as checked if any method of its class compares it, tests it or stores it elsewhere, and as set
+    if a transition or the constructor gives it a value.
+    """
+    node = code.expression_at(span)
+    if node is None:
+        return None
+    match node:
+        case ast.Attribute(value=value) | ast.Subscript(value=value) if dotted(value) != "self":
+            node = value
+        case ast.BinOp(left=left, right=right):
+            node = right if re.search(r" and `[^`]*None[^`]*`", message) else left
+        case ast.Call(func=value):
+            node = value
+    name = dotted(node)
+    function, class_ = code.function_at(span.line), code.class_at(span.line)
+    if not name.startswith("self."):
+        is_checked = bool(name) and function is not None and _is_checked(function, name)
+        return None if is_checked else ast.unparse(node)[:_LONGEST]
+    name = ".".join(name.split(".")[:2])
+    if class_ is None or _is_checked(class_, name):
+        return None
+    values = (
+        value
+        for value in code.values_of(name, span.line)
+        if getattr(code.function_at(value.lineno), "name", "") in _STARTS
+    )
+    return name if all(map(is_none, values)) else None
 
 
-def _differ(values: set[str]) -> bool:
-    """Return whether values are of different classes, as far as their calls show."""
-    classes = {value for value in values if value.rpartition(".")[2][:1].isupper()}
-    created = {value for value in values if "create_" in value}
-    return len(classes) > 1 or len(created) > 1
+def _is_checked(scope: ast.AST, name: str) -> bool:
+    """Return whether a class or function reads a value other than by its members or as an argument.
 
-
-def _unevaluated(tree: ast.Module, *, postponed: bool) -> Iterator[ast.expr]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            for inner in ast.walk(node):
-                if isinstance(inner, ast.AnnAssign):
-                    yield inner.annotation
-            if postponed:
-                arguments = (item for item in ast.walk(node.args) if isinstance(item, ast.arg))
-                yield from (item.annotation for item in arguments if item.annotation is not None)
-                yield from [node.returns] if node.returns is not None else []
-        elif isinstance(node, ast.AnnAssign) and postponed:
-            yield node.annotation
-
-
-def _defined_attributes(tree: ast.Module) -> Iterator[object]:
-    """Yield the attributes that classes of a file define: methods, names, and what is set."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef):
-            for item in node.body:
-                if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef):
-                    yield item.name
-                for inner in ast.walk(item) if isinstance(item, ast.Assign | ast.AnnAssign) else ():
-                    if isinstance(inner, ast.Name):
-                        yield inner.id
-        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
-            yield node.attr
-        elif isinstance(node, ast.Call) and dotted(node.func) in ("hasattr", "setattr"):
-            yield from (item.value for item in node.args if isinstance(item, ast.Constant))
+    It then compares the value, tests it or stores it elsewhere.
+    """
+    loads = uses = 0
+    for node in ast.walk(scope):
+        match node:
+            case ast.Attribute(ctx=ast.Load()) | ast.Name(ctx=ast.Load()) if dotted(node) == name:
+                loads += 1
+        match node:
+            case ast.Attribute(value=value) | ast.Subscript(value=value):
+                used = [value]
+            case ast.BinOp(left=left, right=right):
+                used = [left, right]
+            case ast.Call(func=function, args=arguments, keywords=keywords):
+                used = [function, *arguments, *(keyword.value for keyword in keywords)]
+            case _:
+                used = []
+        uses += sum(dotted(item) == name for item in used)
+    return loads > uses

@@ -7,9 +7,13 @@ from collections.abc import Iterator
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checks.behaviors import behavior_problems
-from composer.python_code.checks.callbacks import callback_problems
 from composer.python_code.checks.messages import message_problems
-from composer.python_code.checks.methods import missing_returns, missing_self, unused_values
+from composer.python_code.checks.methods import (
+    callback_problems,
+    handler_problems,
+    missing_self,
+    unused_values,
+)
 from composer.python_code.checks.node_classes import node_class_problems
 from composer.python_code.checks.scopes import Code
 from composer.python_code.problems import Problem
@@ -28,6 +32,6 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
     yield from missing_self(code)
     if node.behavior is not None:
         yield from behavior_problems(code)
-        yield from missing_returns(code)
+        yield from handler_problems(code)
     else:
         yield from node_class_problems(code)

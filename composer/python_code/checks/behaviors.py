@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
-from composer.diagnostics import shown, suggestion
+from composer.diagnostics import suggestion
+from composer.field_types import STATUS, Word
 from composer.python_code.checks.scopes import Code, Scope
 from composer.python_code.nodes.behaviors import reached_methods
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import Method, published_port
-from composer.python_code.source.method_body import argument, dotted
-from composer.python_code.source.spans import span_of
-from composer.python_code.source.traversal import walk
+from composer.python_code.source.trees import argument, dotted, span_of, walk
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
 
 #: The attributes that the composer sets after the constructor.
 _SET_LATER = frozenset({"clock", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES})
-#: How a goal of an action client ends.
-_STATUS = ("succeeded", "canceled", "aborted")
 _DEFERRED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 #: Texts that show that a file may run an event loop of asyncio, such as in a thread.
 _RUNS_ASYNCIO = ("asyncio.run", "run_until_complete", "run_forever", "asyncio.Runner")
@@ -39,13 +36,10 @@ def behavior_problems(code: Code) -> Iterator[Problem]:
                 case ast.Subscript(value=ast.Attribute() as owner, slice=index):
                     yield from _key(dotted(owner), index, scope)
                 case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
-                    value, words = scope.constant(right), _words(left, scope)
-                    if isinstance(value, str) and words and value not in words:
-                        message, hint = (
-                            f"the value is never '{shown(value)}'",
-                            suggestion(value, words),
-                        )
-                        yield scope.doubt(message, right, hint)
+                    word = _word(left, scope)
+                    problem = word.problem(scope.constant(right)) if word is not None else None
+                    if problem is not None:
+                        yield scope.doubt(problem[0], right, problem[1])
 
 
 def _early_attributes(code: Code) -> Iterator[Problem]:
@@ -111,15 +105,15 @@ def _key(owner: str, index: ast.expr, scope: Scope) -> Iterator[Problem]:
         yield scope.problem(Family.PORT, message, index, suggestion(key, names))
 
 
-def _words(node: ast.expr, scope: Scope) -> Sequence[str]:
-    """Return the texts that a parameter with choices, or the status of a goal, may be."""
+def _word(node: ast.expr, scope: Scope) -> Word | None:
+    """Return the type of a parameter with choices, or of the status of a goal."""
     match node:
         case ast.Attribute(value=ast.Attribute(value=ast.Name(id="self"), attr="parameters")):
             parameter = scope.code.node.parameter(node.attr)
             if parameter is not None and parameter.choices is not None:
-                return [str(choice) for choice in parameter.choices.value]
+                return Word("string", words=tuple(map(str, parameter.choices.value)))
         case ast.Attribute(value=ast.Name(id=name), attr="status"):
             match scope.value(name):
                 case ast.Await(value=ast.Call(func=ast.Attribute(attr="result"))):
-                    return _STATUS
-    return ()
+                    return STATUS
+    return None

@@ -4,65 +4,66 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
+from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 from composer import behavior
-from composer.diagnostics import nearest, suggestion
-from composer.fast_dataclass import dataclass
+from composer.diagnostics import suggestion
 from composer.interfaces import Interfaces
 from composer.project import Project
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import Module, nearby_modules
-from composer.python_code.source.method_body import catches, dotted
+from composer.python_code.source import Module
 from composer.python_code.source.modules import (
     Unreadable,
     is_installed,
+    local_module_file,
     module_file,
     relative_module_file,
 )
-from composer.python_code.source.spans import start_span
 from composer.python_code.source.syntax import defined_names, read_module
-from composer.python_code.source.traversal import walk
-from composer.source import Span, shown_path
-from composer.spelling import is_typo
-from composer.typed import SUFFIX
+from composer.python_code.source.trees import dotted, start_span, walk
+from composer.source import shown_path
+from composer.spelling import edit_distance
 
 _API = "composer.behavior"
-_TYPED = "composer.typed"
-#: The modules of the API, and the names in them.
-_NAMES: Mapping[str, frozenset[str]] = {
-    _API: frozenset({"Any", "Changes"}).union(
-        name
-        for name, item in vars(behavior).items()
-        if isinstance(item, type) and item.__module__ == _API
-    ),
-    _TYPED: frozenset({SUFFIX, "SUFFIX"}),
-}
-_INTERFACE_FOLDERS = ("msg", "srv", "action")
-#: Packages that users often import. They need not be installed where files are validated.
-_USUAL = (
-    *("ament_index_python", "cv2", "cv_bridge", "launch", "launch_ros", "message_filters"),
-    *("numpy", "rclpy", "sensor_msgs_py", "tf2_geometry_msgs", "tf2_py", "tf2_ros"),
-    *("tf2_sensor_msgs", "tf_transformations"),
+_API_NAMES = frozenset({"Any", "Changes"}).union(
+    name
+    for name, item in vars(behavior).items()
+    if isinstance(item, type) and item.__module__ == _API
 )
-_IMPORT_ERRORS = frozenset({"ImportError", "ModuleNotFoundError", "Exception", "BaseException"})
-#: With these, a file gets modules that the search path of now does not show.
+_INTERFACE_FOLDERS = frozenset({"action", "msg", "srv"})
+#: Packages that users often import. They need not be installed where files are validated.
+_USUAL = frozenset(
+    {"ament_index_python", "composer", "cv2", "cv_bridge", "launch", "launch_ros", "numpy"}
+    | {"message_filters", "rclpy", "sensor_msgs_py", "tf2_geometry_msgs", "tf2_py", "tf2_ros"}
+    | {"tf2_sensor_msgs", "tf_transformations"}
+)
+#: With these, a file gets modules that the current search path does not show.
 _AT_RUN_TIME = frozenset(
     {"sys.path", "importlib.import_module", "importlib.util", "site.addsitedir", "__import__"}
 )
-_MAXIMUM_FILES = 200  # in a folder
-#: Fields of statements that contain statements.
-_BODIES = ("body", "handlers", "orelse", "finalbody")
+#: With files of these types, a package may have modules that are compiled when it is built.
+_COMPILED = frozenset({".c", ".cpp", ".pyx", ".pyd", ".so"})
+_MAXIMUM_FILES = 2000  # in a folder
+_LONG_NAME = 8  # letters, of which two may be wrong
+_SHORTEST_TYPO = 4
 
 
-@dataclass(frozen=True, slots=True)
-class _Missing:
-    """What cannot be imported; ``part`` is the misspelled part of the name."""
+class _Contents(NamedTuple):
+    """The names in a module; unless ``is_closed``, it may have others where the code runs."""
+
+    names: frozenset[str]
+    is_closed: bool
+
+
+class _Missing(NamedTuple):
+    """What cannot be imported, and the names that were meant."""
 
     message: str
     hint: str | None = None
-    part: str = ""
     meant: frozenset[str] = frozenset()
     family: Family = Family.IMPORT
 
@@ -72,229 +73,190 @@ def import_problems(
 ) -> Iterator[tuple[Problem, frozenset[str]]]:
     """Yield the problems of the imports in a file, each with the names that may be meant.
 
-    ``folder`` is that of the YAML file. Imports that need not succeed are left out: alternatives
-    under a condition, and those for which the file handles an ImportError.
+    ``folder`` is that of the YAML file. Imports in a function, an ``if`` or a ``try`` may fail, so
+    they are left out. A missing module is only an error if its name is a typo: it may be installed
+    or generated where the code runs.
     """
     imports = _Imports(module, folder, interfaces)
-    for node in _unconditional(module.tree.body):
+    for node in module.tree.body:
         if isinstance(node, ast.Import):
             for alias in node.names:
-                missing = imports.missing_module(alias.name)
-                if missing is not None:
+                for part, missing in imports.missing_modules(alias.name):
                     meant = frozenset() if alias.asname else missing.meant
-                    yield _problem(missing, alias.name, alias, module), meant
+                    yield imports.problem(missing, alias, alias.name, part), meant
         elif isinstance(node, ast.ImportFrom):
             name = "." * node.level + (node.module or "")
-            missing = imports.missing_module(name)
-            if missing is not None:
-                yield _problem(missing, name, node, module), frozenset()
-                continue
-            for lacking, alias in imports.missing_names(name, node):
-                yield _problem(lacking, alias.name, alias, module), lacking.meant
+            for part, missing in imports.missing_modules(name):
+                yield imports.problem(missing, node, f"from {name}", part), frozenset()
+                break
+            else:
+                lacking = [alias for alias in node.names if imports.lacks(name, alias.name)]
+                for alias in lacking[:1]:  # the others have the same cause
+                    missing = imports.missing_names(name, [item.name for item in lacking])
+                    yield imports.problem(missing, alias, alias.name, alias.name), missing.meant
 
 
-@dataclass(frozen=True)
 class _Imports:
-    module: Module
-    folder: Path
-    interfaces: Interfaces
+    """Looks up what the imports of a file name."""
 
-    def missing_module(self, name: str) -> _Missing | None:
-        """Return why a module cannot be imported, or should not be."""
+    def __init__(self, module: Module, folder: Path, interfaces: Interfaces) -> None:
+        self.module = module
+        self.folder = folder
+        self.interfaces = interfaces
+        self._contents = cache(self._read_contents)
+
+    def missing_modules(self, name: str) -> Iterator[tuple[str, _Missing]]:
+        """Yield why a module cannot be imported, or should not be, with the part of its name."""
         top, _, rest = name.partition(".")
-        if not top:  # a relative import; '.' without a file is a folder
-            is_found = self._is_local(name) or not name.strip(".")
-            return None if is_found else _Missing(f"no module named '{name}'")
-        if top == "composer":
-            return _of_composer(name)
-        if top not in sys.stdlib_module_names and self._is_local(name):
-            return None
-        if top in self.interfaces.packages():
-            return self._package_part(top, rest)
-        is_known = top in sys.stdlib_module_names or top in _USUAL or is_installed(top)
-        if not is_known or (rest and top in sys.stdlib_module_names and not _has_file(name)):
-            return self._not_found(name, top)
-        return None
-
-    def missing_names(
-        self, module: str, node: ast.ImportFrom
-    ) -> Iterator[tuple[_Missing, ast.alias]]:
-        """Yield the names that a ``from`` import expects in a module and that are not there."""
-        names = self._names(module)
-        aliases = [alias for alias in node.names if self._lacks(module, names, alias.name)]
-        listed = [alias.name for alias in aliases]
-        home = self._home_of(module, listed) if aliases else None
-        if home is not None or (len(aliases) > 1 and len(aliases) == len(node.names)):
-            shown = " and ".join(f"'{item}'" for item in listed)  # the module is wrong
-            hint = f"import {'it' if len(listed) == 1 else 'them'} from '{home}'" if home else None
-            message = f"module '{module}' has no {shown}"
-            yield _Missing(message, hint, meant=frozenset(listed)), aliases[0]
+        if rest and top in sys.stdlib_module_names and is_installed(top) and not _has_file(name):
+            yield rest, _Missing(f"no module named '{name}'")
+        dots = name[: len(name) - len(name.lstrip("."))]
+        parts = name.removeprefix(dots).split(".") if name != dots else ()
+        for count, part in enumerate(parts):
+            package, path = (dots + ".".join(parts[:end]) for end in (count, count + 1))
+            contents = self._contents(package)
+            if contents is None or (not package and part in sys.stdlib_module_names):
+                return
+            if part in contents.names:
+                continue
+            if package == "composer" and _has_file(path):
+                message = f"'{path}' is internal to the composer and may change without notice"
+                hint = f"behaviors import from '{_API}' only"
+                yield path, _Missing(message, hint, family=Family.INTERNAL)
+            elif dots or not (_has_file(path) if package else is_installed(part)):
+                message = f"no module named '{path}'"
+                yield part, _missing(message, part, contents.names, " is installed")
             return
-        for alias in aliases:  # any other name of the module may have been meant
-            known = names or frozenset()
-            message = f"module '{module}' has no '{alias.name}'"
-            yield _Missing(message, suggestion(alias.name, known), meant=known), alias
 
-    def _not_found(self, name: str, top: str) -> _Missing:
-        nodes = walk(self.module.tree.body)
-        used = {dotted(node) for node in nodes if isinstance(node, ast.Attribute | ast.Name)}
-        if used & _AT_RUN_TIME:
-            message = f"no module named '{name}' is found: the file searches for modules itself"
-            return _Missing(message, part=top, family=Family.NOT_INSTALLED)
-        nearby = nearby_modules(name, self.folder, Project.at(self.folder))
-        if nearby.package or top in sys.stdlib_module_names:
-            part, hint = name.partition(".")[2], None
-            if nearby.package:
-                part, hint = nearby.missing, nearby.hint
-            return _Missing(f"no module named '{name}'", hint, part)
-        close = next(self._similar(top), None)
-        if close is None:
-            message, hint = (
-                f"no module named '{top}' is installed",
-                "install it, or correct the name",
-            )
-            return _Missing(message, hint, top, family=Family.NOT_INSTALLED)
-        hint = f"did you mean '{close}'?"
-        return _Missing(f"no module named '{top}'", hint, top, frozenset({close}))
+    def missing_names(self, module: str, names: Sequence[str]) -> _Missing:
+        """Return the problem of names that are not in a module."""
+        message = f"module '{module}' has no {' and '.join(map(repr, names))}"
+        home = self._home(module, names)
+        if home is not None:
+            them = "it" if len(names) == 1 else "them"
+            return _Missing(message, f"import {them} from '{home}'", frozenset(names))
+        known, is_closed = self._contents(module) or _Contents(frozenset(), is_closed=True)
+        if not is_closed:
+            return _missing(message, names[0], known)
+        hint = suggestion(names[0], known) if len(names) == 1 else None
+        return _Missing(message, hint, known.union(names))
 
-    def _similar(self, name: str) -> Iterator[str]:
-        """Yield a similar module of the project, and public ones that differ in a letter."""
-        folders = (self.module.path.parent, self.folder)
-        files = [
-            path for folder in folders for path in sorted(folder.glob("*.py"))[:_MAXIMUM_FILES]
-        ]
-        close = nearest(name, (path.stem for path in files))
-        yield from (close,) if close is not None else ()
-        for other in (*self.interfaces.packages(), *_USUAL, *sorted(sys.stdlib_module_names)):
-            if other[0] != "_" and (is_typo(name, other) or name.rstrip("s") == other.rstrip("s")):
-                yield other
-
-    def _package_part(self, package: str, rest: str) -> _Missing | None:
-        first = rest.partition(".")[0]
-        if first in ("", *_INTERFACE_FOLDERS) or _has_file(f"{package}.{first}"):
-            return None
-        folders = [item for item in _INTERFACE_FOLDERS if self._in_folder(package, item)]
-        return _Missing(f"no module named '{package}.{rest}'", suggestion(rest, folders), rest)
-
-    def _is_local(self, name: str) -> bool:
-        try:
-            return self._local(name) is not None
-        except Unreadable:
-            return True
-
-    def _local(self, name: str) -> Path | None:
-        """Return the file of a module in the project. Raises Unreadable."""
-        rest = name.lstrip(".")
-        if rest != name:
-            return relative_module_file(rest, len(name) - len(rest), self.module.path)
-        for home in dict.fromkeys((self.module.path.parent, self.folder)):
-            project = Project.at(home)
-            path = module_file(name, home, project)
-            if path is not None and _is_in_project(path, home, project):
-                return path
-        return None
-
-    def _lacks(self, module: str, names: frozenset[str] | None, name: str) -> bool:
-        """Return whether a module with the given names has no such name."""
-        if name == "*" or (name.startswith("__") and name.endswith("__")):
+    def lacks(self, module: str, name: str) -> bool:
+        """Return whether a module has no such name, as far as is known."""
+        contents = self._contents(module)
+        if contents is None or name == "*" or name.startswith("__") or name in contents.names:
             return False
-        if names is None:
-            return self._home_of(module, [name]) is not None
+        if module in self.interfaces.packages():
+            return self._home(module, [name]) is not None  # else it may be another module
         if module.partition(".")[0] in self.interfaces.packages():
             # Python also has Trigger_Request, and private modules.
-            return not name.startswith("_") and name.partition("_")[0] not in names
-        is_typed = module == _TYPED and name.endswith(SUFFIX)
-        part = f"{module}{name}" if module.endswith(".") else f"{module}.{name}"
-        return name not in names and not is_typed and not self._is_local(part)
+            return not name.startswith("_") and name.partition("_")[0] not in contents.names
+        return not _has_file(f"{module}.{name}")
 
-    def _names(self, module: str) -> frozenset[str] | None:
-        """Return the names that can be imported from a module; None if they are not known."""
+    def _read_contents(self, module: str) -> _Contents | None:
+        """Return what a module contains; None if that is not known."""
         package, _, folder = module.partition(".")
-        if module in _NAMES:
-            return _NAMES[module]
-        if package == "composer" or package in sys.stdlib_module_names:
-            return None
+        if package == "composer":
+            names = _API_NAMES if module == _API else frozenset({"behavior", "typed"})
+            is_known = folder in ("", "behavior")
+            return _Contents(names, is_closed=module == _API) if is_known else None
         try:
-            path = self._local(module)
-            if path is not None:
-                own = read_module(path, shown_path(path))
-                return None if own.dynamic else defined_names(own)
+            own = self._read_own(module)
         except Unreadable:
             return None
-        is_interface = package in self.interfaces.packages() and folder in _INTERFACE_FOLDERS
-        return self._in_folder(package, folder) if is_interface else None
-
-    def _in_folder(self, package: str, folder: str) -> frozenset[str]:
+        packages = frozenset(self.interfaces.packages())
+        if not module:
+            names = own.names if own is not None else frozenset()
+            return _Contents(names | _USUAL | packages, is_closed=False)
+        if own is not None and module in packages:
+            return _Contents(own.names | _INTERFACE_FOLDERS, is_closed=False)
+        if own is not None or package not in packages or folder not in ("", *_INTERFACE_FOLDERS):
+            return own
         prefix = f"{package}/{folder}/"
-        names = self.interfaces.names(folder)
-        return frozenset(name.removeprefix(prefix) for name in names if name.startswith(prefix))
+        listed = self.interfaces.names(folder) if folder else ()
+        interfaces = {name.removeprefix(prefix) for name in listed if name.startswith(prefix)}
+        known = frozenset(interfaces) if folder else _INTERFACE_FOLDERS
+        return _Contents(known, is_closed=bool(folder))
 
-    def _home_of(self, module: str, names: Sequence[str]) -> str | None:
+    def _read_own(self, module: str) -> _Contents | None:
+        """Return what a module of the project contains. Raises Unreadable."""
+        name = module.lstrip(".")
+        level = len(module) - len(name)
+        homes = [self.module.path.parent, self.folder]
+        folders = [*homes, *Project.at(self.folder).node_folders]
+        file = None
+        if level:
+            folders = [*self.module.path.parents[level - 1 : level]]
+            file = relative_module_file(name, level, self.module.path)
+        elif name:
+            files = (local_module_file(name, home, Project.at(home)) for home in homes)
+            file = next(filter(None, files), None)
+        defined = frozenset[str]()
+        if file is not None:
+            own = read_module(file, shown_path(file))
+            defined, folders = defined_names(own), [file.parent]
+            if own.dynamic or file.stem != "__init__":
+                return None if own.dynamic else _Contents(defined, is_closed=True)
+        elif name:
+            return None
+        items = (item for folder in folders for item in islice(folder.glob("*"), _MAXIMUM_FILES))
+        listed = [x for x in items if x.suffix in (".py", *_COMPILED) or x.is_dir()]
+        if module and any(item.suffix in _COMPILED for item in listed):
+            return None
+        return _Contents(defined.union(item.stem for item in listed), is_closed=False)
+
+    def _home(self, module: str, names: Sequence[str]) -> str | None:
         """Return the only module that has all these interfaces: in the same package, or any."""
         package, _, folder = module.partition(".")
-        if package not in self.interfaces.packages() or folder not in ("", *_INTERFACE_FOLDERS):
-            return None
-        others = [f"{other}.{folder}" for other in self.interfaces.packages() if folder]
-        for modules in ([f"{package}.{part}" for part in _INTERFACE_FOLDERS], others):
+        packages = self.interfaces.packages()
+        own = [f"{package}.{part}" for part in sorted(_INTERFACE_FOLDERS)]
+        others = [f"{other}.{folder}" for other in packages if folder in _INTERFACE_FOLDERS]
+        for modules in (own, others) if package in packages else ():
             paths = {home: home.replace(".", "/") for home in modules}
-            homes = [
+            found = [
                 home
                 for home, path in paths.items()
                 if all(self.interfaces.find(f"{path}/{name}") is not None for name in names)
             ]
-            if homes:
-                return homes[0] if len(homes) == 1 else None
+            if found:
+                return found[0] if len(found) == 1 else None
         return None
 
+    def problem(
+        self, missing: _Missing, node: ast.alias | ast.ImportFrom, text: str, part: str
+    ) -> Problem:
+        """Return the problem of a part of an import, which begins with a text.
 
-def _of_composer(name: str) -> _Missing | None:
-    if name in ("composer", *_NAMES):
-        return None
-    if _has_file(name):
-        message = f"'{name}' is internal to the composer and may change without notice"
-        hint = f"behaviors import from '{_API}' only"
-        return _Missing(message, hint, name, family=Family.INTERNAL)
-    close = nearest(name, _NAMES)
-    hint = f"did you mean '{close}'?" if close else f"behaviors import from '{_API}'"
-    return _Missing(f"no module named '{name}'", hint, name)
+        It is no error in a file that searches for modules itself.
+        """
+        family, hint = missing.family, missing.hint
+        nodes = walk(self.module.tree.body)
+        used = {dotted(item) for item in nodes if isinstance(item, ast.Attribute | ast.Name)}
+        if family is Family.IMPORT and used & _AT_RUN_TIME:
+            family, hint = Family.NOT_INSTALLED, "the file searches for modules itself"
+        span = start_span(node, len(text), self.module.source)
+        return Problem(family, missing.message, span.part(text.rfind(part), len(part)), hint)
+
+
+def _missing(message: str, name: str, known: Iterable[str], where: str = "") -> _Missing:
+    """Return the problem of a name: an error if another one was meant, else an info.
+
+    ``where`` ends the message of an info.
+    """
+    limit = 2 if len(name) >= _LONG_NAME else 1
+    near = [(edit_distance(name, other), other) for other in known if other[:1] == name[:1]]
+    distance, close = min(near, default=(limit + 1, ""))
+    if distance <= limit:
+        return _Missing(message, f"did you mean '{close}'?", frozenset({close}))
+    hint, names = "install it, or correct the name", frozenset[str]()
+    for other in sys.stdlib_module_names:
+        is_public = len(other) >= _SHORTEST_TYPO and other[0] != "_"
+        if is_public and other[:2] == name[:2] and edit_distance(name, other) == 1:
+            hint, names = f"did you mean '{other}'?", frozenset({other})
+    return _Missing(f"{message}{where}", hint, names, Family.NOT_INSTALLED)
 
 
 def _has_file(name: str) -> bool:
     """Return whether a module outside of the project exists."""
     home = Path(__file__).parent
     return name in sys.modules or module_file(name, home, Project.at(home)) is not None
-
-
-def _is_in_project(path: Path, home: Path, project: Project) -> bool:
-    if {"site-packages", "dist-packages"}.intersection(path.parts):
-        return False
-    return any(path.is_relative_to(folder) for folder in (home, *project.node_folders))
-
-
-def _unconditional(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
-    """Yield the statements of a file, except where a failing import is handled or expected."""
-    pending = list(body[::-1])
-    while pending:
-        node = pending.pop()
-        yield node
-        is_suppressed = isinstance(node, ast.With) and "suppress(" in ast.unparse(node.items[0])
-        if isinstance(node, ast.If | ast.Match) or is_suppressed:
-            continue
-        inner = [item for name in _BODIES for item in getattr(node, name, ())]
-        if isinstance(node, ast.Try) and any(catches(x, _IMPORT_ERRORS) for x in node.handlers):
-            inner = [*node.orelse, *node.finalbody]
-        pending.extend(inner[::-1])
-
-
-def _problem(
-    missing: _Missing, name: str, node: ast.alias | ast.ImportFrom, module: Module
-) -> Problem:
-    start = start_span(node, len(name), module.source)
-    text = module.source.line(start.line)
-    offset = len("from ") if isinstance(node, ast.ImportFrom) else 0
-    column = text.find(name, start.column - 1 + offset)
-    if column >= 0:
-        start = Span(module.source, start.line, column + 1, len(name))
-    part = name.find(missing.part) if missing.part else -1
-    span = start.part(part, len(missing.part)) if part >= 0 else start
-    return Problem(missing.family, missing.message, span, missing.hint)

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from composer.diagnostics import suggestion
-from composer.field_types import constant_problem
-from composer.interfaces import INTEGER_RANGES, TEXTS, Field, FieldType, Message
-from composer.python_code.checks.scopes import Constant, Scope
+from composer.field_types import constant_problem, enumerator_problem, enumerators
+from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
+from composer.python_code.checks.scopes import Scope
 from composer.python_code.problems import Family, Problem
-
-#: Maximum number of names in a hint.
-_SHOWN = 6
-#: Words in the names of constants that are limits, not values of a field.
-_LIMITS = frozenset({"COUNT", "DEFAULT", "LENGTH", "MAX", "MIN", "NUM", "SIZE", "VERSION"})
 
 
 def message_problems(scope: Scope) -> Iterator[Problem]:
@@ -69,17 +64,16 @@ def _value_problems(node: ast.expr, type_: object, scope: Scope) -> Iterator[Pro
         yield from _array_problems(node, type_, scope)
     else:
         value = scope.constant(node)
-        is_text = isinstance(value, str) and type_.name in TEXTS
-        # Values of type byte are bytes in Python.
-        is_integer = _is_integer(value) and type_.name in INTEGER_RANGES and type_.name != "byte"
-        if is_text or is_integer:
-            found = constant_problem(value, type_, scope.code.interfaces)  # type: ignore[arg-type]
-            if found is not None:
-                yield scope.problem(Family.VALUE, found[0], node, found[1])
-
-
-def _is_integer(value: Constant) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+        # In Python, values of type byte are bytes, and those of type bool are integers.
+        if value is None or isinstance(value, bool | bytes) or type_.name in ("bool", "byte"):
+            return
+        found = constant_problem(value, type_, scope.code.interfaces)
+        if not type_.is_primitive:
+            found = (f"{value} where {type_} is expected", None)
+        elif isinstance(value, int) and type_.name in FLOATS:
+            found = (f"{type_} must be a float, not the integer {value}", f"write {value}.0")
+        if found is not None:
+            yield scope.problem(Family.VALUE, found[0], node, found[1])
 
 
 def _array_problems(node: ast.expr, type_: FieldType, scope: Scope) -> Iterator[Problem]:
@@ -91,10 +85,11 @@ def _array_problems(node: ast.expr, type_: FieldType, scope: Scope) -> Iterator[
         elements = f"{count} element" + ("" if count == 1 else "s")
         yield scope.problem(Family.VALUE, f"{elements} where {type_} is expected", node)
         return
-    for item in node.elts if isinstance(node, ast.List | ast.Tuple) else ():
-        problems = list(_value_problems(item, type_.element, scope))
-        yield from problems
-        if problems:
+    items = [node.elt] if isinstance(node, ast.ListComp) else getattr(node, "elts", ())
+    for item in items if isinstance(node, ast.List | ast.Tuple | ast.ListComp) else ():
+        problem = next(_value_problems(item, type_.element, scope), None)
+        if problem is not None:
+            yield problem
             return  # the others have the same cause
 
 
@@ -107,6 +102,9 @@ def _length(node: ast.expr, scope: Scope) -> int | None:
         case ast.BinOp(left=ast.List() as repeated, op=ast.Mult(), right=factor):
             length, times = _length(repeated, scope), scope.constant(factor)
             return length * times if length is not None and isinstance(times, int) else None
+        case ast.Attribute():
+            array = scope.type(node)
+            return array.array_size if isinstance(array, FieldType) else None
     return None
 
 
@@ -136,45 +134,22 @@ def _comparison(left: ast.expr, others: list[ast.expr], scope: Scope) -> Iterato
             yield from _enumerator_problem(*found, other, scope)
 
 
-def enumerators(message: Message, field: str) -> Mapping[str, int]:
-    """Return the constants that are named after the field: STATUS_IDLE for ``status``.
-
-    Without any, they are all constants of the message if only this field has their type.
-    """
-    numbers = [item for item in message.constants if isinstance(item.value, int)]
-    named = [item for item in numbers if item.name.startswith(f"{field.upper()}_")]
-    types = {item.type for item in message.constants}
-    alike = [item.name for item in message.fields if item.type in types]
-    if not named and len(numbers) > 1 and len(types) == 1 and alike == [field]:
-        named = numbers
-    if any(_LIMITS.intersection(item.name.split("_")) for item in named):
-        return {}
-    return {item.name: item.value for item in named if isinstance(item.value, int)}
-
-
 def _enumerator_problem(
     message: Message, field: Field, node: ast.expr, scope: Scope
 ) -> Iterator[Problem]:
     """Yield why a value is none of the constants for a field."""
-    known = enumerators(message, field.name) if not field.type.is_array else {}
-    value = scope.constant(node)
-    if known and isinstance(value, int) and not isinstance(value, bool):
-        if value not in known.values() and not _is_combination(value, set(known.values())):
-            names = [f"{number} {name}" for name, number in known.items()]
-            more = ", ..." if len(names) > _SHOWN else ""
-            text = f"{message.name} has no constant for '{field.name}' with the value {value}"
-            hint = f"valid here: {', '.join(names[:_SHOWN])}{more}"
-            yield scope.doubt(text, node, hint)
-    elif known and isinstance(node, ast.Attribute) and node.attr not in known:
-        owner = scope.message_class(node.value)
-        if owner is not None and any(item.name == node.attr for item in owner.constants):
+    if field.type.is_array:
+        return
+    found = enumerator_problem(message, field.name, scope.constant(node))
+    owner = scope.message_class(node.value) if isinstance(node, ast.Attribute) else None
+    if found is not None:
+        yield scope.doubt(found[0], node, found[1])
+    elif isinstance(node, ast.Attribute) and owner is not None:
+        known = enumerators(message, field.name)
+        if (
+            known
+            and node.attr not in known
+            and any(item.name == node.attr for item in owner.constants)
+        ):
             text = f"{owner.name} defines {node.attr} for another field than '{field.name}'"
             yield scope.doubt(text, node, suggestion(node.attr, known))
-
-
-def _is_combination(value: int, known: set[int]) -> bool:
-    """Return whether the constants are flags and ``value`` is a combination of them."""
-    flags = known - {0}
-    if not all(flag > 0 and flag.bit_count() == 1 for flag in flags) or max(flags, default=0) < 4:
-        return False
-    return value & ~sum(flags) == 0

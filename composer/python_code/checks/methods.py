@@ -1,4 +1,7 @@
-"""Methods that lack ``self`` or a ``return``, and statements without effect."""
+"""Methods without ``self`` or a result, and functions that are called, or not called, by mistake.
+
+The type checker reports callbacks that take other arguments.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,24 @@ from collections.abc import Iterator
 from composer.python_code.checks.scopes import Code, Scope
 from composer.python_code.nodes.behaviors import GENERAL_HANDLERS, handlers
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source.flow import empty_returns, reaches_end
-from composer.python_code.source.method_body import dotted
-from composer.python_code.source.receivers import lacks_self
-from composer.python_code.source.spans import span_of
-from composer.python_code.source.traversal import walk
+from composer.python_code.source import Method
+from composer.python_code.source.flow import called_name, lacks_self, reaches_end, returns_nothing
+from composer.python_code.source.trees import argument, dotted, walk
 
-#: Methods of goals and ports whose names mean nothing else.
-_METHODS = frozenset({"abort", "canceled", "publish", "publish_feedback", "succeed"})
+#: Methods of goals, ports and timers that have no meaning as plain attributes.
+_METHODS = frozenset(
+    {"abort", "cancel", "canceled", "destroy", "publish", "publish_feedback", "reset", "succeed"}
+)
+_TAKING_CALLBACKS = frozenset(
+    {"ActionServer", "add_done_callback", "add_on_set_parameters_callback"}
+    | {"create_guard_condition", "create_service", "create_subscription", "create_timer"}
+    | {"send_goal", "send_goal_async"}
+)
+#: Where callbacks that return something are passed: their position, name and result.
+_RETURNING = {
+    "create_service": (2, "callback", "response"),
+    "ActionServer": (3, "execute_callback", "result"),
+}
 
 
 def unused_values(scope: Scope) -> Iterator[Problem]:
@@ -31,25 +44,6 @@ def unused_values(scope: Scope) -> Iterator[Problem]:
                 if is_own or name in _METHODS:
                     message = f"'{name}' is not called"
                     yield scope.problem(Family.UNUSED, message, value, "add '()'")
-
-
-def missing_returns(code: Code) -> Iterator[Problem]:
-    """Yield the handlers that must return a response or a decision, and may not."""
-    for handler in handlers(code.node):
-        method = code.source.method(handler.name)
-        is_service = handler.kind == "service"
-        is_needed = is_service or handler.name.startswith("accept_")
-        if not is_needed or method is None or method.node is None or not method.known:
-            continue
-        what, example = ("the response", "response") if is_service else ("True or False", "True")
-        message = f"'{handler.name}' must return {what}"
-        for statement in empty_returns(method.node):
-            span = span_of(statement, method.span.file)
-            hint = f"write 'return {example}'"
-            yield Problem(Family.RETURN, f"{message}, not None", span, hint)
-        if reaches_end(method.node):
-            message += ", but may end without a 'return'"
-            yield Problem(Family.RETURN, message, method.span, f"end it with 'return {example}'")
 
 
 def missing_self(code: Code) -> Iterator[Problem]:
@@ -75,3 +69,56 @@ def missing_self(code: Code) -> Iterator[Problem]:
                 hint = f"write 'def {method.name}({', '.join(('self', *names))})'"
                 message = f"method '{method.name}' of '{class_.name}' lacks 'self'"
                 yield Problem(Family.SELF, message, method.span, hint, is_behavior)
+
+
+def callback_problems(scope: Scope) -> Iterator[Problem]:
+    """Yield the callbacks that are called at once, or that return nothing."""
+    for call in scope.nodes:
+        name = called_name(call)
+        if not isinstance(call, ast.Call) or name not in _TAKING_CALLBACKS:
+            continue
+        for item in (*call.args, *(keyword.value for keyword in call.keywords)):
+            method = _method(item.func, scope) if isinstance(item, ast.Call) else None
+            if method is not None and (method.is_async or _returns_nothing(method)):
+                message = "the function is called here, not passed"
+                hint = f"write self.{method.name} without '()'"
+                yield scope.problem(Family.SIGNATURE, message, item, hint)
+        if name in _RETURNING:
+            position, role, result = _RETURNING[name]
+            method = _method(argument(call, position, role), scope)
+            if method is not None and _returns_nothing(method):
+                yield _no_result(method, result)
+
+
+def handler_problems(code: Code) -> Iterator[Problem]:
+    """Yield the handlers of a behavior that may end without a response or a decision.
+
+    The type checker reports a plain 'return'.
+    """
+    for handler in handlers(code.node):
+        method = code.source.method(handler.name)
+        is_service = handler.kind == "service"
+        is_needed = is_service or handler.name.startswith("accept_")
+        if not is_needed or method is None or method.node is None or not method.known:
+            continue
+        if reaches_end(method.node):
+            yield _no_result(method, "response" if is_service else "decision")
+
+
+def _no_result(method: Method, result: str) -> Problem:
+    message = f"'{method.name}' must return the {result}, but may end without a 'return'"
+    return Problem(Family.RETURN, message, method.span, f"end it with 'return {result}'")
+
+
+def _returns_nothing(method: Method) -> bool:
+    return method.node is not None and returns_nothing(method.node)
+
+
+def _method(node: ast.expr | None, scope: Scope) -> Method | None:
+    """Return the method of the class that an expression is, None if it is not known."""
+    match node:
+        case ast.Attribute(value=ast.Name(id="self"), attr=name) if scope.method is not None:
+            method = scope.code.source.method(name)
+            is_known = method is not None and method.known and name not in scope.code.assigned
+            return method if is_known else None
+    return None

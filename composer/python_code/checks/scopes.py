@@ -8,21 +8,19 @@ type, because a type checker runs as well.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
-from pathlib import Path
 from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
+from composer.field_types import ANYTHING, ValueType, fields_of
 from composer.interfaces import Field, FieldType, Interfaces, Message, parts
 from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource, Function, Method, Module
-from composer.python_code.source.method_body import dotted
-from composer.python_code.source.spans import span_of
-from composer.python_code.source.traversal import walk
+from composer.python_code.source.trees import bindings, dotted, span_of, walk
 from composer.python_code.stubs.behaviors import signatures
 
 _FOLDERS = ("msg", "srv", "action")
@@ -30,7 +28,6 @@ _FOLDERS = ("msg", "srv", "action")
 _MAXIMUM_STEPS = 16
 _MAXIMUM_BITS = 128
 
-Type: TypeAlias = Message | FieldType | None
 Constant: TypeAlias = str | bytes | int | float | None
 
 
@@ -43,23 +40,8 @@ class Code:
     interfaces: Interfaces
 
     @cached_property
-    def modules(self) -> Mapping[Path, Scope]:
-        """The statements of each file outside of functions."""
-        return {module.path: Scope(self, module) for module in self.source.own_modules}
-
-    @cached_property
     def scopes(self) -> Sequence[Scope]:
         """All files and functions."""
-        return (*self.modules.values(), *self._functions())
-
-    @cached_property
-    def methods(self) -> Mapping[str, Scope]:
-        """The methods of the node, by name, as far as they are in the project's files."""
-        nearest = {id(method) for method in self.source.methods}
-        own = (scope for scope in self.scopes if id(scope.method) in nearest)
-        return {scope.method.name: scope for scope in own if scope.method is not None}
-
-    def _functions(self) -> Iterator[Scope]:
         own: dict[int, tuple[Method, Mapping[str, str]]] = {}
         for module, class_ in self.source.own_classes:
             if self.node.hosted_class is not None:
@@ -70,21 +52,20 @@ class Code:
                 signature = known.get(method.name)
                 types = [type_ for _, type_ in signature.arguments] if signature else []
                 own[id(method.node)] = method, dict(zip(method.arguments, types, strict=False))
-        for home in self.modules.values():
-            for node in home.nodes:
-                if isinstance(node, Function):
-                    yield Scope(self, home.module, node, *own.get(id(node), ()))
+        modules = [Scope(self, module) for module in self.source.own_modules]
+        functions = (
+            Scope(self, home.module, node, *own.get(id(node), ()))
+            for home in modules
+            for node in home.nodes
+            if isinstance(node, Function)
+        )
+        return (*modules, *functions)
 
     @cached_property
     def assigned(self) -> frozenset[str]:
         """The attributes of ``self`` that methods assign."""
-        return frozenset(
-            node.attr
-            for scope in self.scopes
-            for node in scope.nodes
-            if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
-            if scope.method is not None and dotted(node) == f"self.{node.attr}"
-        )
+        names = (name for _, class_ in self.source.own_classes for name in bindings(class_.node))
+        return frozenset(name.removeprefix("self.") for name in names if name.startswith("self."))
 
 
 @dataclass(eq=False)
@@ -118,40 +99,18 @@ class Scope:
         span = span_of(place, self.module.source)
         return Problem(Family.VALUE, message, span, hint, is_certain=False)
 
-    @cached_property
-    def bindings(self) -> Mapping[str, list[ast.AST | None]]:
-        """What is bound to each name, expressions and functions; None for what is not plain."""
-        bound: dict[str, list[ast.AST | None]] = {}
-        values: dict[int, ast.expr] = {}
-        for node in self.nodes:
-            match node:
-                case ast.Assign(targets=targets, value=value):
-                    values |= {id(target): value for target in targets}
-                case ast.AnnAssign(target=target, value=ast.expr() as value):
-                    values[id(target)] = value
-                case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
-                    bound.setdefault(name, []).append(values.get(id(node)))
-                case (
-                    ast.ClassDef(name=name)
-                    | ast.FunctionDef(name=name)
-                    | ast.AsyncFunctionDef(name=name)
-                ):
-                    bound.setdefault(name, []).append(node)
-                case ast.arg(arg=name) | ast.ExceptHandler(name=str() as name):
-                    bound.setdefault(name, []).append(None)
-                case ast.Global(names=names) | ast.Nonlocal(names=names):
-                    for name in names:  # other functions assign it too
-                        bound.setdefault(name, []).extend((None, None))
-        return bound
+    def bound(self, name: str) -> Sequence[ast.expr | None]:
+        """Return what is assigned to a name; None for changes and for what is not plain."""
+        if self.function is not None and name in bindings(self.function):
+            return bindings(self.function)[name]
+        if "global " in self.module.source.text:
+            return ()
+        return bindings(self.module.tree).get(name, ())
 
     def value(self, name: str) -> ast.expr | None:
-        """Return what is assigned to a name, if that happens once."""
-        if name in self.bindings:
-            value, *others = self.bindings[name]
-            return value if isinstance(value, ast.expr) and not others else None
-        outside = self.code.modules[self.module.path]
-        is_changed = outside is self or "global " in self.module.source.text
-        return None if is_changed else outside.value(name)
+        """Return what is assigned to a name, if that happens once and is not changed."""
+        bound = self.bound(name)
+        return bound[0] if len(bound) == 1 else None
 
     def constant(self, node: ast.expr | None) -> Constant:
         """Return the value of a constant, or of a name for one."""
@@ -169,14 +128,10 @@ class Scope:
 
     def full_name(self, node: ast.expr | str) -> str:
         """Return a dotted name with imports resolved: ``std_msgs.msg.Bool``; "" for others."""
-        names = (node if isinstance(node, str) else dotted(node)).split(".")
-        if self.function is not None and names[0] in self.bindings:
-            return ""
-        for count in range(len(names), 0, -1):
-            imported = self.module.imports.get(".".join(names[:count]))
-            if imported is not None:
-                return ".".join(filter(None, (imported.module, imported.name, *names[count:])))
-        return ".".join(names)
+        text = node if isinstance(node, str) else dotted(node)
+        first, dot, rest = text.partition(".")
+        is_local = self.function is not None and first in bindings(self.function)
+        return "" if is_local else f"{self.module.names.get(first, first)}{dot}{rest}"
 
     def message_class(self, node: ast.expr | str) -> Message | None:
         """Return the message whose class an expression is."""
@@ -187,40 +142,36 @@ class Scope:
         part = names[3].lower() if len(names) == 4 else "message"
         return parts(definition).get(part) if definition is not None else None
 
-    def message(self, node: ast.expr, steps: int = 0) -> Message | None:
-        """Return the message that an expression is."""
-        type_ = self.type(node, steps)
-        if isinstance(type_, FieldType) and not type_.is_array and not type_.is_primitive:
-            return self.code.interfaces.message(type_.name)
-        return type_ if isinstance(type_, Message) else None
-
-    def field(self, node: ast.Attribute, steps: int = 0) -> tuple[Message, Field] | None:
+    def field(self, node: ast.expr, steps: int = 0) -> tuple[Message, Field] | None:
         """Return the field that an attribute is, with its message."""
-        message = self.message(node.value, steps + 1)
+        if not isinstance(node, ast.Attribute):
+            return None
+        message = fields_of(self.type(node.value, steps + 1), self.code.interfaces)
         found = message.field(node.attr) if message is not None else None
         return (message, found) if message is not None and found is not None else None
 
-    def type(self, node: ast.expr, steps: int = 0) -> Type:
-        """Return the type of an expression, None if it is not known."""
-        if steps > _MAXIMUM_STEPS:
-            return None
-        match node:
+    def type(self, node: ast.expr, steps: int = 0) -> ValueType:
+        """Return the type of an expression, ANYTHING if it is not known."""
+        match node if steps <= _MAXIMUM_STEPS else None:
             case ast.Name(id=name):
-                value = self.value(name)
-                return self._argument(name) if value is None else self.type(value, steps + 1)
+                values = [value for value in self.bound(name) if value is not None]
+                if len(values) == 1:
+                    return self.type(values[0], steps + 1)
+                return ANYTHING if values else self._argument(name)
             case ast.Attribute():
                 found = self.field(node, steps)
-                return found[1].type if found is not None else None
+                return found[1].type if found is not None else ANYTHING
             case ast.Subscript(value=owner, slice=index) if not isinstance(index, ast.Slice):
                 array = self.type(owner, steps + 1)
-                return array.element if isinstance(array, FieldType) and array.is_array else None
+                if isinstance(array, FieldType) and array.is_array:
+                    return array.element
             case ast.Call(func=function):
-                return self.message_class(function)
-        return None
+                return self.message_class(function) or ANYTHING
+        return ANYTHING
 
-    def _argument(self, name: str) -> Message | None:
-        if self.function is None or len(self.bindings.get(name, ())) != 1:
-            return None
+    def _argument(self, name: str) -> ValueType:
+        if self.function is None:
+            return ANYTHING
         given = (*self.function.args.posonlyargs, *self.function.args.args)
         annotation = next((item.annotation for item in given if item.arg == name), None)
-        return self.message_class(annotation or self.passed.get(name, ""))
+        return self.message_class(annotation or self.passed.get(name, "")) or ANYTHING

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
-from composer.model import BehaviorReference, Node, Parameter, Port, PortKind, System
-from composer.python_code.source import BehaviorSource, Call, Method, find_behavior
+from composer.model import Node, Port, PortKind, System
+from composer.python_code.source import BehaviorSource, Method, find_behavior
 from composer.resolve.tree_values import is_opaque
 from composer.source import Located
 
@@ -34,6 +34,9 @@ _ARGUMENTS: Mapping[PortKind, tuple[str, ...]] = {
 }
 
 
+_PREFIXES = ("on_", "accept_")
+
+
 @dataclass(frozen=True, slots=True)
 class Handler:
     """A method that the behavior may define for a port or a timer.
@@ -54,8 +57,8 @@ def behaviors(system: System) -> tuple[NodeBehavior, ...]:
     pairs = []
     for node in system.nodes:
         reference = node.behavior
-        if reference is None or not _is_readable(reference):
-            continue
+        if reference is None or not reference.class_name or is_opaque(reference.text.value):
+            continue  # a missing class is reported by a rule
         key = (reference.text.value, reference.folder)
         if key not in read:
             read[key] = find_behavior(reference)
@@ -63,36 +66,15 @@ def behaviors(system: System) -> tuple[NodeBehavior, ...]:
     return tuple(pairs)
 
 
-def distinct_behaviors(pairs: Iterable[NodeBehavior]) -> tuple[NodeBehavior, ...]:
-    """Return one node for each behavior and each set of ports, timers and parameters it is used in.
-
-    Hundreds of copies of a node are equal in all that a rule about Python code needs.
-    """
-    first: dict[object, NodeBehavior] = {}
-    for node, source in pairs:
-        ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
-        parameters = tuple(map(_kind_of, node.parameters))
-        timers = tuple(timer.name.value for timer in node.timers)
-        key = (id(source), node.complete, ports, parameters, timers)
-        first.setdefault(key, (node, source))
-    return tuple(first.values())
-
-
-def _kind_of(parameter: Parameter) -> tuple[object, ...]:
-    """Return what the code may depend on: also the length of a list, and which choice is set."""
-    value = None if parameter.value is None else parameter.value.value
-    is_choice = parameter.choices is not None and isinstance(value, str)
-    known = len(value) if isinstance(value, list) else value if is_choice else None
-    return parameter.name.value, parameter.type.value, known
-
-
-def complete_behaviors(pairs: Iterable[NodeBehavior]) -> tuple[NodeBehavior, ...]:
-    """Return the nodes whose behavior is known completely, with its source."""
-    return tuple(
-        (node, source)
-        for node, source in pairs
-        if source.class_found and source.complete and node.complete
-    )
+def use_of(node: Node, source: BehaviorSource) -> tuple[object, ...]:
+    """Return what a check of the Python code of a node depends on; equal uses are checked once."""
+    place = (source.reference.text.value, source.reference.folder)
+    if node.behavior is None:
+        return place
+    ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
+    parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
+    timers = tuple(timer.name.value for timer in node.timers)
+    return (*place, node.complete, ports, parameters, timers)
 
 
 def handlers(node: Node) -> Iterator[Handler]:
@@ -113,14 +95,6 @@ def _is_needed(port: Port) -> bool:
     if port.kind is PortKind.ACTION_SERVER and (port.result or port.feedback):
         return False
     return not port.reactions
-
-
-def _is_readable(reference: BehaviorReference) -> bool:
-    """Return whether the class can be looked up; a missing one is reported by a rule."""
-    return bool(reference.class_name) and not is_opaque(reference.text.value)
-
-
-_PREFIXES = ("on_", "accept_")
 
 
 def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
@@ -145,39 +119,22 @@ def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
     return [method for method in unbound if method.name not in used]
 
 
-def calls_of(source: BehaviorSource, method: Method) -> Iterator[Call]:
-    """Yield the calls of ``method``, and those of the methods of its class that it calls."""
-    for reached in reached_methods(source, method):
-        yield from reached.calls
-
-
-def escaping_publishers(source: BehaviorSource) -> frozenset[str]:
-    """Return the publishers that the behavior passes on or stores; their uses are unknown."""
-    return frozenset(port for method in source.methods for port in method.publishing.passed_on)
-
-
 def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
     """Yield ``methods`` and those of their class that they call, directly or through others."""
     pending, seen = list(methods), {method.name for method in methods}
-    known = methods_by_name(source)
     while pending:
         current = pending.pop()
         yield current
-        for callee in called_methods(current, known):
+        for callee in called_methods(source, current):
             if callee.name not in seen:
                 seen.add(callee.name)
                 pending.append(callee)
 
 
-def methods_by_name(source: BehaviorSource) -> Mapping[str, Method]:
-    """Return the methods as ``source.method`` finds them, for many look-ups."""
-    return {method.name: method for method in reversed(source.methods)}
-
-
-def called_methods(method: Method, known: Mapping[str, Method]) -> Iterator[Method]:
-    """Yield those of the ``known`` methods of its class that ``method`` itself calls at once."""
+def called_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
+    """Yield those methods of its class that ``method`` itself calls at once."""
     for call in method.calls:
         is_own = call.name.startswith("self.") and not call.deferred
-        callee = known.get(call.name.removeprefix("self.")) if is_own else None
+        callee = source.method(call.name.removeprefix("self.")) if is_own else None
         if callee is not None:
             yield callee

@@ -1,38 +1,17 @@
-"""The parameters and ports that the classes of nodes create, read from their source."""
+"""What the classes of nodes call on their object, and the parameters that they declare so."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
-from typing import TypeVar
+from collections.abc import Iterator
 
 from composer.fast_dataclass import dataclass
-from composer.model import PortKind
-from composer.python_code.nodes.classes import ClassOfNode
 from composer.python_code.source import BehaviorSource
-from composer.python_code.source.method_body import argument
-from composer.python_code.source.spans import span_of
-from composer.python_code.source.traversal import walk
-from composer.python_code.source.values import NotLiteral, Scope
-from composer.qos import QosProfile
+from composer.python_code.source.trees import argument, span_of, walk
+from composer.python_code.source.values import Scope, scopes_in
 from composer.resolve.declarations.parameters import rclpy_type
-from composer.source import Located, Span
+from composer.source import Located
 
-T = TypeVar("T")
-
-_TOPIC = ("msg_type", "topic", "qos_profile")
-_SERVICE = ("srv_type", "srv_name")
-#: The methods that create ports: their kind, and their arguments in order.
-CREATORS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
-    "create_publisher": (PortKind.PUBLISHER, _TOPIC),
-    "create_lifecycle_publisher": (PortKind.PUBLISHER, _TOPIC),
-    "create_subscription": (
-        PortKind.SUBSCRIPTION,
-        ("msg_type", "topic", "callback", "qos_profile"),
-    ),
-    "create_service": (PortKind.SERVICE, _SERVICE),
-    "create_client": (PortKind.CLIENT, _SERVICE),
-}
 _DECLARING = frozenset({"declare_parameter", "declare_parameters"})
 #: With one of these, parameters exist that the class does not declare by name.
 _UNDECLARED = frozenset(
@@ -40,54 +19,6 @@ _UNDECLARED = frozenset(
 )
 #: Packages whose functions take a node and declare no parameters of the class.
 _OF_ROS = frozenset({"message_filters", "rclpy", "tf2_ros"})
-
-
-@dataclass(frozen=True, slots=True)
-class CreatedPort:
-    """A port that a class creates; what its source does not show is None."""
-
-    kind: PortKind
-    name: str | None
-    interface: str | None
-    qos: QosProfile | None
-    span: Span
-
-
-def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
-    """Yield the ports that a class creates by methods of Node."""
-    for scope, call in _calls(node_class.source):
-        creator = CREATORS.get(_called(call))
-        if creator is None:
-            continue
-        kind, names = creator
-        has_qos = "qos_profile" in names
-        qos = argument(call, names.index("qos_profile"), "qos_profile") if has_qos else None
-        yield CreatedPort(
-            kind,
-            _known(scope.text, argument(call, 1, names[1])),
-            _known(scope.interface, argument(call, 0, names[0])),
-            _known(scope.qos, qos),
-            span_of(call, scope.module.source),
-        )
-
-
-def all_created_ports(node_class: ClassOfNode) -> list[CreatedPort] | None:
-    """Return all ports that a class creates by methods of Node.
-
-    None: it may create others, since a name is computed, or since other code gets the node.
-    """
-    source = node_class.source
-    if not source.complete or passes_node_on(source, frozenset({"rclpy"})):
-        return None
-    ports = list(created_ports(node_class))
-    if any(port.name is None for port in ports):
-        return None
-    mentioned = sum(
-        isinstance(node, ast.Attribute) and node.attr in CREATORS
-        for module in source.own_modules
-        for node in walk(module.tree.body)
-    )
-    return ports if mentioned == len(ports) else None
 
 
 @dataclass(slots=True)
@@ -108,31 +39,31 @@ def declared_parameters(source: BehaviorSource) -> DeclaredParameters:
     # A method that is passed on, or called for another object, may declare anything.
     mentions = sum(isinstance(node, ast.Attribute) and node.attr in _DECLARING for node in nodes)
     parameters = DeclaredParameters({}, source.complete and source.class_found and not is_open)
-    for scope, call in _calls(source):
-        if _called(call) in _DECLARING:
+    for scope, call, method in calls_on_self(source):
+        if method in _DECLARING:
             mentions -= 1
-            _declare(scope, call, parameters)
+            _declare(scope, call, method, parameters)
     parameters.is_complete = parameters.is_complete and mentions == 0
     return parameters
 
 
-def _declare(scope: Scope, call: ast.Call, parameters: DeclaredParameters) -> None:
+def _declare(scope: Scope, call: ast.Call, method: str, parameters: DeclaredParameters) -> None:
     """Add the parameters that a call declares."""
     prefix: str | None = ""
     items = [(argument(call, 0, "name"), argument(call, 1, "value"))]
-    if _called(call) == "declare_parameters":
-        prefix = _known(scope.text, argument(call, 0, "namespace"))
+    if method == "declare_parameters":
+        prefix = scope.known(scope.text, argument(call, 0, "namespace"))
         listed = argument(call, 1, "parameters")
         pairs = listed.elts if isinstance(listed, ast.List | ast.Tuple) else [ast.Tuple(elts=[])]
         items = [_pair(item) for item in pairs]
     for name_node, default in items:
-        name = _known(scope.text, name_node)
+        name = scope.known(scope.text, name_node)
         if name is None or prefix is None:
             parameters.is_complete = False
             continue
         name = f"{prefix}.{name}" if prefix else name
         is_certain = name not in parameters.types and not _may_change(call)
-        type_ = rclpy_type(_known(scope.literal, default)) if is_certain else None
+        type_ = rclpy_type(scope.known(scope.literal, default)) if is_certain else None
         where = span_of(call, scope.module.source)
         parameters.types[name] = Located(type_, where) if type_ is not None else None
 
@@ -148,17 +79,12 @@ def _pair(item: ast.expr) -> tuple[ast.expr | None, ast.expr | None]:
 
 def passes_node_on(source: BehaviorSource, harmless: frozenset[str] = _OF_ROS) -> bool:
     """Return whether a class passes its object to other code than that of some packages."""
-    return any(
-        _passes_on(Scope(module, known.node, method.node), harmless)
-        for module, known in source.classes_outside_ros
-        for method in known.methods
-        if method.node is not None
-    )
+    return any(_passes_on(scope, harmless) for scope in scopes_in(source.classes))
 
 
 def _passes_on(scope: Scope, harmless: frozenset[str]) -> bool:
     uses = 0
-    for node in walk(scope.method.body, closed=(ast.ClassDef,)):
+    for node in scope.nodes:
         match node:
             case ast.Name(id="self"):
                 uses += 1
@@ -170,29 +96,13 @@ def _passes_on(scope: Scope, harmless: frozenset[str]) -> bool:
     return uses > 0
 
 
-def _calls(source: BehaviorSource) -> Iterator[tuple[Scope, ast.Call]]:
-    """Yield the calls of methods of the object in the methods of a class."""
-    for module, known in source.classes_outside_ros:
-        for method in known.methods:
-            if method.node is None:
-                continue
-            scope = Scope(module, known.node, method.node)
-            for node in walk(method.node.body, closed=(ast.ClassDef,)):
-                match node:
-                    case ast.Call(func=ast.Attribute(value=ast.Name(id="self"))):
-                        yield scope, node
-
-
-def _called(call: ast.Call) -> str:
-    return call.func.attr if isinstance(call.func, ast.Attribute) else ""
-
-
-def _known(read: Callable[[ast.expr], T], node: ast.expr | None) -> T | None:
-    """Return what an expression is, None if only running the code would show it."""
-    try:
-        return read(node) if node is not None else None
-    except NotLiteral:
-        return None
+def calls_on_self(source: BehaviorSource) -> Iterator[tuple[Scope, ast.Call, str]]:
+    """Yield the calls of methods of the object in the methods of a class, with their names."""
+    for scope in scopes_in(source.classes):
+        for node in scope.nodes:
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name(id="self"), attr=name)):
+                    yield scope, node, name
 
 
 def _may_change(call: ast.Call) -> bool:

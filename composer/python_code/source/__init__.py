@@ -5,14 +5,20 @@ read from the syntax tree. What syntax does not determine (a base class in anoth
 decorator, ``__getattr__``) is marked as unknown, and rules do not report it as missing.
 """
 
-from composer.python_code.source.lookup import BehaviorSource, find_behavior, imported_from
-from composer.python_code.source.method_body import Call, Function
+from composer.python_code.source.calls import Call, published_port
+from composer.python_code.source.lookup import (
+    BehaviorSource,
+    BrokenModule,
+    find_behavior,
+    imported_from,
+)
 from composer.python_code.source.nearby_modules import NearbyModules, nearby_modules
-from composer.python_code.source.publishing import published_port
 from composer.python_code.source.syntax import Class, Method, Module
+from composer.python_code.source.trees import Function
 
 __all__ = [
     "BehaviorSource",
+    "BrokenModule",
     "Call",
     "Class",
     "Function",

@@ -1,32 +1,43 @@
-"""How a function ends: with a value, or without one."""
+"""Whether a function has ``self``, and how it ends: with a value, or without one."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
 
-from composer.python_code.source.method_body import Function
-from composer.python_code.source.traversal import children, walk
+from composer.python_code.source.trees import SCOPES, Function, is_none, walk
 
-_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 #: Functions of the standard library that do not return.
 EXITS = frozenset({"exit", "quit", "_exit", "abort"})
+_LOOPS = (ast.For, ast.AsyncFor, ast.While)
+_CLASS_METHODS = frozenset({"__new__", "__init_subclass__", "__class_getitem__"})
+_RECEIVERS = frozenset({"self", "cls", "mcs"})
 
 
-def empty_returns(function: Function) -> Iterator[ast.Return]:
-    """Yield the ``return`` statements of ``function`` that return None."""
-    for node in own_nodes(function.body):
-        if isinstance(node, ast.Return):
-            value = node.value
-            if value is None or (isinstance(value, ast.Constant) and value.value is None):
-                yield node
+def lacks_self(function: Function, arguments: int | None = None) -> bool:
+    """Return whether a method lacks its first argument, ``self``.
+
+    It does if it has no argument at all, if it uses ``self`` without having it, or if it takes
+    exactly the ``arguments`` that a handler gets besides ``self``.
+    """
+    if function.decorator_list or function.name in _CLASS_METHODS:
+        return False
+    positional = [item.arg for item in (*function.args.posonlyargs, *function.args.args)]
+    if not positional:
+        return function.args.vararg is None
+    if positional[0] in _RECEIVERS or positional[0].startswith("_"):
+        return False
+    names = [node for node in ast.walk(function) if isinstance(node, ast.Name)]
+    contexts = [node.ctx for node in names if node.id == "self"]
+    uses_self = bool(contexts) and all(isinstance(item, ast.Load) for item in contexts)
+    every = [*positional, *(item.arg for item in function.args.kwonlyargs)]
+    return ("self" not in every and uses_self) or len(positional) == arguments
 
 
 def returned_values(function: Function) -> Iterator[ast.expr]:
     """Yield what the ``return`` statements of ``function`` return, except None."""
-    empty = set(empty_returns(function))
-    for node in own_nodes(function.body):
-        if isinstance(node, ast.Return) and node.value is not None and node not in empty:
+    for node in walk(function.body, closed=SCOPES):
+        if isinstance(node, ast.Return) and node.value is not None and not is_none(node.value):
             yield node.value
 
 
@@ -36,7 +47,7 @@ def reaches_end(function: Function) -> bool:
     A generator is never said to. What calls do is not known: a method that always raises counts as
     one that returns.
     """
-    nodes = own_nodes(function.body)
+    nodes = walk(function.body, closed=SCOPES)
     if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in nodes):
         return False
     return _continues(function.body)
@@ -47,14 +58,9 @@ def returns_nothing(function: Function) -> bool:
 
     A method that always raises, and one with a decorator, is not said to.
     """
-    if function.decorator_list or _is_stub(function) or not reaches_end(function):
+    if function.decorator_list or is_empty(function.body) or not reaches_end(function):
         return False
     return next(returned_values(function), None) is None
-
-
-def own_nodes(body: Sequence[ast.stmt]) -> Iterator[ast.AST]:
-    """Yield the nodes of ``body`` in source order, without nested functions and classes."""
-    return walk(body, closed=_SCOPES)
 
 
 def called_name(node: ast.AST) -> str:
@@ -69,12 +75,12 @@ def is_true(test: ast.expr) -> bool:
     return isinstance(test, ast.Constant) and bool(test.value)
 
 
-def _is_stub(function: Function) -> bool:
-    """Return whether a function only has a docstring, 'pass' or '...': one to be overridden."""
+def is_empty(body: Sequence[ast.stmt]) -> bool:
+    """Return whether a body only has a docstring, 'pass' or '...'."""
     return all(
         isinstance(item, ast.Pass)
         or (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant))
-        for item in function.body
+        for item in body
     )
 
 
@@ -87,52 +93,36 @@ def _leaves(statement: ast.stmt) -> bool:
     """Return whether the statement after ``statement`` is never reached."""
     match statement:
         case ast.Return() | ast.Raise() | ast.Continue() | ast.Break():
-            found = True
+            return True
         case ast.If(body=body, orelse=orelse):
-            found = not _continues(body) and bool(orelse) and not _continues(orelse)
-        case ast.While(test=test, body=body, orelse=orelse):
-            is_endless = is_true(test) or not _continues(orelse)
-            found = is_endless and not _has_break(body)
-        case ast.For(body=body, orelse=orelse) | ast.AsyncFor(body=body, orelse=orelse):
-            found = not _continues(orelse) and not _has_break(body)
+            branches = [body]
+            while len(orelse) == 1 and isinstance(orelse[0], ast.If):  # there may be many 'elif'
+                branches.append(orelse[0].body)
+                orelse = orelse[0].orelse
+            return not any(map(_continues, (*branches, orelse)))
+        case ast.While(test=test, body=body):
+            return is_true(test) and not _has_break(body)
         case ast.With(body=body) | ast.AsyncWith(body=body):
-            found = not _continues(body)
+            return not _continues(body)
         case ast.Match(cases=cases):
-            found = _is_exhaustive(cases) and not any(_continues(case.body) for case in cases)
+            last = cases[-1]  # it takes every value, unless it has a pattern or a guard
+            is_any = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None
+            is_any = is_any and last.guard is None
+            return is_any and not any(_continues(case.body) for case in cases)
         case ast.Try() | ast.TryStar():
-            found = _try_leaves(statement)
-        case ast.Expr():
-            found = called_name(statement.value) in EXITS
+            paths = [[*statement.body, *statement.orelse]]
+            paths += [handler.body for handler in statement.handlers]
+            return not _continues(statement.finalbody) or not any(map(_continues, paths))
+        case ast.Expr(value=value):
+            return called_name(value) in EXITS
         case ast.Assert(test=ast.Constant(value=False)):
-            found = True
-        case _:
-            found = False
-    return found
-
-
-def _try_leaves(statement: ast.Try | ast.TryStar) -> bool:
-    if not _continues(statement.finalbody):
-        return True
-    body = [*statement.body, *statement.orelse]
-    handlers = (handler.body for handler in statement.handlers)
-    return not _continues(body) and not any(_continues(handler) for handler in handlers)
-
-
-def _is_exhaustive(cases: Sequence[ast.match_case]) -> bool:
-    last = cases[-1]
-    is_wildcard = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None
-    return is_wildcard and last.guard is None
+            return True
+    return False
 
 
 def _has_break(body: Sequence[ast.stmt]) -> bool:
     """Return whether a ``break`` in ``body`` leaves the loop that it is the body of."""
-    pending: list[ast.AST] = list(body)
-    while pending:
-        node = pending.pop()
-        if isinstance(node, ast.Break):
-            return True
-        if isinstance(node, ast.For | ast.AsyncFor | ast.While):
-            pending.extend(node.orelse)
-        elif not isinstance(node, _SCOPES):
-            pending.extend(children(node))
-    return False
+    return any(
+        isinstance(node, ast.Break) or (isinstance(node, _LOOPS) and _has_break(node.orelse))
+        for node in walk(body, closed=(*SCOPES, *_LOOPS))
+    )

@@ -7,7 +7,7 @@ import importlib.util
 import io
 import stat
 import tokenize
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from composer.ownership import TrustedUsers
@@ -109,14 +109,6 @@ def module_below(base: Path, parts: Sequence[str]) -> Path | None:
     return next((file for file in candidates if _exists(file)), None)
 
 
-def top_package(path: Path) -> str:
-    """Return the package that a file belongs to: source folders may have the name of one too."""
-    folder = path.parent
-    while folder.name and (folder.parent / "__init__.py").is_file():
-        folder = folder.parent
-    return folder.name if (folder / "__init__.py").is_file() else ""
-
-
 def _checked(path: Path, project: Project) -> Path:
     if not project.holds(path):
         raise Unreadable("is a symbolic link out of the project")
@@ -139,14 +131,9 @@ def _installed(parts: list[str]) -> Path | None:
     if len(parts) == 1:
         origin = Path(spec.origin) if spec.has_location and spec.origin else None
         return origin if origin is not None and origin.suffix == ".py" else None
-    return next(_submodules(spec, parts[1:]), None)
-
-
-def _submodules(spec: importlib.machinery.ModuleSpec, parts: list[str]) -> Iterator[Path]:
-    for location in spec.submodule_search_locations or ():
-        found = module_below(Path(location), parts)
-        if found is not None:
-            yield found
+    locations = spec.submodule_search_locations or ()
+    files = (module_below(Path(location), parts[1:]) for location in locations)
+    return next(filter(None, files), None)
 
 
 def is_installed(module: str) -> bool:

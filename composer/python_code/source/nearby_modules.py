@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pkgutil
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 from composer.fast_dataclass import dataclass
@@ -14,7 +14,7 @@ from composer.project import Project
 from composer.python_code.source.modules import module_spec
 from composer.spelling import Vocabulary
 
-_MAXIMUM_FILES = 2000
+_MAXIMUM_MODULES = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,17 +39,17 @@ class NearbyModules:
 
         A file of the project has a name without dots, unlike most modules of ROS packages.
         """
-        return bool(self.package) or (self.is_single and self._similar is not None)
-
-    @property
-    def _similar(self) -> str | None:
-        return _closest(self.missing, self.names)
+        return bool(self.package) or (self.is_single and bool(self._similar))
 
     @property
     def hint(self) -> str | None:
         """The name that was most likely meant, as a hint."""
-        name = self._similar or _closest(self.missing, self.installed)
-        return None if name is None else f"did you mean '{name}'?"
+        close = self._similar or Vocabulary(self.installed).close(self.missing)
+        return next((f"did you mean '{name}'?" for name in close), None)
+
+    @property
+    def _similar(self) -> Sequence[str]:
+        return Vocabulary(self.names).close(self.missing)
 
 
 def nearby_modules(module: str, folder: Path, project: Project) -> NearbyModules:
@@ -60,17 +60,8 @@ def nearby_modules(module: str, folder: Path, project: Project) -> NearbyModules
         folders = tuple(_package_folders(parts[:count], bases))
         if folders:
             return NearbyModules(".".join(parts[:count]), parts[count], _modules_in(folders))
-    installed = _installed_names(tuple(sys.path))
+    installed = _modules_in(sys.path)
     return NearbyModules("", parts[0], _modules_in(bases), len(parts) == 1, installed)
-
-
-@lru_cache(maxsize=1)
-def _installed_names(path: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(item.name for item in pkgutil.iter_modules(path))
-
-
-def _closest(name: str, names: tuple[str, ...]) -> str | None:
-    return next(iter(Vocabulary(names).close(name)), None)
 
 
 def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:
@@ -84,13 +75,6 @@ def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:
                 yield candidate
 
 
-def _modules_in(folders: Iterable[Path]) -> tuple[str, ...]:
-    found = set()
-    for folder in folders:
-        with suppress(OSError):
-            for _, path in zip(range(_MAXIMUM_FILES), folder.iterdir(), strict=False):
-                name = path.name.partition(".")[0]
-                is_module = path.suffix in (".py", ".so") or (path / "__init__.py").is_file()
-                if is_module and name.isidentifier() and name != "__init__":
-                    found.add(name)
-    return tuple(sorted(found))
+def _modules_in(folders: Iterable[Path | str]) -> tuple[str, ...]:
+    modules = pkgutil.iter_modules(map(str, folders))
+    return tuple(item.name for item in islice(modules, _MAXIMUM_MODULES))

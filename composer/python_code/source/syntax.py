@@ -3,54 +3,98 @@
 from __future__ import annotations
 
 import ast
-import re
-from collections.abc import Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Mapping
 from dataclasses import field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.source.compilation import NotPython, parse
-from composer.python_code.source.method_body import (
-    Call,
-    Function,
-    dotted,
-    imported_names,
-    read_body,
-)
+from composer.python_code.source.calls import Body, Call, read_body
 from composer.python_code.source.modules import Unreadable, read_text
-from composer.python_code.source.publishing import PublisherUses, publisher_uses
-from composer.python_code.source.spans import start_span
-from composer.python_code.source.traversal import walk
+from composer.python_code.source.trees import (
+    SCOPES,
+    Function,
+    Import,
+    dotted,
+    full_names,
+    imports_in,
+    name_span,
+    span_of,
+    walk,
+)
 from composer.source import SourceFile, Span
 
+#: Maximum depth of an expression: with more, functions of ``ast`` exceed Python's stack.
+MAXIMUM_DEPTH = 250
+#: Decorators that do not hide the signature of a method.
+_TRANSPARENT = frozenset({"staticmethod", "classmethod", "override", "typing.override"})
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True)
 class Method:
-    """A method of a behavior.
+    """A method of a behavior; ``names`` maps the imports of the file to full names.
 
-    ``arguments`` are the positional arguments without ``self``; the last ``optional`` of them have
-    defaults. ``known`` is false if a decorator or an assignment hides the signature.
+    ``node`` is None for an attribute of the class, whose value may be a function.
     """
 
     name: str
     span: Span = field(compare=False)
-    arguments: tuple[str, ...] = ()
-    optional: int = 0
-    variadic: bool = False  # accepts *arguments
-    keywords: tuple[str, ...] = ()  # keyword-only arguments without a default
-    is_async: bool = False
-    known: bool = True
-    node: Function | None = field(default=None, repr=False, compare=False)
-    calls: tuple[Call, ...] = field(default=(), compare=False)
-    publishing: PublisherUses = field(default_factory=PublisherUses)
+    node: Function | None = field(default=None, repr=False)
+    names: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def body(self) -> Body:
+        """The calls and names in the method."""
+        return Body() if self.node is None else read_body(self.node, self.names, self.span.file)
+
+    @property
+    def calls(self) -> tuple[Call, ...]:
+        """The calls in the method, in source order."""
+        return self.body.calls
+
+    @property
+    def is_async(self) -> bool:
+        """Whether the method is a coroutine."""
+        return isinstance(self.node, ast.AsyncFunctionDef)
+
+    @property
+    def known(self) -> bool:
+        """Whether the signature is known: no decorator and no assignment hides it."""
+        if self.node is None or not {*map(_plain_name, self.node.decorator_list)} <= _TRANSPARENT:
+            return False
+        return self._is_static or bool(self.node.args.posonlyargs or self.node.args.args)
+
+    @property
+    def _is_static(self) -> bool:
+        decorators = self.node.decorator_list if self.node is not None else ()
+        return any(_plain_name(decorator) == "staticmethod" for decorator in decorators)
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """The positional arguments without ``self``."""
+        if self.node is None:
+            return ()
+        names = [item.arg for item in (*self.node.args.posonlyargs, *self.node.args.args)]
+        return tuple(names if self._is_static else names[1:])
+
+    @property
+    def required(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The arguments without a default: positional ones, and those passed by keyword."""
+        if self.node is None:
+            return (), ()
+        given = self.node.args
+        pairs = zip(given.kwonlyargs, given.kw_defaults, strict=True)
+        keywords = tuple(item.arg for item, default in pairs if default is None)
+        return self.arguments[: max(len(self.arguments) - len(given.defaults), 0)], keywords
 
     def accepts(self, count: int) -> bool:
         """Return whether it can be called with ``count`` positional arguments."""
-        if not self.known:
+        if not self.known or self.node is None:
             return True
-        maximum = count if self.variadic else len(self.arguments)
-        return not self.keywords and len(self.arguments) - self.optional <= count <= maximum
+        needed, keywords = self.required
+        maximum = count if self.node.args.vararg is not None else len(self.arguments)
+        return not keywords and len(needed) <= count <= maximum
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,30 +109,29 @@ class Class:
     node: ast.ClassDef = field(repr=False, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
-class Import:
-    """``from module import name``, or ``import module`` with an empty name."""
-
-    module: str
-    name: str
-    level: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Module:
-    """The top-level definitions and imports of a Python file."""
+    """The top-level definitions and imports of a Python file.
+
+    ``imports`` has the names with one origin, ``alternatives`` those that several imports bind.
+    """
 
     path: Path
     source: SourceFile
     tree: ast.Module = field(repr=False)
     classes: dict[str, Class]
     imports: dict[str, Import]
-    assigned: frozenset[str]
+    alternatives: dict[str, tuple[Import, ...]]
     dynamic: bool  # it may have names that its syntax does not show
+
+    @cached_property
+    def names(self) -> Mapping[str, str]:
+        """The full names of what absolute imports bind."""
+        return full_names(self.imports.items())
 
     def may_have(self, name: str) -> bool:
         """Return whether ``name`` may exist without a class statement in this file."""
-        return self.dynamic or name in self.imports or name in self.assigned
+        return self.dynamic or name in defined_names(self)
 
 
 def read_module(path: Path, shown: str) -> Module:
@@ -103,143 +146,84 @@ def read_module(path: Path, shown: str) -> Module:
 @lru_cache(maxsize=128)
 def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Module:
     source = SourceFile(shown, read_text(path))
-    try:
-        tree = parse(source)
-    except NotPython as error:
-        raise Unreadable(f"is not Python: {error}", error.span) from None
-    statements = tuple(_top_level(tree.body))
-    names = dict(_imported_names(statements))
-    classes = (item for item in statements if isinstance(item, ast.ClassDef))
-    imports = dict(_imports(statements))
+    tree = parse(source)
+    statements = [*walk(tree.body, closed=SCOPES)]
+    origins: dict[str, dict[Import, None]] = {}
+    for name, origin in imports_in(statements):
+        origins.setdefault(name, {})[origin] = None
+    imports = {name: found for name, (found, *others) in origins.items() if not others}
+    names = full_names(imports.items())
+    functions = {item.name for item in statements if isinstance(item, Function)}
+    classes = [_class(item, names, source) for item in statements if isinstance(item, ast.ClassDef)]
     return Module(
         path=path,
         source=source,
         tree=tree,
-        classes={item.name: _class(item, names, source) for item in classes},
+        classes={item.name: item for item in classes},
         imports=imports,
-        assigned=frozenset(name.id for item in statements for name in _assigned(item)),
-        dynamic="*" in imports or any(_is_getattr(item) for item in statements),
+        alternatives={name: (*found,) for name, found in origins.items() if name not in imports},
+        dynamic="*" in origins or "__getattr__" in functions,
     )
+
+
+def parse(source: SourceFile) -> ast.Module:
+    """Return the syntax tree of a file. Raises Unreadable if it is not Python.
+
+    What only Python's compiler finds, such as 'return' outside a function, is left to the checker.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(source.text)
+    except SyntaxError as error:
+        line = min(max(error.lineno or 1, 1), max(len(source.lines), 1))
+        column = min(max(error.offset or 1, 1), len(source.line(line)) + 1)
+        end = error.end_offset if error.end_lineno == error.lineno else None
+        length = min((end or 0) - column, len(source.line(line)) - column + 2)
+        span = Span(source, line, column, max(length, 1))
+        raise Unreadable(f"is not Python: {error.msg}", span) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise Unreadable("is not Python: it cannot be parsed") from None
+    pending: list[tuple[ast.AST, int]] = [(tree, 0)]
+    while pending:
+        node, depth = pending.pop()
+        if depth > MAXIMUM_DEPTH:
+            raise Unreadable("has expressions that are nested too deep to be checked")
+        depth = 0 if isinstance(node, ast.stmt) else depth + 1
+        pending += [(child, depth) for child in ast.iter_child_nodes(node)]
+    return tree
 
 
 @lru_cache(maxsize=128)
 def defined_names(module: Module) -> frozenset[str]:
     """Return the names that a file defines or imports, at its top level or below."""
-    names = {name.partition(".")[0] for name in module.imports}
-    for item in walk(module.tree.body):
-        match item:
-            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
-                names.add(name)
-            case ast.ClassDef(name=name) | ast.Name(id=name, ctx=ast.Store()):
-                names.add(name)
+    names = {name.partition(".")[0] for name in (*module.imports, *module.alternatives)}
+    for node in walk(module.tree.body):
+        if isinstance(node, Function | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
     return frozenset(names)
 
 
-def _top_level(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield the statements of a body, including those in an if, a try or a with."""
-    pending = list(body)[::-1]
-    while pending:
-        statement = pending.pop()
-        yield statement
-        inner: list[ast.stmt] = []
-        for name in ("body", "orelse", "finalbody"):
-            if isinstance(statement, ast.If | ast.Try | ast.With):
-                inner.extend(getattr(statement, name, ()))
-        if isinstance(statement, ast.Try):
-            inner.extend(item for handler in statement.handlers for item in handler.body)
-        pending.extend(reversed(inner))
-
-
-def _imports(statements: Iterable[ast.stmt]) -> Iterator[tuple[str, Import]]:
-    for statement in statements:
-        if isinstance(statement, ast.ImportFrom):
-            for alias in statement.names:
-                found = Import(statement.module or "", alias.name, statement.level)
-                yield alias.asname or alias.name, found
-        elif isinstance(statement, ast.Import):
-            for alias in statement.names:
-                bound = alias.asname or alias.name
-                yield bound, Import(alias.name, "")
-
-
-def _imported_names(statements: Iterable[ast.stmt]) -> Iterator[tuple[str, str]]:
-    for statement in statements:
-        if isinstance(statement, ast.Import | ast.ImportFrom):
-            yield from imported_names(statement)
-
-
 def _class(node: ast.ClassDef, names: Mapping[str, str], source: SourceFile) -> Class:
-    statements = tuple(_top_level(node.body))
-    methods = {
-        method.name: method for item in statements for method in _methods(item, names, source)
-    }
-    dynamic = bool(node.decorator_list or node.keywords) or "__getattr__" in methods
+    methods = {}
+    for item in walk(node.body, closed=SCOPES):
+        if isinstance(item, Function):
+            span = name_span(item, "def", source)
+            methods[item.name] = Method(item.name, span, item, names)
+        elif isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store):
+            methods[item.id] = Method(item.id, span_of(item, source))
     return Class(
-        node.name,
-        name_span(node, "class", source),
-        tuple(_dotted(base) for base in node.bases),
-        tuple(methods.values()),
-        dynamic,
-        node,
-    )
-
-
-def _methods(statement: ast.stmt, names: Mapping[str, str], source: SourceFile) -> Iterator[Method]:
-    if isinstance(statement, Function):
-        yield _method(statement, names, source)
-        return
-    for target in _assigned(statement):
-        yield Method(target.id, start_span(target, len(target.id), source), known=False)
-
-
-def _assigned(statement: ast.stmt) -> Iterator[ast.Name]:
-    """Yield the names that a statement assigns."""
-    targets: list[ast.expr] = []
-    if isinstance(statement, ast.Assign):
-        targets = statement.targets
-    elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
-        targets = [statement.target]
-    yield from (target for target in targets if isinstance(target, ast.Name))
-
-
-def _is_getattr(statement: ast.stmt) -> bool:
-    return isinstance(statement, Function) and statement.name == "__getattr__"
-
-
-def _method(node: Function, names: Mapping[str, str], source: SourceFile) -> Method:
-    body = read_body(node, names, source)
-    decorators = {_dotted(decorator) for decorator in node.decorator_list}
-    positional = [item.arg for item in (*node.args.posonlyargs, *node.args.args)]
-    static = "staticmethod" in decorators
-    return Method(
         name=node.name,
-        span=name_span(node, "def", source),
-        arguments=tuple(positional if static else positional[1:]),
-        optional=min(len(node.args.defaults), len(positional)),
-        variadic=node.args.vararg is not None,
-        keywords=tuple(
-            argument.arg
-            for argument, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
-            if default is None
-        ),
-        is_async=isinstance(node, ast.AsyncFunctionDef),
-        known=decorators <= _TRANSPARENT and bool(positional or static),
+        span=name_span(node, "class", source),
+        bases=tuple(map(_plain_name, node.bases)),
+        methods=tuple(methods.values()),
+        dynamic=bool(node.decorator_list or node.keywords) or "__getattr__" in methods,
         node=node,
-        calls=body.calls,
-        publishing=publisher_uses(node, body),
     )
 
 
-_TRANSPARENT = frozenset({"staticmethod", "classmethod", "override", "typing.override"})
-
-
-def _dotted(node: ast.expr) -> str:
+def _plain_name(node: ast.expr) -> str:
     """Return a dotted name as written, without the subscript of ``Base[T]``; "" for other nodes."""
     return dotted(node.value if isinstance(node, ast.Subscript) else node)
-
-
-def name_span(node: Function | ast.ClassDef, keyword: str, source: SourceFile) -> Span:
-    """Return the span of the name after ``def`` or ``class``."""
-    span = start_span(node, len(node.name), source)
-    found = re.search(rf"{keyword}\s+({re.escape(node.name)})\b", source.line(span.line))
-    return Span(source, span.line, found.start(1) + 1, span.length) if found else span

@@ -3,43 +3,26 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.source import Function, Module
-from composer.python_code.source.method_body import dotted
-from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
+from composer.python_code.source.syntax import Class, Module
+from composer.python_code.source.trees import Function, bindings, dotted, walk
 from composer.tree import Plain
+
+T = TypeVar("T")
 
 _MAXIMUM_STEPS = 8
 _MAXIMUM_ITEMS = 1000
 _FOLDERS = ("msg", "srv", "action")
-_QOS_NAMES = {
-    "rclpy.qos.qos_profile_sensor_data": "sensor_data",
-    "rclpy.qos.qos_profile_services_default": "services_default",
-    "rclpy.qos.qos_profile_parameters": "parameters",
-    "rclpy.qos.qos_profile_system_default": "system_default",
-    "rclpy.qos.QoSPresetProfiles.SENSOR_DATA.value": "sensor_data",
-    "rclpy.qos.QoSPresetProfiles.SERVICES_DEFAULT.value": "services_default",
-    "rclpy.qos.QoSPresetProfiles.PARAMETERS.value": "parameters",
-    "rclpy.qos.QoSPresetProfiles.SYSTEM_DEFAULT.value": "system_default",
-}
-#: The enumerations of rclpy's policies; each has two names.
-_POLICIES = {
-    "history": History,
-    "reliability": Reliability,
-    "durability": Durability,
-    "liveliness": Liveliness,
-}
-_DURATIONS = {
-    "deadline": "deadline_ms",
-    "lifespan": "lifespan_ms",
-    "liveliness_lease_duration": "liveliness_lease_duration_ms",
-}
 
 
 class NotLiteral(Exception):
     """Only running the code would show the value. The text is the code."""
+
+    def __init__(self, node: ast.expr) -> None:
+        super().__init__(ast.unparse(node)[:80])
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,36 +33,41 @@ class Scope:
     cls: ast.ClassDef
     method: Function
 
+    @property
+    def nodes(self) -> Iterator[ast.AST]:
+        """The syntax of the method, without classes in it."""
+        return walk(self.method.body, closed=(ast.ClassDef,))
+
     def full_name(self, node: ast.expr) -> str:
         """Return the full dotted name of an expression, imports resolved; "" for other ones."""
         first, dot, rest = dotted(node).partition(".")
-        imported = self.module.imports.get(first)
-        if imported is None:
-            return f"{first}{dot}{rest}"
-        origin = f"{imported.module}.{imported.name}" if imported.name else imported.module
-        if not imported.name and imported.module.startswith(f"{first}."):
-            origin = first  # import package.module binds package
-        return f"{origin}{dot}{rest}"
+        return f"{self.module.names.get(first, first)}{dot}{rest}"
+
+    def known(self, read: Callable[[ast.expr], T], node: ast.expr | None) -> T | None:
+        """Return what an expression is, None if only running the code would show it."""
+        try:
+            return read(node) if node is not None else None
+        except NotLiteral:
+            return None
 
     def literal(self, node: ast.expr) -> Plain:
         """Return the value of an expression. Raises NotLiteral."""
-        found = self.followed(node)
-        match found:
-            case ast.Constant(value=bool() | int() | float() | str() | None):
-                return found.value  # type: ignore[return-value]
+        match self.followed(node):
+            case ast.Constant(value=bool() | int() | float() | str() | None as value):
+                return value
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                value = self.literal(operand)
-                if isinstance(value, int | float) and not isinstance(value, bool):
-                    return -value
+                number = self.literal(operand)
+                if isinstance(number, int | float) and not isinstance(number, bool):
+                    return -number
             case ast.List(elts=items) | ast.Tuple(elts=items) if len(items) <= _MAXIMUM_ITEMS:
                 return [self.literal(item) for item in items]
-        raise NotLiteral(ast.unparse(node)[:80])
+        raise NotLiteral(node)
 
     def text(self, node: ast.expr) -> str:
         """Return the text that an expression is. Raises NotLiteral."""
         value = self.literal(node)
         if not isinstance(value, str):
-            raise NotLiteral(ast.unparse(node)[:80])
+            raise NotLiteral(node)
         return value
 
     def interface(self, node: ast.expr) -> str:
@@ -90,117 +78,34 @@ class Scope:
         parts = self.full_name(self.followed(node)).split(".")
         if len(parts) == 3 and parts[1] in _FOLDERS:
             return "/".join(parts)
-        raise NotLiteral(ast.unparse(node)[:80])
-
-    def known_interface(self, node: ast.expr) -> str | None:
-        """Return the interface that an expression names, None if it names none."""
-        try:
-            return self.interface(node)
-        except NotLiteral:
-            return None
-
-    def qos(self, node: ast.expr) -> QosProfile:
-        """Return the QoS profile that an expression is. Raises NotLiteral."""
-        preset = _QOS_NAMES.get(self.full_name(node))
-        if preset is not None:
-            return PRESETS[preset]
-        found = self.followed(node)
-        match found:
-            case ast.Constant(value=int() as depth) if depth is not True and depth is not False:
-                return QosProfile(depth=depth)
-            case ast.Call(func=function, args=[], keywords=keywords):
-                if self.full_name(function) == "rclpy.qos.QoSProfile":
-                    return self._profile(keywords)
-            case ast.Name() | ast.Attribute() if self.full_name(found) in _QOS_NAMES:
-                return PRESETS[_QOS_NAMES[self.full_name(found)]]
-        raise NotLiteral(ast.unparse(node)[:80])
-
-    def _profile(self, keywords: list[ast.keyword]) -> QosProfile:
-        values: dict[str, object] = {}
-        for keyword in keywords:
-            name = keyword.arg or ""
-            if name == "depth":
-                values[name] = self.literal(keyword.value)
-            elif name in _POLICIES:
-                values[name] = self._policy(name, keyword.value)
-            elif name in _DURATIONS:
-                values[_DURATIONS[name]] = self._duration_ms(keyword.value)
-            elif name != "avoid_ros_namespace_conventions":
-                raise NotLiteral(ast.unparse(keyword.value)[:80])
-        return QosProfile(**values)  # type: ignore[arg-type]
-
-    def _policy(self, name: str, node: ast.expr) -> object:
-        value = dotted(self.followed(node)).rpartition(".")[2].lower()
-        kind = _POLICIES[name]
-        if value not in {item.value for item in kind}:
-            raise NotLiteral(ast.unparse(node)[:80])
-        return kind(value)
-
-    def _duration_ms(self, node: ast.expr) -> float:
-        found = self.followed(node)
-        if isinstance(found, ast.Call) and self.full_name(found.func) == "rclpy.duration.Duration":
-            given = {item.arg: self.literal(item.value) for item in found.keywords if item.arg}
-            numbers = [given.get(name, 0) for name in ("seconds", "nanoseconds")]
-            if not found.args and all(isinstance(item, int | float) for item in numbers):
-                seconds, nanoseconds = numbers
-                return float(seconds) * 1e3 + float(nanoseconds) * 1e-6  # type: ignore[arg-type]
-        raise NotLiteral(ast.unparse(node)[:80])
+        raise NotLiteral(node)
 
     def followed(self, node: ast.expr) -> ast.expr:
         """Return the expression that a name stands for, if it is assigned once."""
+        start = node
         for _ in range(_MAXIMUM_STEPS):
             assigned = self._assigned(dotted(node))
             if assigned is None:
                 return node
             node = assigned
-        raise NotLiteral(ast.unparse(node)[:80])
+        raise NotLiteral(start)
 
     def _assigned(self, name: str) -> ast.expr | None:
         """Return the only value that is assigned to a name, or None."""
-        if not name:
-            return None
-        places: tuple[ast.AST, ...] = (self.method, self.module.tree)
         prefix, _, last = name.rpartition(".")
-        if prefix in ("self", self.cls.name):
-            places, name = (self.cls,), last
+        if prefix in ("self", self.cls.name):  # the class may set it, or a method
+            of_class = bindings(self.cls)
+            values = [*of_class.get(f"self.{last}", ()), *of_class.get(last, ())]
         elif prefix:
             return None
-        for place in places:
-            values = list(_values(place, name, of_self=prefix == "self"))
-            if values:
-                return values[0] if len(values) == 1 else None
-        return None
+        else:
+            values = bindings(self.method).get(name) or bindings(self.module.tree).get(name) or []
+        return values[0] if len(values) == 1 else None
 
 
-def _values(place: ast.AST, name: str, *, of_self: bool) -> Iterator[ast.expr | None]:
-    """Yield what is assigned to a name in a place; None for what only running would show."""
-    whole = isinstance(place, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-    nodes = ast.walk(place) if whole else iter(getattr(place, "body", ()))
-    for node in nodes:
-        match node:
-            case (
-                ast.Assign(targets=[target], value=value)
-                | ast.AnnAssign(target=target, value=ast.expr() as value)
-            ):
-                if _is_target(target, name, of_self=of_self):
-                    yield value
-                elif _changes(target, name, of_self=of_self):
-                    yield None
-            case ast.AugAssign(target=target) | ast.For(target=target):
-                if _is_target(target, name, of_self=of_self):
-                    yield None
-            case ast.arg(arg=argument) if argument == name and not of_self:
-                yield None
-
-
-def _is_target(target: ast.expr, name: str, *, of_self: bool) -> bool:
-    if isinstance(target, ast.Name):
-        return target.id == name  # of a class: an attribute that self has too
-    return of_self and dotted(target) == f"self.{name}"
-
-
-def _changes(target: ast.expr, name: str, *, of_self: bool) -> bool:
-    """Return whether a target is a part of the value, as in ``qos.depth = 5``."""
-    if isinstance(target, ast.Attribute | ast.Subscript):
-        return _is_target(target.value, name, of_self=of_self)
-    return False
+def scopes_in(classes: Iterable[tuple[Module, Class]]) -> Iterator[Scope]:
+    """Yield the methods of classes."""
+    for module, class_ in classes:
+        for method in class_.methods:
+            if method.node is not None:
+                yield Scope(module, class_.node, method.node)

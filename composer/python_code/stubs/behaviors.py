@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from keyword import iskeyword
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Interfaces, Message, Service
-from composer.model import Node, Port, PortKind
+from composer.model import Node, Parameter, Port, PortKind
 from composer.python_code.stubs.messages import python_name
 from composer.typed import SUFFIX
 
@@ -34,6 +35,15 @@ _DEFINITIONS = {"topic": Message, "service": Service, "action": Action}
 
 
 @dataclass(frozen=True, slots=True)
+class NamedNode:
+    """A node type, or a node with a behavior of its own, and the file that declares it."""
+
+    name: str
+    node: Node
+    place: str
+
+
+@dataclass(frozen=True, slots=True)
 class Signature:
     """The arguments of a handler by name, with their types, and the type of its result."""
 
@@ -47,9 +57,34 @@ def behavior_class_name(name: str) -> str:
     return "".join(word[:1].upper() + word[1:] for word in words) + SUFFIX
 
 
-def behavior_module(classes: Mapping[str, Node], interfaces: Interfaces) -> str:
-    """Return the stub of ``composer.typed`` with the given classes by name."""
+def behavior_classes(
+    nodes: Iterable[NamedNode], interfaces: Interfaces
+) -> tuple[dict[str, Node], list[tuple[NamedNode, NamedNode]]]:
+    """Return the base classes by name, and the nodes that would need another class of that name.
+
+    The first of several nodes gets the class; the others come with it in pairs.
+    """
+    first: dict[str, NamedNode] = {}
+    conflicts = []
+    for item in nodes:
+        name = behavior_class_name(item.name)
+        chosen = first.setdefault(name, item)
+        texts = {behavior_module({name: node}, interfaces) for node in (chosen.node, item.node)}
+        if name.isidentifier() and len(texts) > 1:
+            conflicts.append((chosen, item))
+    classes = {name: first[name].node for name in sorted(first) if name.isidentifier()}
+    return classes, conflicts
+
+
+def behavior_module(
+    classes: Mapping[str, Node], interfaces: Interfaces, others: Iterable[str] = ()
+) -> str:
+    """Return the stub of ``composer.typed`` with the given classes by name.
+
+    ``others`` are classes of node types that are not known: without ports and parameters.
+    """
     lines = [line for name, node in classes.items() for line in _class(name, node, interfaces)]
+    lines += (f"class {name}(composer.behavior.Behavior): ..." for name in others)
     used = sorted(set(re.findall(r"\b([a-z]\w*\.(?:msg|srv|action))\.[A-Z]", "\n".join(lines))))
     head = [
         "from collections.abc import Awaitable",
@@ -101,9 +136,10 @@ def member_class_name(behavior: str, attribute: str) -> str:
 
 def _class(name: str, node: Node, interfaces: Interfaces) -> Iterator[str]:
     groups = {attribute: _ports(node, attribute, interfaces) for attribute in PORT_ATTRIBUTES}
+    descriptions = {port.name.value: port.description for port in node.ports}
     for attribute, members in groups.items():
         yield f"class {member_class_name(name, attribute)}:"
-        yield from _properties(members)
+        yield from _properties(members, descriptions)
         yield "    def __getitem__(self, name: str, /) -> Any: ..."
     yield f"class {member_class_name(name, 'parameters')}:"
     yield from _parameters(node)
@@ -114,13 +150,16 @@ def _class(name: str, node: Node, interfaces: Interfaces) -> Iterator[str]:
         yield f"    {attribute}: {member_class_name(name, attribute)}"
     for handler, signature in signatures(node, interfaces).items():
         arguments = "".join(f", {argument}: {type_}" for argument, type_ in signature.arguments)
+        if arguments:
+            arguments += ", /"  # they are passed by position: a behavior may name them as it likes
         result = signature.result
         yield f"    def {handler}(self{arguments}) -> Awaitable[{result}] | {result}: ..."
 
 
 def _docstring(text: str) -> str:
     """Return a description as a docstring of one line."""
-    plain = " ".join(text.split()).replace("\\", "/").replace('"', "'")
+    plain = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    plain = plain.replace("\\", "/").replace('"', "'")
     return f'"""{plain}"""'
 
 
@@ -140,11 +179,22 @@ def _ports(node: Node, attribute: str, interfaces: Interfaces) -> Iterator[tuple
                 yield port.name.value, f"composer.behavior.ActionClient[{parts}]"
 
 
-def _properties(members: Iterable[tuple[str, str]]) -> Iterator[str]:
+def _properties(
+    members: Iterable[tuple[str, str]], descriptions: Mapping[str, str]
+) -> Iterator[str]:
     for name, type_ in members:
-        if name.isidentifier():
+        if name.isidentifier() and not iskeyword(name):
+            description = descriptions.get(name)
             yield "    @property"
-            yield f"    def {name}(self) -> {type_}: ..."
+            yield f"    def {name}(self) -> {type_}:{'' if description else ' ...'}"
+            if description:
+                yield f"        {_docstring(description)}"
+
+
+def _described(parameter: Parameter) -> str:
+    """Return the description of a parameter, with its unit."""
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    return f"{parameter.description}{unit}".strip()
 
 
 def _parameters(node: Node) -> Iterator[str]:
@@ -152,7 +202,7 @@ def _parameters(node: Node) -> Iterator[str]:
         (parameter.name.value, PARAMETER_TYPES.get(parameter.type.value, "Any"))
         for parameter in node.parameters
     ]
-    yield from _properties(members)
+    yield from _properties(members, {item.name.value: _described(item) for item in node.parameters})
     for name, type_ in members:
         yield "    @overload"
         yield f"    def __getitem__(self, name: Literal[{name!r}], /) -> {type_}: ..."

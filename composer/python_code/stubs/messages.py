@@ -10,8 +10,19 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 
-from composer.interfaces import FLOATS, TEXTS, Action, FieldType, Interfaces, Message, Service
+from composer.interfaces import (
+    FLOATS,
+    TEXTS,
+    Action,
+    FieldType,
+    Interface,
+    Interfaces,
+    Message,
+    Service,
+    parts,
+)
 from composer.interfaces.sources import FOLDERS
 
 #: What all generated modules use, as the module ``_ros``. Only float has both methods of ``Real``:
@@ -98,26 +109,28 @@ _HEAD = (
     "",
     "import _ros",
 )
-_USED_PACKAGE = re.compile(r"\b([a-z]\w*)\.(?:msg|srv|action)\.[A-Z]")
 
 
-def message_stubs(interfaces: Interfaces, packages: Iterable[str] | None = None) -> dict[str, str]:
-    """Return the stubs of packages and of those whose messages they contain; by default, of all."""
-    by_package = _names_by_package(interfaces)
-    pending = list(by_package if packages is None else packages)
-    files = {"_ros.pyi": SUPPORT}
-    seen: set[str] = set()
+def message_stubs(interfaces: Interfaces, names: Iterable[str] | None = None) -> dict[str, str]:
+    """Return the stubs of interfaces and of the messages in them; by default, of all interfaces."""
+    if names is None:
+        names = (name for folder in FOLDERS for name in interfaces.names(folder))
+    pending = list(names)
+    definitions: dict[str, Interface] = {}
     while pending:
-        package = pending.pop()
-        if package in seen or package not in by_package:
-            continue
-        seen.add(package)
-        files[f"{package}/__init__.pyi"] = ""
-        for folder, names in by_package[package].items():
-            text = _module(interfaces, names)
-            files[f"{package}/{folder}.pyi"] = text
-            pending += _USED_PACKAGE.findall(text)
-    return files
+        name = pending.pop()
+        definition = interfaces.find(name) if name not in definitions else None
+        if definition is not None:
+            definitions[name] = definition
+            fields = (item for part in parts(definition).values() for item in part.fields)
+            pending += [item.type.name for item in fields if not item.type.is_primitive]
+    modules: dict[str, list[str]] = {}
+    for name in sorted(definitions):
+        package, folder, short = name.split("/")
+        modules.setdefault(f"{package}/{folder}.pyi", []).append(_text(short, definitions[name]))
+    files = {"_ros.pyi": SUPPORT}
+    files |= {f"{path.partition('/')[0]}/__init__.pyi": "" for path in modules}
+    return files | {path: _module("\n".join(texts)) for path, texts in modules.items()}
 
 
 def python_name(interface: str) -> str:
@@ -125,33 +138,35 @@ def python_name(interface: str) -> str:
     return interface.replace("/", ".")
 
 
-def _names_by_package(interfaces: Interfaces) -> Mapping[str, Mapping[str, list[str]]]:
-    found: dict[str, dict[str, list[str]]] = {}
-    for folder in FOLDERS:
-        for name in interfaces.names(folder):
-            package = name.partition("/")[0]
-            found.setdefault(package, {}).setdefault(folder, []).append(name)
-    return found
-
-
-def _module(interfaces: Interfaces, names: Iterable[str]) -> str:
+def _module(text: str) -> str:
     """Return the text of ``package/msg.pyi`` or of one like it."""
-    lines: list[str] = []
-    for name in names:
-        short = name.rpartition("/")[2]
-        match interfaces.find(name):
-            case Message() as message:
-                lines += _message(short, message)
-            case Service(request=request, response=response):
-                parts = {"Request": request, "Response": response}
-                lines += _with_parts(short, parts, "ServiceType")
-            case Action(goal=goal, result=result, feedback=feedback):
-                parts = {"Goal": goal, "Result": result, "Feedback": feedback}
-                lines += _with_parts(short, parts, "ActionType")
-    text = "\n".join(lines)
     used = sorted(set(re.findall(r"\b([a-z]\w*\.msg)\.[A-Z]", text)))
-    imports = (f"import {module}" for module in used)
-    return "\n".join((*_HEAD, *imports, "", text, ""))
+    return "\n".join((*_HEAD, *(f"import {module}" for module in used), "", text, ""))
+
+
+def _text(name: str, definition: Interface) -> str:
+    """Return the stub of one interface, kept by its content: systems use the same ones."""
+    try:
+        return _kept_text(name, definition)
+    except TypeError:  # a default value is a list, so the content has no hash
+        return _written_text(name, definition)
+
+
+@lru_cache(maxsize=2048)
+def _kept_text(name: str, definition: Interface) -> str:
+    return _written_text(name, definition)
+
+
+def _written_text(name: str, definition: Interface) -> str:
+    match definition:
+        case Service(request=request, response=response):
+            named = {"Request": request, "Response": response}
+            return "\n".join(_with_parts(name, named, "ServiceType"))
+        case Action(goal=goal, result=result, feedback=feedback):
+            named = {"Goal": goal, "Result": result, "Feedback": feedback}
+            return "\n".join(_with_parts(name, named, "ActionType"))
+        case _:
+            return "\n".join(_message(name, definition))
 
 
 def _with_parts(name: str, parts: Mapping[str, Message], base: str) -> Iterator[str]:

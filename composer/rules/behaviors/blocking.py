@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import behaviors, distinct_behaviors
@@ -13,13 +13,12 @@ from composer.diagnostics import Diagnostic, Label
 from composer.model import Node
 from composer.python_code.nodes.behaviors import (
     GENERAL_HANDLERS,
-    calls_of,
     handlers,
     reached_methods,
 )
 from composer.python_code.source import BehaviorSource, Call, Function, Method
-from composer.python_code.source.flow import EXITS, called_name, is_true, own_nodes
-from composer.python_code.source.spans import start_span
+from composer.python_code.source.flow import EXITS, called_name, is_empty, is_true
+from composer.python_code.source.trees import SCOPES, start_span, walk
 from composer.rules.python.definitions import on_tick, warning
 from composer.source import Span
 
@@ -86,7 +85,8 @@ def _blocking_calls(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     seen: set[Span] = set()
     for name, place in places.items():
         method = source.method(name)
-        for call in calls_of(source, method) if method is not None else ():
+        reached = reached_methods(source, method) if method is not None else ()
+        for call in (call for item in reached for call in item.calls):
             if _blocks(call) and call.span not in seen and _is_imported(source, call):
                 seen.add(call.span)
                 message = f"handler '{name}' of '{source.reference.class_name}' blocks in"
@@ -132,31 +132,23 @@ def endless_loops(function: Function) -> Iterator[ast.While]:
     A loop that waits for a request to cancel is one of them if it does not wait for anything else:
     the request cannot be handled meanwhile.
     """
-    for node in own_nodes(function.body):
+    for node in walk(function.body, closed=SCOPES):
         if isinstance(node, ast.While) and _never_ends(node):
             yield node
 
 
 def _never_ends(loop: ast.While) -> bool:
-    inside = [loop.test, *own_nodes(loop.body)]
+    inside = [loop.test, *walk(loop.body, closed=SCOPES)]
     if any(isinstance(node, _WAITS) for node in (*inside, *ast.walk(loop.test))):
         return False
     if any(isinstance(node, _LEAVES) or called_name(node) in _ENDS_OR_WAITS for node in inside):
         return False
-    return is_true(loop.test) or _waits_for_cancel(loop.test) or _is_empty(loop.body)
+    # Only other code can end a loop that does nothing.
+    return is_true(loop.test) or _waits_for_cancel(loop.test) or is_empty(loop.body)
 
 
 def _waits_for_cancel(test: ast.expr) -> bool:
     return any(
         isinstance(node, ast.Attribute) and node.attr == "is_cancel_requested"
         for node in ast.walk(test)
-    )
-
-
-def _is_empty(body: Sequence[ast.stmt]) -> bool:
-    """Return whether a body does nothing, so that only other code can end its loop."""
-    return all(
-        isinstance(item, ast.Pass)
-        or (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant))
-        for item in body
     )

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import a
-from composer.analysis.python_nodes import behaviors, complete_behaviors, distinct_behaviors
+from composer.analysis.python_nodes import behaviors, distinct_behaviors
 from composer.diagnostics import Diagnostic, Label, nearest, suggestion
-from composer.model import ImplementationKind, Node, PortKind
+from composer.model import Node, PortKind
 from composer.python_code.nodes.behaviors import (
     GENERAL_HANDLERS,
     Handler,
@@ -17,12 +16,11 @@ from composer.python_code.nodes.behaviors import (
     unbound_handlers,
 )
 from composer.python_code.source import BehaviorSource, Method
-from composer.python_code.source.receivers import lacks_self
-from composer.python_code.source.spans import span_of
-from composer.python_code.source.values import Scope
-from composer.rules.python.definitions import error, on_tick, warning
+from composer.python_code.source.flow import lacks_self
+from composer.python_code.source.trees import span_of
+from composer.python_code.source.values import scopes_in
+from composer.rules.python.definitions import error, on_tick
 from composer.rules.python.uses_of_nodes import HANDLER_ANNOTATION
-from composer.source import Span
 
 MISSING_HANDLER = error(
     code="RC433",
@@ -55,49 +53,16 @@ HANDLER_SIGNATURE = error(
     bad=on_tick("pass").replace("(self)", "(self, timer)"),
     good=on_tick("pass"),
 )
-IDLE_PORT = warning(
-    code="RC438",
-    name="idle-port",
-    summary="A timer or server has neither a behavior nor a reaction.",
-    why=(
-        "The timer has no effect. The service returns an empty response to every request, "
-        "which looks like a failure or, worse, like success."
-    ),
-    bad="""\
-system: idle
-nodes:
-  planner:
-    services: {reset: {type: std_srvs/srv/Trigger}}
-""",
-    good="""\
-system: idle
-nodes:
-  planner:
-    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
-""",
-)
-
-#: What a node without a behavior can do instead, by the kind of its port or timer.
-_REACTIONS = {
-    "timer": "add 'publish', 'call', 'set' or 'log'",
-    PortKind.SERVICE.value: "add 'respond'",
-    PortKind.ACTION_SERVER.value: "add 'result'",
-}
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the ports and timers of nodes with the methods of their behaviors."""
-    for node, source in complete_behaviors(context):
-        yield from _unbound(node, source)
     for node, source in behaviors(context):
+        if source.class_found and source.complete and node.complete:
+            yield from _unbound(node, source)
         yield from _signatures(node, source)
     for node, source in distinct_behaviors(context):
         yield from _annotations(node, source)
-    affected = context.once(earlier_errors).nodes
-    for node in context.system.nodes:
-        is_declarative = node.implementation is ImplementationKind.DECLARATIVE
-        if is_declarative and node.complete and node.name.value not in affected:
-            yield from _idle_ports(node)
 
 
 def _unbound(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
@@ -141,7 +106,7 @@ def _hint(node: Node, name: str, bound: list[str]) -> str | None:
 
 
 def _signatures(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
-    place = source.reference.text.span
+    place, class_name = source.reference.text.span, source.reference.class_name
     expected = {name: (arguments, place) for name, arguments in GENERAL_HANDLERS.items()}
     expected |= {item.name: (item.arguments, item.of.span) for item in handlers(node)}
     for name, (arguments, span) in expected.items():
@@ -149,43 +114,25 @@ def _signatures(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
         if method is None or method.accepts(len(arguments)):
             continue
         if method.node is None or not lacks_self(method.node, len(arguments)):
-            yield _wrong_signature(source, method, arguments, span)
-
-
-def _wrong_signature(
-    source: BehaviorSource, method: Method, arguments: tuple[str, ...], span: Span
-) -> Diagnostic:
-    name, class_name = method.name, source.reference.class_name
-    takes = ", ".join(("self", *method.arguments))
-    gets = ", ".join(("self", *arguments))
-    message = f"'{name}' of '{class_name}' is called with ({gets}), but takes ({takes})"
-    label = Label(span, "called here")
-    return Diagnostic(
-        HANDLER_SIGNATURE, message, method.span, (label,), f"write 'def {name}({gets})'"
-    )
+            takes = ", ".join(("self", *method.arguments))
+            gets = ", ".join(("self", *arguments))
+            message = f"'{name}' of '{class_name}' is called with ({gets}), but takes ({takes})"
+            label = Label(span, "called here")
+            hint = f"write 'def {name}({gets})'"
+            yield Diagnostic(HANDLER_SIGNATURE, message, method.span, (label,), hint)
 
 
 def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     """Report the handlers of subscriptions that annotate another message than they get."""
     types = {f"on_{port.name}": port.interface for port in node.ports_of(PortKind.SUBSCRIPTION)}
-    for module, known in source.own_classes:
-        for method in known.methods:
-            type_ = types.get(method.name)
-            arguments = method.node.args.args if method.node is not None and type_ else []
-            annotation = arguments[1].annotation if len(arguments) > 1 else None
-            if type_ is None or method.node is None or annotation is None:
-                continue
-            annotated = Scope(module, known.node, method.node).known_interface(annotation)
-            if annotated not in (None, type_.value):
-                message = f"'{method.name}' gets a {type_}, not a {annotated}"
-                label = Label(source.reference.text.span, "the behavior of this node")
-                span = span_of(annotation, module.source)
-                yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,))
-
-
-def _idle_ports(node: Node) -> Iterator[Diagnostic]:
-    for handler in handlers(node):
-        if handler.needed and handler.kind in _REACTIONS:
-            message = f"{handler.kind} '{handler.of}' does nothing"
-            hint = _REACTIONS[handler.kind]
-            yield Diagnostic(IDLE_PORT, message, handler.of.span, hint=hint)
+    for scope in scopes_in(source.own_classes):
+        type_, arguments = types.get(scope.method.name), scope.method.args.args
+        annotation = arguments[1].annotation if len(arguments) > 1 else None
+        if type_ is None or annotation is None:
+            continue
+        annotated = scope.known(scope.interface, annotation)
+        if annotated not in (None, type_.value):
+            message = f"'{scope.method.name}' gets a {type_}, not a {annotated}"
+            label = Label(source.reference.text.span, "the behavior of this node")
+            span = span_of(annotation, scope.module.source)
+            yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,))

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.call_settings import call_limits, callback_settings
+from composer.analysis.class_ports import CreatedPort, all_created_ports, created_ports
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, nearest
-from composer.model import USE_SIM_TIME, Node, ParameterType, Port, PortKind
-from composer.python_code.nodes.class_interfaces import (
-    CreatedPort,
-    all_created_ports,
-    created_ports,
-    declared_parameters,
-    passes_node_on,
-)
+from composer.model import USE_SIM_TIME, ChannelKind, ParameterType, Port, PortKind
+from composer.python_code.nodes.class_interfaces import declared_parameters, passes_node_on
 from composer.python_code.nodes.classes import ClassOfNode
-from composer.rules.python.definitions import error, rclpy_class, warning
-from composer.source import Span
+from composer.qos import incompatibilities
+from composer.rules.python.definitions import as_warning, error, info, rclpy_class, warning
 
 
 def _publishing(name: str, type_: str, qos: str) -> str:
@@ -38,9 +32,6 @@ def _declaring(key: str) -> str:
 
 
 _FLOAT = "std_msgs/msg/Float32"
-_LISTENING = (
-    "    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command, external: true%s}}\n"
-)
 _RIGHT_PORT = _publishing("range", _FLOAT, "command")
 _RIGHT_PARAMETER = _declaring("rate_hz: {type: double, default: 5.0}")
 
@@ -63,11 +54,14 @@ CLASS_PORT_TYPE = error(
     bad=_publishing("range", "std_msgs/msg/Float64", "command"),
     good=_RIGHT_PORT,
 )
-CLASS_PORT_QOS = warning(
+CLASS_PORT_QOS = info(
     code="RC493",
     name="class-port-qos",
     summary="A port of a node has another QoS than in its class.",
-    why="The class decides, so checks of the declared QoS miss what happens on the topic.",
+    why=(
+        "The class decides, so checks of the declared QoS miss what happens on the topic. It is a "
+        "warning if the QoS of the class does not match that of another node."
+    ),
     bad=_publishing("range", _FLOAT, "sensor_data"),
     good=_RIGHT_PORT,
 )
@@ -87,35 +81,21 @@ CLASS_PARAMETER_TYPE = error(
     bad=_declaring("rate_hz: {type: integer, default: 5}"),
     good=_RIGHT_PARAMETER,
 )
-CLASS_SETTING = error(
-    code="RC468",
-    name="class-setting",
-    summary="A node with a class declares reactions, timers, state or limits of calls.",
-    why=(
-        "The class has callbacks and timers of its own; its ports are declared to be checked "
-        "and connected. What the YAML file says they do would have no effect."
-    ),
-    bad=rclpy_class(keys=_LISTENING % ', log: "{message.data}"'),
-    good=rclpy_class(keys=_LISTENING % ""),
-)
-
 _KINDS = frozenset({PortKind.PUBLISHER, PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.CLIENT})
-_POLICIES = ("reliability", "durability", "depth", "deadline_ms")
+#: The policies that decide whether endpoints match.
+_POLICIES = ("reliability", "durability", "deadline_ms", "liveliness")
 _OF_EVERY_NODE = (USE_SIM_TIME, "start_type_description_service")
 _TYPES = frozenset(item.value for item in ParameterType)
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Compare the ports, parameters and settings of nodes with their classes."""
+    """Compare the ports and parameters of nodes with their classes."""
     for item in hosted_classes(context):
         if item.node.ports:
             yield from _missing_ports(item)
-            yield from _different_ports(item)
+            yield from _different_ports(item, context)
         if item.node.parameters:
             yield from _parameters(item)
-        for what, span in _settings(item.node):
-            message = f"{what} has no effect: node '{item.node.name}' has a class"
-            yield Diagnostic(CLASS_SETTING, message, span, hint="remove it, or write a behavior")
 
 
 def _missing_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
@@ -141,7 +121,7 @@ def _last(name: str) -> str:
     return name.rpartition("/")[2]
 
 
-def _different_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
+def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic]:
     """Report the ports that the class creates with another type or QoS."""
     created = list(created_ports(item))
     for port in item.node.ports:
@@ -155,20 +135,35 @@ def _different_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
         if types and port.interface.value not in {other.interface for other in types}:
             message = f"{what} with type {types[0].interface}, not {port.interface}"
             label = Label(types[0].span, "created here")
-            yield Diagnostic(CLASS_PORT_TYPE, message, port.interface.span, (label,))
+            rule = as_warning(CLASS_PORT_TYPE, unless=item.is_certain(types[0].span))
+            yield Diagnostic(rule, message, port.interface.span, (label,))
         elif len(same) == 1 and port.qos.known and port.qos.explicit:
-            yield from _different_qos(port, same[0], what)
+            yield from _different_qos(port, same[0], what, context)
 
 
-def _different_qos(port: Port, created: CreatedPort, what: str) -> Iterator[Diagnostic]:
-    if created.qos is None:
+def _different_qos(
+    port: Port, created: CreatedPort, what: str, context: Context
+) -> Iterator[Diagnostic]:
+    """Report a policy that decides about matches; it is a warning if another end does not match."""
+    declared, qos = port.qos.profile, created.qos
+    if qos is None:
         return
+    is_publisher = port.kind is PortKind.PUBLISHER
+    topics = (item for item in context.channels if item.kind is ChannelKind.TOPIC)
+    ends = [
+        end.port.qos.profile
+        for topic in topics
+        for end in (topic.sinks if is_publisher else topic.sources)
+        if topic.name == port.full_name
+    ]
+    pairs = [(qos, other) if is_publisher else (other, qos) for other in ends]
+    rule = as_warning(CLASS_PORT_QOS, unless=not any(incompatibilities(*pair) for pair in pairs))
     for policy in _POLICIES:
-        here, there = getattr(port.qos.profile, policy), getattr(created.qos, policy)
+        here, there = getattr(declared, policy), getattr(qos, policy)
         if here != there:
             message = f"{what} with {policy} {_value(there)}, not {_value(here)}"
             label = Label(created.span, "created here")
-            yield Diagnostic(CLASS_PORT_QOS, message, port.qos.own_span(policy), (label,))
+            yield Diagnostic(rule, message, port.qos.own_span(policy), (label,))
             return  # another profile, most likely
 
 
@@ -193,15 +188,5 @@ def _parameters(item: ClassOfNode) -> Iterator[Diagnostic]:
         if type_ is not None and given in _TYPES and type_.value != given:
             message = f"class '{class_name}' declares parameter '{name}' as {type_}, not {given}"
             label = Label(type_.span, "declared here")
-            yield Diagnostic(CLASS_PARAMETER_TYPE, message, parameter.type.span, (label,))
-
-
-def _settings(node: Node) -> Iterator[tuple[str, Span]]:
-    """Yield what a node declares that only callbacks of a behavior use, with its place."""
-    yield from callback_settings(node)
-    for port in node.ports:
-        for event, reaction in port.reactions:
-            yield f"the reaction of {port.kind} '{port.name}' to its {event}", reaction.span
-        if port.result is not None or port.feedback is not None or port.accept is not None:
-            yield f"the reaction of {port.kind} '{port.name}'", port.span
-        yield from call_limits(port)
+            rule = as_warning(CLASS_PARAMETER_TYPE, unless=item.is_certain(type_.span))
+            yield Diagnostic(rule, message, parameter.type.span, (label,))

@@ -9,10 +9,10 @@ from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic
 from composer.model import ExecutorKind, Node, System
-from composer.python_code.nodes.classes import ClassOfNode, calls_in
+from composer.python_code.nodes.classes import ClassOfNode
 from composer.python_code.source import Call
-from composer.python_code.source.method_body import is_none
-from composer.rules.python.definitions import error, rclpy_class, warning
+from composer.python_code.source.trees import SCOPES, is_none, span_of, walk
+from composer.rules.python.definitions import as_warning, error, rclpy_class, warning
 
 _IMPORT = "import rclpy\n"
 _ASKING = '\n    def ask(self):\n        return input("name: ")\n'
@@ -90,27 +90,40 @@ def check(context: Context) -> Iterator[Diagnostic]:
 def _constructor(item: ClassOfNode) -> Iterator[Diagnostic]:
     name = item.source.reference.class_name
     constructor = item.constructor
-    for call in constructor.calls if constructor is not None else ():
+    if constructor is None or constructor.node is None:
+        return
+    for call in constructor.calls:
         if call.name == "rclpy.spin" and not call.deferred:
+            rule = as_warning(CLASS_SPINS, unless=item.is_certain(call.span))
             message = f"the constructor of '{name}' calls rclpy.spin, which never returns"
             hint = "spin in the main function of the program, or run it as an 'executable'"
-            yield item.diagnostic(CLASS_SPINS, message, call.span, hint)
-    for node, span in calls_in(constructor) if constructor is not None else ():
-        if isinstance(node.func, ast.Attribute) and node.func.attr == "__init__":
-            for keyword in node.keywords:
-                if keyword.arg in _REFUSED and not is_none(keyword.value):
-                    message = f"'{name}' gives its node a '{keyword.arg}' of its own"
-                    yield item.diagnostic(CLASS_CONTEXT, message, span, _REFUSED[keyword.arg])
+            yield item.diagnostic(rule, message, call.span, hint)
+    given = {
+        argument.arg for argument in ast.walk(constructor.node.args) if hasattr(argument, "arg")
+    }
+    for node in walk(constructor.node.body, closed=SCOPES):
+        match node:
+            case ast.Call(func=ast.Attribute(attr="__init__") as function, keywords=keywords):
+                span = span_of(function, constructor.span.file)
+            case _:
+                continue
+        rule = as_warning(CLASS_CONTEXT, unless=item.is_certain(span))
+        for keyword in keywords:
+            is_passed_on = getattr(keyword.value, "id", None) in given  # it may be None
+            if keyword.arg in _REFUSED and not (is_none(keyword.value) or is_passed_on):
+                message = f"'{name}' gives its node a '{keyword.arg}' of its own"
+                yield item.diagnostic(rule, message, span, _REFUSED[keyword.arg])
 
 
 def _second_nodes(item: ClassOfNode) -> Iterator[Diagnostic]:
     name = item.source.reference.class_name
-    for method in item.methods:
+    for method in item.source.methods:
         for call in method.calls:
             if call.name in _CREATORS:
+                rule = as_warning(CLASS_SECOND_NODE, unless=item.is_certain(call.span))
                 message = f"'{method.name}' of '{name}' creates a second node"
                 hint = "declare it as a node of the system, or run the program as an 'executable'"
-                yield item.diagnostic(CLASS_SECOND_NODE, message, call.span, hint)
+                yield item.diagnostic(rule, message, call.span, hint)
 
 
 def _blocking_calls(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
@@ -118,7 +131,7 @@ def _blocking_calls(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
     name = item.source.reference.class_name
     others = list(_on_same_executor(item.node, system))
     is_single = _is_single_threaded(item.node, system)
-    for method in item.methods:
+    for method in item.source.methods:
         what = f"'{method.name}' of '{name}'"
         for call in method.calls:
             if call.name == "input" and not call.deferred:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 
-from composer.analysis.call_settings import call_limits, callback_settings
+from composer.analysis.call_settings import callback_settings
 from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.model import Isolation, Node, Port, System
@@ -110,13 +110,8 @@ def _declared(node: Node, isolated: frozenset[tuple[str, str]]) -> Iterator[tupl
 
 
 def _of_port(port: Port) -> Iterator[tuple[str, Span]]:
-    for event, reaction in port.reactions:
-        yield f"the reaction of {port.kind} '{port.name}' to its {event}", reaction.span
     if port.budget_ms is not None:
         yield "'budget_ms'", port.budget_ms.span
-    yield from call_limits(port)
     for name, is_set in (("reentrant", port.reentrant), ("always_on", port.always_on)):
         if is_set:
             yield f"'{name}' of {port.kind} '{port.name}'", port.span
-    if port.result is not None or port.feedback is not None or port.accept is not None:
-        yield f"the reaction of {port.kind} '{port.name}'", port.span

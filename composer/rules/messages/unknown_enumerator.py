@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.messages.reactions import message_templates
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.field_types import constant_problem
+from composer.field_types import constant_problem, enumerator_problem
 from composer.interfaces import Interfaces, Message
 from composer.templates import Constant, Items, Record, Template
 
@@ -38,9 +38,6 @@ nodes:
     )
 )
 
-#: Maximum number of names in a hint.
-_SHOWN = 6
-
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the numbers that message fields are set to."""
@@ -65,40 +62,6 @@ def _template(template: Template, message: Message, interfaces: Interfaces) -> I
 
 
 def _number(constant: Constant, field: str, message: Message) -> Iterator[Diagnostic]:
-    value = constant.value
-    known = _enumerators(message, field)
-    if not known or not isinstance(value, int) or isinstance(value, bool):
-        return
-    if value in known.values() or _is_combination(value, set(known.values())):
-        return
-    names = [f"{number} {name}" for name, number in known.items()]
-    listed = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
-    yield Diagnostic(
-        RULE,
-        f"{message.name} has no constant for '{field}' with the value {value}",
-        constant.span,
-        hint=f"valid here: {listed}",
-    )
-
-
-def _enumerators(message: Message, field: str) -> Mapping[str, int]:
-    """Return the constants that are named after the field: STATUS_IDLE for ``status``.
-
-    Without any, they are all constants of the message if only this field has their type.
-    """
-    prefix = f"{field.upper()}_"
-    numbers = [item for item in message.constants if isinstance(item.value, int)]
-    found = [item for item in numbers if item.name.startswith(prefix)]
-    types = {item.type for item in message.constants}
-    alike = [item.name for item in message.fields if item.type in types]
-    if not found and len(numbers) > 1 and len(types) == 1 and alike == [field]:
-        found = numbers
-    return {item.name: item.value for item in found if isinstance(item.value, int)}
-
-
-def _is_combination(value: int, known: set[int]) -> bool:
-    """Return whether the constants are flags and ``value`` is a combination of them."""
-    flags = known - {0}
-    if not all(flag > 0 and flag.bit_count() == 1 for flag in flags) or max(flags, default=0) < 4:
-        return False
-    return value & ~sum(flags) == 0
+    problem = enumerator_problem(message, field, constant.value)
+    if problem is not None:
+        yield Diagnostic(RULE, problem[0], constant.span, hint=problem[1])

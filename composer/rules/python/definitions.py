@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import TypedDict, Unpack
 
 from composer.diagnostics import Rule, Severity, register
@@ -56,16 +58,16 @@ class Texts(TypedDict):
     good: str
 
 
-def error(**texts: Unpack[Texts]) -> Rule:
-    """Register a rule whose problems keep a system from running."""
-    return register(Rule(severity=Severity.ERROR, **texts))
+def as_warning(rule: Rule, *, unless: bool = False) -> Rule:
+    """Return a rule as a warning, unless its problem certainly keeps a system from running."""
+    return rule if unless else replace(rule, severity=Severity.WARNING)
 
 
-def warning(**texts: Unpack[Texts]) -> Rule:
-    """Register a rule whose problems do not keep a system from running."""
-    return register(Rule(severity=Severity.WARNING, **texts))
+def _rule(severity: Severity, **texts: Unpack[Texts]) -> Rule:
+    return register(Rule(severity=severity, **texts))
 
 
-def info(**texts: Unpack[Texts]) -> Rule:
-    """Register a rule about what is only worth knowing."""
-    return register(Rule(severity=Severity.INFO, **texts))
+#: These register a rule: errors keep a system from running, infos are only worth knowing.
+error = partial(_rule, Severity.ERROR)
+warning = partial(_rule, Severity.WARNING)
+info = partial(_rule, Severity.INFO)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -14,10 +14,12 @@ from composer.model import Node
 from composer.python_code.checks import code_problems
 from composer.python_code.checks.imports import import_problems
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource
+from composer.python_code.source import BehaviorSource, Module
+from composer.python_code.source.trees import start_span, walk
 from composer.rules.behaviors import blocking, handlers
 from composer.rules.messages import index_out_of_range, invalid_value, unknown_field
 from composer.rules.python import plain_python, uses_of_nodes
+from composer.rules.python.definitions import as_warning
 from composer.rules.transforms import frame_id_slash
 from composer.source import Span
 
@@ -50,20 +52,20 @@ RULE_OF: Mapping[Family, Rule] = {
     Family.SIGNATURE: handlers.HANDLER_SIGNATURE,
     Family.PARAMETER: uses_of_nodes.UNDECLARED_PARAMETER,
     Family.CONSTRUCTOR: uses_of_nodes.MISSING_CONSTRUCTOR,
+    Family.SYNTAX: plain_python.PYTHON_SYNTAX,
     Family.NOT_CHECKED: plain_python.NOT_CHECKED,
 }
 
 
-def diagnostic(problem: Problem, place: Span, what: What, *, certain: bool = True) -> Diagnostic:
+def diagnostic(problem: Problem, place: Span, what: What) -> Diagnostic:
     """Return the diagnostic of a problem; ``place`` is where the YAML file names the code.
 
-    In a class nothing is an error: it may run as it does today. In a behavior, a problem is only a
-    warning if it is not ``certain``.
+    In a class nothing but its syntax is an error: it may run as it does today.
     """
     rule = RULE_OF[problem.family]
-    is_error = what == "behavior" and certain and problem.is_certain
+    is_error = (what == "behavior" and problem.is_certain) or problem.family is Family.SYNTAX
     if rule.severity is Severity.ERROR and not is_error:
-        rule = replace(rule, severity=Severity.WARNING)
+        rule = as_warning(rule)
     label = Label(place, f"the {what} of this node")
     return Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
 
@@ -72,17 +74,22 @@ def check(context: Context) -> Iterator[Diagnostic]:
     """Report the problems of the files of behaviors and classes, each once."""
     for source, what, problem, _ in context.once(_import_problems):
         yield diagnostic(problem, source.reference.text.span, what)
-    for node, source, what in _sources(context):
+    for node, source, what in sources(context):
         for problem in code_problems(node, source, context.interfaces):
             yield diagnostic(problem, source.reference.text.span, what)
 
 
 def names_meant(context: Context) -> frozenset[tuple[str, str]]:
     """Return files with the names that a wrong import in the file may have been meant to define."""
-    return context.once(_names_meant)
+    return frozenset(
+        (problem.span.file.path, name)
+        for _, _, problem, names in context.once(_import_problems)
+        for name in names
+    )
 
 
-def _sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
+def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
+    """Yield the behaviors and classes of a system, each once for each way to use it."""
     for node, source in distinct_behaviors(context):
         yield node, source, "behavior"
     for item in distinct_classes(context):
@@ -95,19 +102,29 @@ def _import_problems(
     """Return the problems of the imports in all files, with the names that were meant."""
     problems: list[tuple[BehaviorSource, What, Problem, frozenset[str]]] = []
     checked: set[Path] = set()
-    for _, source, what in _sources(context):
+    for _, source, what in sources(context):
         for module in source.own_modules:
             if module.path not in checked:
                 checked.add(module.path)
                 folder = source.reference.folder
                 for problem, names in import_problems(module, folder, context.interfaces):
                     problems.append((source, what, problem, names))
+                others = _alternatives(module, context)
+                problems += [(source, what, problem, frozenset()) for problem in others]
     return tuple(problems)
 
 
-def _names_meant(context: Context) -> frozenset[tuple[str, str]]:
-    return frozenset(
-        (problem.span.file.path, name)
-        for _, _, problem, names in context.once(_import_problems)
-        for name in names
-    )
+def _alternatives(module: Module, context: Context) -> Iterator[Problem]:
+    """Yield the messages and other interfaces that a condition chooses at run time."""
+    packages = context.interfaces.packages()
+    chosen = {
+        name
+        for name, origins in module.alternatives.items()
+        if any(origin.module.partition(".")[0] in packages for origin in origins)
+    }
+    for node in walk(module.tree.body) if chosen else ():
+        if isinstance(node, ast.alias) and (node.asname or node.name) in chosen:
+            chosen.remove(node.asname or node.name)
+            message = f"'{node.asname or node.name}' is imported from several modules, so its uses"
+            span = start_span(node, len(node.name), module.source)
+            yield Problem(Family.NOT_CHECKED, f"{message} are not checked", span)

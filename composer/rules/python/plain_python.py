@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from composer.rules.python.definitions import error, info, on_tick, warning
 
+_FAILING = on_tick(
+    'raise TransitionFailed("why")', head="from composer.behavior import TransitionFailed"
+)
+
 UNKNOWN_IMPORT = error(
     code="RC444",
     name="unknown-import",
     summary="A file imports a module or a name that does not exist.",
     why="The node cannot be created if an import of its module fails.",
-    bad=on_tick(
-        'raise TransitionFaild("why")', head="from composer.behavior import TransitionFaild"
-    ),
-    good=on_tick(
-        'raise TransitionFailed("why")', head="from composer.behavior import TransitionFailed"
-    ),
+    bad=_FAILING.replace("Failed", "Faild"),
+    good=_FAILING,
 )
 MODULE_NOT_INSTALLED = info(
     code="RC445",
@@ -103,4 +103,16 @@ print(f"rate {rate["hz"]}")  # Python 3.11 reads the file, and this needs 3.12
     good="""\
 print(f"rate {rate['hz']}")
 """,
+)
+
+PYTHON_SYNTAX = error(
+    code="RC441",
+    name="python-syntax",
+    summary="The module of a behavior or class is not valid Python.",
+    why=(
+        "The node cannot be created. The module is parsed and not executed; the type checker "
+        "finds what only Python's compiler refuses, such as 'await' outside an async function."
+    ),
+    bad=on_tick("await self.clock.sleep(0.05)"),
+    good=on_tick("await self.clock.sleep(0.05)", is_async=True),
 )

@@ -6,21 +6,21 @@ several systems use in the same way is checked once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field
 from typing import TypeAlias
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.python_nodes import distinct_behaviors, distinct_classes
 from composer.diagnostics import Diagnostic
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checker import RunningCheck, start
+from composer.python_code.nodes.behaviors import use_of
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource
-from composer.rules.python.families import RULE_OF, diagnostic, names_meant
+from composer.rules.python.families import RULE_OF, diagnostic, names_meant, sources
 from composer.source import Span
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.
@@ -43,8 +43,8 @@ class TypeCheck:
         for context in contexts:
             key = id(context.interfaces)
             _, classes = by_interfaces.setdefault(key, (context.interfaces, {}))
-            for node, source in _classes(context):
-                classes.setdefault(_use(node, source), (node, source))
+            for node, source, _ in sources(context):
+                classes.setdefault(use_of(node, source), (node, source))
         return cls(
             [
                 start(tuple(classes.values()), interfaces)
@@ -62,9 +62,9 @@ class TypeCheck:
             self._problems = self._collected()
         others = [*reported]
         return [
-            diagnostic(problem, source.reference.text.span, _what(node), certain=True)
-            for node, source in _classes(context)
-            for problem in self._problems.get(_use(node, source), ())
+            diagnostic(problem, source.reference.text.span, what)
+            for node, source, what in sources(context)
+            for problem in self._problems.get(use_of(node, source), ())
             if not _follows(problem, node, context, others)
         ]
 
@@ -77,26 +77,8 @@ class TypeCheck:
         found: dict[_Use, list[Problem]] = {}
         for check in self._running:
             for node, source, problem in check.problems():
-                found.setdefault(_use(node, source), []).append(problem)
+                found.setdefault(use_of(node, source), []).append(problem)
         return found
-
-
-def _classes(context: Context) -> Iterator[tuple[Node, BehaviorSource]]:
-    yield from distinct_behaviors(context)
-    yield from ((item.node, item.source) for item in distinct_classes(context))
-
-
-def _what(node: Node) -> str:
-    return "behavior" if node.behavior is not None else "class"
-
-
-def _use(node: Node, source: BehaviorSource) -> _Use:
-    place = (source.path, source.reference.class_name, source.reference.folder)
-    if node.behavior is None:
-        return place
-    ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
-    parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
-    return (*place, ports, parameters, tuple(timer.name.value for timer in node.timers))
 
 
 def _follows(
@@ -117,8 +99,8 @@ def _follows(
         return True
     rule = RULE_OF[problem.family].code
     return any(
-        _overlap(problem.span, item.primary)
-        or (item.rule.code == rule and _is_same_line(problem.span, item.primary))
+        problem.span.overlaps(item.primary)
+        or (item.rule.code == rule and problem.span.is_on_line_of(item.primary))
         for item in reported
     )
 
@@ -147,13 +129,3 @@ def _is_within_function(span: Span, signature: Span) -> bool:
 
 def _indentation(line: str) -> int:
     return len(line) - len(line.lstrip())
-
-
-def _is_same_line(one: Span, other: Span) -> bool:
-    return one.file.path == other.file.path and one.line == other.line
-
-
-def _overlap(one: Span, other: Span) -> bool:
-    if not _is_same_line(one, other):
-        return False
-    return one.column < other.column + other.length and other.column < one.column + one.length

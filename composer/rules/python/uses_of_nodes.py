@@ -13,6 +13,18 @@ from composer.rules.python.definitions import (
 
 _RESET = "services: {reset: {type: std_srvs/srv/Trigger}}"
 _ON_RESET = "class Counter:\n    def on_reset(self, request, response):\n        "
+_UNSET = (
+    "class Counter:\n    def __init__(self):\n        self.last: list[int] | None = None\n\n"
+    "    def on_tick(self):\n"
+)
+_EARLY = (
+    "class Counter:\n    def %s(self):\n        self.log.info('created')\n\n"
+    "    def on_tick(self):\n        pass\n"
+)
+_READING = rclpy_class(
+    'self.declare_parameter("rate_hz", 10.0)',
+    'self.rate = self.get_parameter("rate_hz").value',
+)
 
 UNKNOWN_ATTRIBUTE = error(
     code="RC442",
@@ -79,17 +91,8 @@ UNCHECKED_NONE = warning(
         "An attribute that is None at first stays so until the first message, and a callback "
         "may run before. Any attribute of None raises AttributeError."
     ),
-    bad=behavior(
-        "class Counter:\n"
-        "    def __init__(self):\n        self.last: list[int] | None = None\n\n"
-        "    def on_tick(self):\n        self.last.append(1)\n"
-    ),
-    good=behavior(
-        "class Counter:\n"
-        "    def __init__(self):\n        self.last: list[int] | None = None\n\n"
-        "    def on_tick(self):\n"
-        "        if self.last is not None:\n            self.last.append(1)\n"
-    ),
+    bad=behavior(f"{_UNSET}        self.last.append(1)\n"),
+    good=behavior(f"{_UNSET}        if self.last is not None:\n            self.last.append(1)\n"),
 )
 HANDLER_ANNOTATION = warning(
     code="RC451",
@@ -114,28 +117,16 @@ TOO_EARLY = warning(
         "Ports, parameters and the clock exist from 'on_configure' on, not in '__init__'. "
         "Messages are dropped before the node is active."
     ),
-    bad=behavior(
-        "class Counter:\n    def __init__(self):\n        self.log.info('created')\n\n"
-        "    def on_tick(self):\n        pass\n"
-    ),
-    good=behavior(
-        "class Counter:\n    def on_configure(self):\n        self.log.info('configured')\n\n"
-        "    def on_tick(self):\n        pass\n"
-    ),
+    bad=behavior(_EARLY % "__init__"),
+    good=behavior(_EARLY % "on_configure"),
 )
 UNDECLARED_PARAMETER = error(
     code="RC483",
     name="undeclared-parameter",
     summary="A class reads a parameter that it does not declare.",
     why="rclpy raises ParameterNotDeclaredException, in the constructor or in a callback.",
-    bad=rclpy_class(
-        'self.declare_parameter("rate_hz", 10.0)',
-        'self.rate = self.get_parameter("rate").value',
-    ),
-    good=rclpy_class(
-        'self.declare_parameter("rate_hz", 10.0)',
-        'self.rate = self.get_parameter("rate_hz").value',
-    ),
+    bad=_READING.replace('get_parameter("rate_hz")', 'get_parameter("rate")'),
+    good=_READING,
 )
 MISSING_CONSTRUCTOR = error(
     code="RC484",

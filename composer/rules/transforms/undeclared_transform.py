@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.frame_uses import BROADCAST, FrameUse
 from composer.analysis.frames import Declared, place, uses_of_behaviors
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
 from composer.model import DynamicTransform, Node
-from composer.python_code.nodes.frames import BROADCAST, FrameUse
 from composer.source import Located
 
 RULE = register(

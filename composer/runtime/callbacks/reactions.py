@@ -36,7 +36,7 @@ class MessageReaction(Protocol):
 MAX_STATE_SIZE = 1_000_000
 
 #: The publisher and client ports of a node, by name.
-Publishers: TypeAlias = Mapping[str, Publisher]
+Publishers: TypeAlias = Mapping[str, Publisher[Any]]
 Clients: TypeAlias = Mapping[str, ReactionClient]
 Action: TypeAlias = Callable[[dict[str, Any]], None]
 

@@ -126,6 +126,40 @@ def test_a_class_that_may_exist_is_not_missing(tmp_path: Path, text: str) -> Non
     assert not source.complete
 
 
+def test_a_base_of_the_typed_module_has_no_handlers(tmp_path: Path) -> None:
+    source = read(
+        tmp_path, "from composer.typed import RobotBehavior\nclass Robot(RobotBehavior): ...\n"
+    )
+    assert source.complete
+
+
+def test_alternative_imports_have_no_single_origin(tmp_path: Path) -> None:
+    (tmp_path / "old.py").write_text("class Base:\n    def on_old(self): ...\n")
+    (tmp_path / "new.py").write_text("class Base:\n    def on_new(self): ...\n")
+    source = read(
+        tmp_path,
+        "import time\nif time.time() > 0:\n    from old import Base\n"
+        "else:\n    from new import Base\nimport time\nclass Robot(Base): ...\n",
+    )
+    assert not source.complete
+    module = source.classes[0][0]
+    assert sorted(module.alternatives) == ["Base"]
+    assert module.names == {"time": "time"}
+    assert {item.path.stem for item in source.own_modules} == {"robot", "old", "new"}
+
+
+def test_broken_modules_have_their_place_and_text(tmp_path: Path) -> None:
+    (tmp_path / "helper.py").write_text("def help(:\n")
+    for text in ("import helper\nclass Robot: ...\n", "from helper import Robot\n"):
+        (broken,) = read(tmp_path, text).broken
+        assert broken.path == tmp_path / "helper.py"
+        assert broken.span.file.text == "def help(:\n"
+        assert broken.message.startswith("module 'helper' is not Python: ")
+    source = read(tmp_path, "class Robot(:\n")
+    assert [item.path for item in source.broken] == [tmp_path / "robot.py"]
+    assert source.problem is not None
+
+
 def test_relative_imports_are_followed(tmp_path: Path) -> None:
     package = tmp_path / "robots"
     package.mkdir()

@@ -135,7 +135,7 @@ FILES = [
 
         def accept_fibonacci(self, request):
             if request.order > 9:
-                return  # RETURN
+                return  # the type checker reports it
             return True
 
         def on_fibonacci(self, goal):
@@ -164,10 +164,10 @@ FILES = [
         async def on_tick(self):
             goal = await self.action_clients.count.send_goal(None, on_feedback=self.show)
             await self.action_clients.count.send_goal(None, on_feedback=self.print())  # SIGNATURE
-            await self.action_clients.count.send_goal(None, on_feedback=lambda: 1)  # SIGNATURE
+            await self.action_clients.count.send_goal(None, on_feedback=lambda: 1)
             await self.action_clients.count.send_goal(None, on_feedback=lambda feedback: 1)
 
-        def show(self, name, feedback):  # SIGNATURE
+        def show(self, name, feedback):
             pass
 
         def print(self):

@@ -18,11 +18,18 @@ def interfaces() -> Interfaces:
     return Interfaces.load()
 
 
-HELPERS = {"motor.py": "SPEED = 1\n\n\ndef start(): ...\n", "arms/__init__.py": "LEFT = 1\n"}
+HELPERS = {
+    "motor.py": "SPEED = 1\n\n\ndef start(): ...\n",
+    "arms/__init__.py": "LEFT = 1\n",
+    "arms/grip.py": "",
+}
+#: A package may have interfaces and modules.
+INTERFACES = {"std_srvs/__init__.py": ""}
+COMPILED = {"fast/__init__.py": "", "fast/core.pyx": "", "fast/solver.py": ""}
 
 
 def found(code: str, folder: Path) -> list[tuple[Family, str, str | None]]:
-    for name, text in {**HELPERS, "code.py": code}.items():
+    for name, text in {**HELPERS, **COMPILED, **INTERFACES, "code.py": code}.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     module = read_module(folder / "code.py", "code.py")
@@ -32,12 +39,14 @@ def found(code: str, folder: Path) -> list[tuple[Family, str, str | None]]:
 
 FAIL = [
     ("import nmpy", "nmpy", "did you mean 'numpy'?"),
-    ("import maths", "maths", "did you mean 'math'?"),
     ("import moter", "moter", "did you mean 'motor'?"),
     ("import os.pth", "pth", None),
-    ("import xml.etre", "etre", "did you mean 'etree'?"),
-    ("import arms.gripper", "gripper", None),
-    ("from .moter import SPEED", ".moter", None),
+    ("import xml.etre", "etre", None),
+    ("import arms.grp", "grp", "did you mean 'grip'?"),
+    ("from .moter import SPEED", "moter", "did you mean 'motor'?"),
+    ("from . import moter", "moter", "did you mean 'motor'?"),
+    ("from arms import LEFTT", "LEFTT", "did you mean 'LEFT'?"),
+    ("import sensr_msg.msg", "sensr_msg", "did you mean 'sensor_msgs'?"),
     ("from motor import SPED", "SPED", "did you mean 'SPEED'?"),
     ("from .motor import SPED", "SPED", "did you mean 'SPEED'?"),
     ("from std_msgs.mgs import String", "mgs", "did you mean 'msg'?"),
@@ -46,9 +55,7 @@ FAIL = [
     ("from std_srvs.msg import Trigger", "Trigger", "import it from 'std_srvs.srv'"),
     ("import geometry_msg.msg", "geometry_msg", "did you mean 'geometry_msgs'?"),
     ("from composer.behavior import CallCanceled", "CallCanceled", "did you mean 'CallCancelled'?"),
-    ("from composer.behaviour import Goal", "composer.behaviour",
-     "did you mean 'composer.behavior'?"),
-    ("from composer.typed import Driver", "Driver", "valid here: Behavior, SUFFIX"),
+    ("from composer.behaviour import Goal", "behaviour", "did you mean 'behavior'?"),
 ]  # fmt: skip
 
 
@@ -62,6 +69,13 @@ def test_imports_that_fail(code: str, text: str, hint: str | None, tmp_path: Pat
     [
         "import fastkalman",
         "from mars_msgs.msg import Crater",
+        "import bson",
+        "import ntplib",
+        "import cma",
+        "import arms.gripper",
+        "from . import generated",
+        "from arms import generated",
+        "from .generated import parameters",
         "import sys\nsys.path.insert(0, '/opt/tools')\nimport meter",
         "import importlib\nimportlib.import_module('a')\nimport moter",
     ],
@@ -72,6 +86,11 @@ def test_modules_that_may_be_elsewhere(code: str, tmp_path: Path) -> None:
     assert "did you mean" not in str(hint)
 
 
+def test_a_module_like_one_of_the_standard_library(tmp_path: Path) -> None:
+    hint = "did you mean 'math'?"
+    assert found("import maths", tmp_path) == [(Family.NOT_INSTALLED, "maths", hint)]
+
+
 def test_an_internal_module(tmp_path: Path) -> None:
     [(family, text, _)] = found("from composer.names import join", tmp_path)
     assert (family, text) == (Family.INTERNAL, "composer.names")
@@ -80,6 +99,10 @@ def test_an_internal_module(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "code",
     [
+        "from std_srvs.srv import Trigger\nimport std_srvs.srv",
+        "from fast import solvr, other",
+        "import fast.slver",
+        "from composer.typed import Driver",
         "import math, os.path, collections.abc, xml.etree, motor, arms",
         "from motor import SPEED, start",
         "from . import motor",
@@ -90,10 +113,10 @@ def test_an_internal_module(tmp_path: Path) -> None:
         "from std_msgs.msg import *",
         "from composer.behavior import Goal, Changes",
         "from composer.typed import DriverBehavior",
-        "try:\n    import fast\nexcept ImportError:\n    fast = None",
-        "from contextlib import suppress\nwith suppress(ImportError):\n    import fast",
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import fast",
-        "import os\nif os.environ.get('OLD'):\n    from motor import SPED\nelse:\n    import fast",
+        "try:\n    import quick\nexcept ImportError:\n    quick = None",
+        "from contextlib import suppress\nwith suppress(ImportError):\n    import quick",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import quick",
+        "import os\nif os.environ.get('OLD'):\n    from motor import SPED\nelse:\n    import quick",
     ],
 )
 def test_imports_that_succeed_or_need_not(code: str, tmp_path: Path) -> None:

@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
-import ast
 from pathlib import Path
 from textwrap import dedent, indent
+from typing import NamedTuple
 
 import pytest
 
-from composer.graph.scenes.rates import publishing_rates_hz
-from composer.python_code.source.method_body import read_body
-from composer.python_code.source.publishing import PublisherUses, publisher_uses
-from composer.source import SourceFile
+from composer.analysis.timing import publications
+from composer.graph.scenes import rates
+from composer.model import BehaviorReference
+from composer.python_code.source import find_behavior
+from composer.source import Located, SourceFile, Span
 from tests.unit.support.resolving import system_of
 
+PLACE = Span(SourceFile("robot.yaml"), 1, 1)
 
-def publishing(body: str) -> PublisherUses:
-    text = f"def on_tick(self):\n{indent(dedent(body), '    ')}"
-    (function,) = ast.parse(text).body
-    assert isinstance(function, ast.FunctionDef)
-    return publisher_uses(function, read_body(function, {}, SourceFile("a.py", text)))
+
+class Uses(NamedTuple):
+    """The publishers of a method: those of each call, all, and those passed on or stored."""
+
+    always: bool
+    anywhere: bool
+    passed_on: bool
+
+
+def uses(body: str, folder: Path) -> Uses:
+    """Return how a handler uses the publisher ``out``."""
+    text = f"class Robot:\n    def on_tick(self):\n{indent(dedent(body), '        ')}\n"
+    (folder / "robot.py").write_text(text)
+    source = find_behavior(BehaviorReference(Located("robot:Robot", PLACE), folder))
+    (method,) = source.methods
+    return Uses(
+        always=[*rates._unconditional(method)].count("out") == 1,
+        anywhere="self.publishers.out" in rates._names(method),
+        passed_on=publications._passed_on(source) == {"out"},
+    )
 
 
 @pytest.mark.parametrize(
@@ -33,8 +50,8 @@ def publishing(body: str) -> PublisherUses:
         "publishers = self.publishers\nout = publishers.out\nsend = out.publish\nsend(x)",
     ],
 )
-def test_unconditional_statements_publish_each_time(body: str) -> None:
-    assert publishing(body) == PublisherUses(("out",), ("out",))
+def test_unconditional_statements_publish_each_time(body: str, tmp_path: Path) -> None:
+    assert uses(body, tmp_path) == (True, True, False)
 
 
 @pytest.mark.parametrize(
@@ -49,8 +66,8 @@ def test_unconditional_statements_publish_each_time(body: str) -> None:
         "self.publishers.out.topic",
     ],
 )
-def test_conditional_publishers_are_only_mentioned(body: str) -> None:
-    assert publishing(body) == PublisherUses((), ("out",))
+def test_conditional_publishers_are_only_mentioned(body: str, tmp_path: Path) -> None:
+    assert uses(body, tmp_path) == (False, True, False)
 
 
 @pytest.mark.parametrize(
@@ -63,13 +80,13 @@ def test_conditional_publishers_are_only_mentioned(body: str) -> None:
         "def send(out=self.publishers.out):\n    out.publish(x)",
     ],
 )
-def test_stored_publishers_may_be_used_anywhere(body: str) -> None:
-    assert publishing(body) == PublisherUses((), ("out",), ("out",))
+def test_stored_publishers_may_be_used_anywhere(body: str, tmp_path: Path) -> None:
+    assert uses(body, tmp_path) == (False, True, True)
 
 
 @pytest.mark.parametrize("body", ["out.publish(x)", "self.out.publish(x)", "self.publishers"])
-def test_other_attributes_are_not_publishers(body: str) -> None:
-    assert publishing(body) == PublisherUses()
+def test_other_attributes_are_not_publishers(body: str, tmp_path: Path) -> None:
+    assert uses(body, tmp_path) == (False, False, False)
 
 
 SENDER = """
@@ -92,18 +109,18 @@ SYSTEM = """
 """
 
 
-def rates(folder: Path, python: str = SENDER, system: str = SYSTEM) -> dict[str, float]:
+def rates_hz(folder: Path, python: str = SENDER, system: str = SYSTEM) -> dict[str, float]:
     (folder / "sender.py").write_text(dedent(python))
     (node,) = system_of(system, folder).nodes
-    return publishing_rates_hz(node)
+    return rates.publishing_rates_hz(node)
 
 
 def test_the_rate_is_that_of_the_timer_whose_handler_publishes(tmp_path: Path) -> None:
-    assert rates(tmp_path) == {"out": 20.0}
+    assert rates_hz(tmp_path) == {"out": 20.0}
 
 
 def test_the_rate_is_unknown_if_another_handler_publishes_too(tmp_path: Path) -> None:
-    assert rates(tmp_path, SENDER.replace("pass", "self.publishers.out.publish(1)")) == {}
+    assert rates_hz(tmp_path, SENDER.replace("pass", "self.publishers.out.publish(1)")) == {}
 
 
 def test_the_rate_is_unknown_if_a_subscription_publishes_too(tmp_path: Path) -> None:
@@ -111,8 +128,8 @@ def test_the_rate_is_unknown_if_a_subscription_publishes_too(tmp_path: Path) -> 
         "timers:",
         "subscriptions: {in: {type: std_msgs/msg/String, publish: {out: {}}}}\n        timers:",
     )
-    assert rates(tmp_path, SENDER, system) == {}
+    assert rates_hz(tmp_path, SENDER, system) == {}
 
 
 def test_the_rate_is_unknown_without_a_handler(tmp_path: Path) -> None:
-    assert rates(tmp_path, SENDER.replace("on_tick", "on_tock")) == {}
+    assert rates_hz(tmp_path, SENDER.replace("on_tick", "on_tock")) == {}

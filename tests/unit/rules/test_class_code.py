@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import has_errors
+from composer.diagnostics import Severity, has_errors
 from tests.unit.support.checking import diagnostics_in, quoted
 from tests.unit.support.python_cases import diagnostics_of
 
@@ -370,7 +370,7 @@ PUBLISHED = (
         ("publishers: {text: {type: std_msgs/msg/Int32, topic: text, external: true}}", None),
         (PUBLISHED % "command", None),
         (PUBLISHED % "{extends: command, lifespan_ms: 100}", None),
-        (PUBLISHED % "{extends: command, depth: 1}", "class-port-qos"),
+        (PUBLISHED % "{extends: command, depth: 1}", None),
         (PUBLISHED % "{extends: command, deadline_ms: 100}", "class-port-qos"),
         (PUBLISHED % "state", "class-port-qos"),
         ("subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}",
@@ -390,3 +390,94 @@ def test_parameters_and_ports_agree_with_the_class(
     rules = {"class-parameter", "class-parameter-type", "class-port-qos", "class-port-type"}
     found = [item.rule.name for item in diagnostics_in(system, tmp_path)]
     assert [name for name in found if name in rules] == ([rule] if rule is not None else [])
+
+
+@pytest.mark.parametrize(
+    ("qos", "severity"), [("sensor_data", Severity.INFO), ("state", Severity.WARNING)]
+)
+def test_another_qos_is_a_warning_if_another_end_does_not_match(
+    qos: str, severity: Severity, tmp_path: Path
+) -> None:
+    port = f"type: std_msgs/msg/String, topic: /text, qos: {qos}"
+    system = (
+        "system: a\nnodes:\n  n:\n    class: declaring:Declaring\n    publishers:\n"
+        f"      text: {{{port}}}\n"
+        "  other:\n    subscriptions:\n"
+        f"      text: {{{port}, log: message}}\n"
+    )
+    code = DECLARING.replace('"~/text"', '"/text"')
+    (tmp_path / "declaring.py").write_text(code, encoding="utf-8")
+    found = [item for item in diagnostics_in(system, tmp_path) if item.rule.code == "RC493"]
+    assert [item.rule.severity for item in found] == [severity]
+
+
+HOSTED = """\
+import rclpy
+from rclpy.node import Node
+
+
+class Robot(Node):
+    def __init__(self, *, spins=False, cli_args=None):
+        {init}
+"""
+REFUSED = [
+    ('super().__init__("r", cli_args=["-r"])', "class-context", Severity.ERROR),
+    ('super().__init__("r", cli_args=cli_args)', None, None),
+    ('super().__init__("r", cli_args=None)', None, None),
+    ('super().__init__("r")\n        rclpy.spin(self)', "class-spins", Severity.ERROR),
+    (
+        'super().__init__("r")\n        if spins:\n            rclpy.spin(self)',
+        "class-spins",
+        Severity.WARNING,
+    ),
+    (
+        'super().__init__("r")\n        self.x = rclpy.create_node("x")',
+        "class-second-node",
+        Severity.ERROR,
+    ),
+    (
+        'super().__init__("r")\n        self.x = spins and rclpy.create_node("x")',
+        "class-second-node",
+        Severity.WARNING,
+    ),
+]
+
+
+@pytest.mark.parametrize(("init", "rule", "severity"), REFUSED)
+def test_only_what_hosting_surely_refuses_is_an_error(
+    init: str, rule: str | None, severity: Severity | None, tmp_path: Path
+) -> None:
+    (tmp_path / "code.py").write_text(HOSTED.format(init=init), encoding="utf-8")
+    found = [(item.rule.name, item.rule.severity) for item in diagnostics_in(SYSTEM, tmp_path)]
+    assert found == ([(rule, severity)] if rule is not None else [])
+
+
+ALTERNATIVES = """\
+import os
+
+from rclpy.node import Node
+
+OLD = os.environ.get("ROS_DISTRO", "humble") == "humble"
+if OLD:
+    from geometry_msgs.msg import Twist as Command
+else:
+    from geometry_msgs.msg import TwistStamped as Command
+
+
+class Robot(Node):
+    def __init__(self):
+        super().__init__("robot")
+        self.commands = self.create_publisher(Command, "cmd_vel", 10)
+
+    def send(self):
+        command = Command()
+        if OLD:
+            command.linear.x = 0.1
+        else:
+            command.twist.linear.x = 0.1
+        self.commands.publish(command)
+"""
+
+
+def test_alternative_messages_are_not_checked(tmp_path: Path) -> None:
+    assert _found(tmp_path, ALTERNATIVES) == [[("not-checked", "Twist")]]

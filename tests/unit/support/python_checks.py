@@ -11,7 +11,6 @@ from composer.interfaces import Interfaces
 from composer.loading import load_bytes
 from composer.model import BehaviorReference, Node
 from composer.python_code.checks import code_problems
-from composer.python_code.nodes.classes import _NODES
 from composer.python_code.problems import Problem
 from composer.python_code.source import find_behavior
 from composer.source import Located
@@ -59,7 +58,7 @@ def problems(text: str, folder: Path, node: str) -> list[Problem]:
     (folder / "nodes.py").write_text(textwrap.dedent(text))
     model = _nodes()[node]
     reference = BehaviorReference(Located("nodes:Robot", model.name.span), folder)
-    source = find_behavior(reference, _NODES if node == "class" else frozenset())
+    source = find_behavior(reference)
     assert source.class_found, source.problem
     return list(code_problems(model, source, _interfaces()))
 

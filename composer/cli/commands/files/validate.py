@@ -21,10 +21,12 @@ from composer.cli.support.system_arguments import (
     path_exists,
     project_systems,
 )
+from composer.cli.support.typings import update_typings
 from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
+    from composer.project import Project
 
 EPILOGS = {
     "validate": examples(
@@ -118,6 +120,8 @@ def validate(
     _print(diagnostics, output_format or _default_format(), max_diagnostics)
     suffix = "" if diagnostics else ": no problems found"
     say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{suffix}")
+    for project in checked.projects:
+        update_typings(project)
     if checked.foreign:
         say(f"skipped, without 'system:' or 'node:': {_listed(checked.foreign)}")
     is_strict = checked.strict if strict is None else strict
@@ -131,6 +135,7 @@ class _Checked:
     diagnostics: list[Diagnostic]
     strict: bool
     foreign: tuple[Path, ...]
+    projects: tuple[Project, ...]
 
 
 def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
@@ -154,6 +159,7 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
         diagnostics=diagnostics,
         strict=any(result.project.settings.strict for result in results),
         foreign=found.foreign,
+        projects=tuple({item.project.root: item.project for item in results}.values()),
     )
 
 

@@ -32,6 +32,7 @@ from composer.cli.support.options import (
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import announce_discovery, require_interfaces, require_ros
 from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.cli.support.typings import update_typings
 
 if TYPE_CHECKING:
     from composer.model import Process, System
@@ -166,14 +167,17 @@ def run(
     """
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
-    declared = runnable_system(
+    runnable = runnable_system(
         system,
         settings=settings or (),
         namespace=namespace,
         use_sim_time=use_sim_time,
         only_errors=process is not None,  # the coordinating process prints the warnings
         exit_code=CONFIG,
-    ).system
+    )
+    declared = runnable.system
+    if process is None:
+        update_typings(runnable.result.project)
     member = None if process is None else _member(declared, process)
     if member is not None:
         os.environ.update({name.value: value for name, value in member.environment})

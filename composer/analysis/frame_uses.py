@@ -8,10 +8,8 @@ from collections.abc import Iterator, Mapping
 from composer.fast_dataclass import dataclass
 from composer.model import Node
 from composer.python_code.source import BehaviorSource
-from composer.python_code.source.method_body import argument, dotted
-from composer.python_code.source.spans import span_of
-from composer.python_code.source.traversal import walk
-from composer.python_code.source.values import NotLiteral, Scope
+from composer.python_code.source.trees import argument, dotted, span_of
+from composer.python_code.source.values import Scope, scopes_in
 from composer.source import Located, Span
 
 BROADCAST = "broadcast"
@@ -42,29 +40,15 @@ def frame_uses(node: Node, source: BehaviorSource) -> Iterator[FrameUse]:
 
     The ID of a frame is known if it is a constant or a parameter of the node.
     """
-    for module, known in source.own_classes:
-        for method in known.methods:
-            if method.node is None:
-                continue
-            scope = Scope(module, known.node, method.node)
-            for call in walk(method.node.body, closed=(ast.ClassDef,)):
-                if isinstance(call, ast.Call) and _is_of_transforms(call, scope):
-                    yield _use(call, scope, node)
-
-
-def _is_of_transforms(call: ast.Call, scope: Scope) -> bool:
-    match call.func:
-        case ast.Attribute(value=value, attr=name) if name in _METHODS:
-            return _name(value, scope) == _TRANSFORMS
-    return False
-
-
-def _use(call: ast.Call, scope: Scope, node: Node) -> FrameUse:
-    method = dotted(call.func).rpartition(".")[2]
-    given = (argument(call, position, name) for position, name in _METHODS[method])
-    frames = (_frame(item, scope, node) for item in given if item is not None)
-    known = tuple(frame for frame in frames if frame is not None)
-    return FrameUse(method, span_of(call.func, scope.module.source), known)
+    for scope in scopes_in(source.own_classes):
+        for call in scope.nodes:
+            match call:
+                case ast.Call(func=ast.Attribute(value=owner, attr=name)) if name in _METHODS:
+                    if _name(owner, scope) == _TRANSFORMS:
+                        given = (argument(call, *place) for place in _METHODS[name])
+                        frames = (_frame(item, scope, node) for item in given if item is not None)
+                        span = span_of(call.func, scope.module.source)
+                        yield FrameUse(name, span, tuple(filter(None, frames)))
 
 
 def _frame(expression: ast.expr, scope: Scope, node: Node) -> Located[str] | None:
@@ -74,17 +58,12 @@ def _frame(expression: ast.expr, scope: Scope, node: Node) -> Located[str] | Non
         parameter = node.parameter(name.removeprefix(_PARAMETER))
         value = parameter.value.value if parameter is not None and parameter.value else None
     else:
-        try:
-            value = scope.literal(expression)
-        except NotLiteral:
-            value = None
+        value = scope.known(scope.literal, expression)
     place = span_of(expression, scope.module.source)
     return Located(value, place) if isinstance(value, str) else None
 
 
 def _name(expression: ast.expr, scope: Scope) -> str:
     """Return the dotted name that an expression stands for; "" if there is none."""
-    try:
-        return dotted(scope.followed(expression))
-    except NotLiteral:
-        return ""
+    value = scope.known(scope.followed, expression)
+    return dotted(value) if value is not None else ""

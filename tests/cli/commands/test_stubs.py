@@ -1,0 +1,265 @@
+"""``compose stubs``: what it writes, replaces, removes and keeps."""
+
+from __future__ import annotations
+
+import ast
+import errno
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from composer.python_code.stubs.folder import HEADER
+from tests.cli.compose import compose
+
+TYPED = "typings/composer/typed.pyi"
+#: A system with a node that has a behavior and ports of its own.
+SYSTEM = """\
+system: extra
+nodes:
+  filter_node:
+    behavior: filter_node:Filter
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    assert compose("new", "project", "my_robot").code == 0
+    monkeypatch.chdir(tmp_path / "my_robot")
+    return tmp_path / "my_robot"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return the files below a folder, with their contents."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def classes(project: Path) -> list[str]:
+    """Return the base classes of behaviors in the stub."""
+    tree = ast.parse((project / TYPED).read_text())
+    names = (node.name for node in tree.body if isinstance(node, ast.ClassDef))
+    return [name for name in names if name.endswith("Behavior")]
+
+
+def test_stubs_of_the_project_are_written_and_are_up_to_date(project: Path) -> None:
+    (project / "systems/extra.yaml").write_text(SYSTEM)
+    done = compose("stubs")
+    assert (done.code, done.out) == (0, "")
+    assert "'typings': " in done.err
+    assert " files written" in done.err
+    assert classes(project) == ["CounterBehavior", "FilterNodeBehavior"]
+    files = contents(project / "typings")
+    assert {"std_msgs/msg.pyi", "std_srvs/srv.pyi", "rclpy/node.pyi"} <= files.keys()
+    for name, text in files.items():
+        assert text.startswith(HEADER.encode()), name
+        ast.parse(text)
+    assert compose("stubs", "--check").code == 0
+    assert compose("stubs").err == "'typings' is up to date\n"
+
+
+def test_a_behavior_runs_and_is_tested_without_the_stubs(project: Path) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "tests/test_counter_node.py"]
+    done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert (
+        "from composer.typed import CounterBehavior" in (project / "nodes/counter.py").read_text()
+    )
+    assert compose("validate", "--strict", ".").code == 0
+
+
+def test_only_the_given_systems_add_classes(project: Path) -> None:
+    (project / "systems/extra.yaml").write_text(SYSTEM)
+    done = compose("stubs", "systems/my_robot.yaml", "-o", "elsewhere")
+    assert done.code == 0, done.err
+    assert not (project / "typings").exists()
+    (project / "elsewhere").rename(project / "typings")
+    assert classes(project) == ["CounterBehavior"]
+
+
+def test_the_output_depends_on_the_files_only(project: Path) -> None:
+    (project / "systems/extra.yaml").write_text(SYSTEM)
+    written = []
+    for seed in ("1", "2"):
+        command = [sys.executable, "-P", "-m", "composer", "stubs", "-o", seed]
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        subprocess.run(command, check=True, env=environment, capture_output=True)
+        written.append(contents(project / seed))
+    assert written[0] == written[1]
+
+
+def test_check_names_what_would_change(project: Path) -> None:
+    assert compose("stubs").code == 0
+    before = contents(project / "typings")
+    text = (project / "nodes/counter.yaml").read_text()
+    (project / "nodes/counter.yaml").write_text(text.replace("rate_hz:", "rate:", 1))
+    done = compose("stubs", "--check")
+    assert (done.code, done.out) == (1, f"{TYPED}\n")
+    assert "'typings' is out of date" in done.err
+    assert contents(project / "typings") == before
+    done = compose("stubs", "-o", "other", "--check")
+    assert done.code == 1
+    assert not (project / "other").exists()
+
+
+def test_only_files_of_the_command_are_replaced_and_removed(project: Path) -> None:
+    assert compose("stubs").code == 0
+    folder = project / "typings"
+    (folder / "mine.pyi").write_text("X: int\n")
+    (folder / "std_msgs/extra.pyi").write_text("Y: int\n")
+    (folder / "old_msgs").mkdir()
+    (folder / "old_msgs/msg.pyi").write_text(HEADER)
+    (folder / "rclpy/node.pyi").write_text("class Node: ...\n")
+    (folder / "std_msgs/msg.pyi").write_text(HEADER + "changed\n")
+    done = compose("stubs")
+    assert "note: 'typings/rclpy/node.pyi' is not a file of this command: it is kept" in done.err
+    assert "'typings': 1 file written, 1 removed" in done.err
+    files = contents(folder)
+    assert files["mine.pyi"] == b"X: int\n"
+    assert files["std_msgs/extra.pyi"] == b"Y: int\n"
+    assert files["rclpy/node.pyi"] == b"class Node: ...\n"
+    assert not (folder / "old_msgs").exists()
+    assert b"changed" not in files["std_msgs/msg.pyi"]
+    assert compose("stubs", "--check").code == 0
+
+
+def test_symbolic_links_are_not_followed(project: Path, tmp_path: Path) -> None:
+    outside = tmp_path / "outside"
+    (outside / "std_msgs").mkdir(parents=True)
+    (outside / "std_msgs/old.pyi").write_text(HEADER)
+    (outside / "file.pyi").write_text(HEADER)
+    folder = project / "typings"
+    (folder / "rclpy").mkdir(parents=True)
+    (folder / "std_msgs").symlink_to(outside / "std_msgs")
+    (folder / "rclpy/node.pyi").symlink_to(outside / "file.pyi")
+    (folder / "stale.pyi").symlink_to(outside / "file.pyi")
+    done = compose("stubs")
+    assert done.code == 0, done.err
+    assert "'typings/std_msgs/msg.pyi' is not a file of this command: it is kept" in done.err
+    assert contents(outside) == {
+        "std_msgs/old.pyi": HEADER.encode(),
+        "file.pyi": HEADER.encode(),
+    }
+    assert (folder / "stale.pyi").is_symlink()
+
+
+def test_a_node_type_with_errors_is_written_as_far_as_it_is_known(project: Path) -> None:
+    (project / "nodes/arm.yaml").write_text(
+        "node: arm\nbehavior: arm:Arm\npublishers:\n  joints: {type: sensor_msgs/msg/JointState}\n"
+        "  tool: {type: sensor_msgs/msg/Nonsense}\n  class: {type: std_msgs/msg/String}\n"
+        "parameters:\n  gain: {type: dubble}\n  rate.max: {type: double}\nunknown: 1\n"
+    )
+    (project / "nodes/broken.yaml").write_text("node: [\n")
+    done = compose("stubs")
+    assert done.code == 0
+    assert "note: 'nodes/broken.yaml' cannot be read: see 'compose validate'" in done.err
+    text = (project / TYPED).read_text()
+    ast.parse(text)
+    assert "def joints(self) -> composer.behavior.Publisher[sensor_msgs.msg.JointState]" in text
+    assert "def tool(self) -> Any" in text
+    assert "name: Literal['rate.max'], /) -> float" in text
+
+
+def test_of_two_nodes_with_one_class_name_the_first_is_written(project: Path) -> None:
+    (project / "systems/extra.yaml").write_text(SYSTEM.replace("filter_node:\n", "counter:\n"))
+    done = compose("stubs")
+    assert (
+        "note: 'counter' of 'systems/extra.yaml' differs from 'counter' of 'nodes/counter.yaml', "
+        "which has the class of that name" in done.err
+    )
+    assert "on_scan" not in (project / TYPED).read_text()
+
+
+@pytest.mark.parametrize("command", [("validate", "nodes"), ("run", "my_robot", "--dry-run")])
+def test_validate_and_run_update_the_folder(project: Path, command: tuple[str, ...]) -> None:
+    (project / "systems/extra.yaml").write_text(SYSTEM)
+    (project / "nodes/filter_node.py").write_text(
+        "class Filter:\n    def on_scan(self, message): ...\n"
+    )
+    assert "typings" not in compose(*command).err
+    assert not (project / "typings").exists()
+    assert compose("stubs").code == 0
+    assert "typings" not in compose(*command).err
+    text = (project / "nodes/counter.yaml").read_text()
+    (project / "nodes/counter.yaml").write_text(
+        text.replace("timers:", "  more: {type: std_msgs/msg/Bool, external: true}\ntimers:")
+    )
+    done = compose(*command)
+    assert "'typings' is up to date again: 1 file written" in done.err
+    assert "def more(self)" in (project / TYPED).read_text()
+    assert classes(project) == ["CounterBehavior", "FilterNodeBehavior"]
+    assert compose("stubs", "--check").code == 0
+
+
+def test_the_folder_is_not_updated_while_a_node_type_cannot_be_read(project: Path) -> None:
+    assert compose("stubs").code == 0
+    (project / "nodes/counter.yaml").write_text("node: [\n")
+    done = compose("validate", ".")
+    assert done.code == 1
+    assert "typings" not in done.err
+    assert classes(project) == ["CounterBehavior"]
+
+
+def test_a_folder_without_stubs_is_left_alone(project: Path) -> None:
+    (project / "typings/composer").mkdir(parents=True)
+    (project / TYPED).write_text("class CounterBehavior: ...\n")
+    assert "typings" not in compose("validate", ".").err
+    assert contents(project / "typings") == {"composer/typed.pyi": b"class CounterBehavior: ...\n"}
+
+
+def test_a_folder_that_cannot_be_written_is_one_note(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(**_: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    assert compose("stubs").code == 0
+    (project / TYPED).write_text(HEADER)
+    monkeypatch.setattr(tempfile, "mkstemp", refuse)
+    done = compose("validate", ".")
+    assert done.code == 0
+    note = (
+        f"note: 'typings' was not updated: cannot write '{project / TYPED}': Read-only file system"
+    )
+    assert note in done.err.splitlines()
+    assert (compose("stubs").code, (project / TYPED).read_text()) == (1, HEADER)
+
+
+def test_a_file_in_the_place_of_the_folder_is_an_error(project: Path) -> None:
+    (project / "typings").write_text("")
+    done = compose("stubs")
+    assert done.code == 1
+    assert "typings" in done.err
+    assert "internal error" not in done.err
+
+
+def test_paths_must_exist_and_be_of_one_project(project: Path, tmp_path: Path) -> None:
+    assert compose("stubs", "nowhere").code == 2
+    assert compose("stubs", "a" * 5000).code == 2
+    assert compose("stubs", "systems", str(tmp_path)).code == 2
+
+
+def test_a_folder_without_a_project_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = compose("stubs")
+    assert done.code == 2
+    assert "there is no system and no node type" in done.err
+    assert not (tmp_path / "typings").exists()
+
+
+@pytest.mark.parametrize("line", ["CounterBehavior", "CounterBehavior as Base", "OtherBehavior"])
+def test_a_missing_handler_of_a_typed_behavior_is_reported(project: Path, line: str) -> None:
+    base = line.rpartition(" ")[2]
+    (project / "nodes/counter.py").write_text(
+        f"from composer.typed import {line}\n\n\nclass Counter({base}):\n    pass\n"
+    )
+    done = compose("validate", "nodes")
+    assert (done.code, done.out.count("error[")) == (1, 1)
+    assert "error[RC433 missing-handler]: timer 'tick' has no handler" in done.out
