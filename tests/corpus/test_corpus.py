@@ -10,7 +10,11 @@ without knowledge of the rules:
 - ``valid``: edits in the same form that are correct.
 
 A mistake is found if it adds an error, a warning or an info. The mistakes of three files in four,
-and the files in ``more``, are checked by ``make soak``.
+and the files in ``more`` and ``code``, are checked by ``make soak``.
+
+The files in ``code`` are about Python alone, a third of it in rclpy classes, and by other authors.
+Left out are kinds that are not checked any more: attributes and arguments that change their kind,
+attributes that are never read, formats, elements that an array parameter lacks, and unpacking.
 """
 
 from __future__ import annotations
@@ -32,6 +36,7 @@ from composer.project import Project
 
 FILES = sorted(Path(__file__).parent.glob("*.yaml"))
 MORE = sorted((Path(__file__).parent / "more").glob("*.yaml"))
+CODE = sorted((Path(__file__).parent / "code").glob("*.yaml"))
 MIN_FOUND, MIN_RIGHT, MAX_REPORTS = 0.97, 0.98, 1.1
 #: Found, and reports each, of the files in ``more``: what was measured, below the target for some.
 #: They may not get worse. Most mistakes not found are in Python code.
@@ -41,6 +46,13 @@ MEASURED = {
     "services": (0.954, 1.10),
     "swarms": (0.992, 1.13),
     "vehicles": (0.972, 1.12),
+}
+#: The same of the files in ``code``, with the share in the right place. The author of "machines"
+#: names as the right place where a wrong value comes from; most are reported where it is used.
+MEASURED_CODE = {
+    "robots": (0.95, 1.04, 0.98),
+    "vehicles": (0.91, 1.04, 0.98),
+    "machines": (0.87, 1.07, 0.87),
 }
 MIN_MISTAKES, MIN_VALID = 220, 50
 _INSTALLED = Interfaces.load()
@@ -111,11 +123,17 @@ def _read(path: Path) -> Iterator[ProjectFiles]:
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 REST = [path for path in FILES if path not in FILES[::4]]
 CORPORA = [
-    pytest.param(FILES[::4], MIN_FOUND, MAX_REPORTS, id="corpus"),
-    pytest.param(REST, MIN_FOUND, MAX_REPORTS, id="rest", marks=pytest.mark.soak),
+    pytest.param(FILES[::4], MIN_FOUND, MAX_REPORTS, MIN_RIGHT, id="corpus"),
+    pytest.param(REST, MIN_FOUND, MAX_REPORTS, MIN_RIGHT, id="rest", marks=pytest.mark.soak),
     *(
-        pytest.param([path], *MEASURED[path.stem], id=path.stem, marks=pytest.mark.soak)
+        pytest.param([path], *MEASURED[path.stem], MIN_RIGHT, id=path.stem, marks=pytest.mark.soak)
         for path in MORE
+    ),
+    *(
+        pytest.param(
+            [path], *MEASURED_CODE[path.stem], id=f"code-{path.stem}", marks=pytest.mark.soak
+        )
+        for path in CODE
     ),
 ]
 
@@ -267,11 +285,12 @@ def test_the_corpus_is_large_enough() -> None:
     assert sum(len(project.valid) for project in projects) >= MIN_VALID
 
 
-@pytest.mark.parametrize(("files", "min_found", "max_reports"), CORPORA)
+@pytest.mark.parametrize(("files", "min_found", "max_reports", "min_right"), CORPORA)
 def test_mistakes_are_found_once_in_the_right_place(
     files: list[Path],
     min_found: float,
     max_reports: float,
+    min_right: float,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -280,12 +299,14 @@ def test_mistakes_are_found_once_in_the_right_place(
         _check_project(project, _folder(project, tmp_path, monkeypatch), result)
     print(result)
     assert result.found >= min_found * result.mistakes, result
-    assert result.right >= MIN_RIGHT * result.found, result
+    assert result.right >= min_right * result.found, result
     assert result.reports <= max_reports * result.found, result
 
 
 @pytest.mark.parametrize(
-    "files", [FILES, pytest.param(MORE, marks=pytest.mark.soak)], ids=["corpus", "more"]
+    "files",
+    [FILES, pytest.param(MORE, marks=pytest.mark.soak), pytest.param(CODE, marks=pytest.mark.soak)],
+    ids=["corpus", "more", "code"],
 )
 def test_correct_files_give_no_errors_and_no_warnings(
     files: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -74,6 +74,8 @@ _SENDING = {
     "composer.behavior.Goal.publish_feedback": "the feedback is",
 }
 _RCLPY_MODULES = tuple(f"rclpy.{path.stem}" for path in (LIBRARIES / "rclpy").iterdir())
+#: The usual names of messages that callbacks take.
+_MESSAGE_ARGUMENTS = frozenset({"feedback", "message", "msg", "response", "result"})
 #: Modules besides the standard library of which every name is known.
 _COMPLETE_MODULES = frozenset({"composer", "numpy", "rclpy"})
 
@@ -172,7 +174,8 @@ class _Reader:
                 return self._return()
             case "missing-import":
                 return self._import()
-        if "`None`" in self.finding.message or "`NoneType`" in self.finding.message:
+        first = self.finding.message.partition("\n")[0]
+        if "`None`" in first or "`NoneType`" in first:
             return self._none()
         return self._in_its_words()
 
@@ -216,7 +219,8 @@ class _Reader:
         is_stored = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
         if is_stored and not is_own:
             return None  # most objects take any attribute
-        self.about.append(f"type {named}")
+        if not is_own:
+            self.about.append(f"type {named}")
         names = _members(self.code, named) if is_own else ()
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
         return self._made(Family.ATTRIBUTE, f"'{named}' has no attribute '{name}'", hint)
@@ -300,15 +304,27 @@ class _Reader:
             is_annotated = isinstance(statement, ast.AnnAssign)
             return self._in_its_words() if is_annotated and not self._is_class else None
         module = self.checked.copy.module
+        if dotted(target) == f"self.{target.attr}":
+            if dotted(target) in self.owners.attributes and not self._is_class:
+                message = f"'{dotted(target)}' is set by the composer and must not be changed"
+                return self._made(Family.TYPE, message)
+            return None
         owner = self.owners.with_field(target, found["expected"], module)
-        if owner is not None and dotted(target) != f"self.{target.attr}":
+        is_certain = found["expected"] in self.owners.messages or self._is_message(target)
+        if owner is not None and (is_certain or not self._is_class):
             if _may_be_none(found["given"], found["expected"]):
                 return self._none()
             return self._value(owner, target.attr, found["given"])
-        if dotted(target) in self.owners.attributes and not self._is_class:
-            message = f"'{dotted(target)}' is set by the composer and must not be changed"
-            return self._made(Family.TYPE, message)
         return None
+
+    def _is_message(self, target: ast.Attribute) -> bool:
+        """Return whether an attribute that is set is, as far as syntax shows, a message's field."""
+        root = dotted(target).partition(".")[0]
+        values = self.code.values_of(root, self.span.line)
+        made = [dotted(value.func) for value in values if isinstance(value, ast.Call)]
+        imports = self.checked.copy.module.imports
+        origins = [imports[name].module for name in made if name in imports]
+        return root in _MESSAGE_ARGUMENTS or any(item.endswith(".msg") for item in origins)
 
     def _keyword(self) -> Problem:
         found = re.search(_KEYWORD, self.finding.message)
@@ -392,13 +408,14 @@ def _is_near(name: str, other: str) -> bool:
 
 def _plain(text: str) -> str:
     """Return a type as a reader knows it."""
-    text = re.sub(_MODULE, "", re.sub(_LITERAL, r"\1", text))
+    literals = re.sub(_LITERAL, lambda found: found[1].replace("'", '"'), text)
+    text = re.sub(_MODULE, "", literals)
     return text.replace("Float | Scalar", "float").replace("Values[", "list[")
 
 
 def _may_be_none(given: str, expected: str) -> bool:
     """Return whether a value has the right type, or is None."""
-    members = given.split(" | ")
+    members = [] if given.startswith("(") else given.split(" | ")
     others = {item.rpartition(".")[2] for item in members if item != "None"}
     is_plain = all(item.isidentifier() for item in (*others, expected.rpartition(".")[2]))
     is_other = is_plain and expected.rpartition(".")[2] not in others | {"float", "Any"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Iterable, Mapping
+from dataclasses import field
 from functools import cached_property
 
 from composer import behavior
@@ -33,6 +34,7 @@ class Owner:
     name: str
     what: str  # of its attributes: "publisher", "field", ...
     members: tuple[str, ...]
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  # of the node: name to attribute
 
     def lacks(self, name: str) -> str:
         """Return the message about an attribute that it does not have."""
@@ -43,6 +45,8 @@ class Owner:
         other = _ROS_1_NAMES.get(name, "")
         if other in self.members:
             return f"did you mean '{other}'?"
+        if name in self.elsewhere:
+            return f"'{name}' is in '{self.elsewhere[name]}'"
         if self.what == "attribute":
             close = nearest(name, self.members)
             return f"did you mean '{close}'?" if close is not None else None
@@ -77,7 +81,8 @@ class Owners:
         """Return a message, or a part of a service or action, by its full name."""
         definition = self._definition(name)
         if definition is None:
-            return None
+            folder = name.split("/")[1]
+            return Owner(Family.FIELD, name, "part", _PARTS[folder]) if _PARTS[folder] else None
         constants = (constant.name for constant in definition.constants)
         return Owner(Family.FIELD, name, "field", (*definition.field_names, *constants))
 
@@ -91,7 +96,12 @@ class Owners:
         """Return a message with such a field, best one named as in ``header.stamp``."""
         short, parent = expected.rpartition(".")[2], dotted(target.value).rpartition(".")[2]
         every = self._by_use((full for names in self.messages.values() for full in names), module)
-        for full in sorted(every, key=lambda full: not full.lower().endswith(f"/{parent}")):
+
+        def rank(full: str) -> tuple[bool, bool]:
+            name = full.rpartition("/")[2]
+            return name.lower() != parent, name not in module.imports
+
+        for full in sorted(every, key=rank):
             definition = self._definition(full)
             found = definition.field(target.attr) if definition is not None else None
             if found is not None and short_type(found.type) == short:
@@ -154,7 +164,7 @@ class Owners:
         for folder in FOLDERS:
             for name in self.interfaces.names(folder):
                 short = name.rpartition("/")[2]
-                found.setdefault(short, []).extend([name] if folder == "msg" else [])
+                found.setdefault(short, []).append(name)
                 for part in _PARTS[folder]:
                     found.setdefault(f"{short}_{part}", []).append(f"{name}_{part}")
         return found
@@ -162,4 +172,10 @@ class Owners:
 
 def _group(node: Node, what: str, names: Iterable[str]) -> Owner:
     members = tuple(name for name in names if name.isidentifier())
-    return Owner(Family.PORT, f"node '{node.name}'", what, members)
+    elsewhere = {
+        port.name.value: attribute
+        for attribute, kind in PORT_ATTRIBUTES.items()
+        for port in node.ports_of(kind)
+    }
+    elsewhere |= {item.name.value: "parameters" for item in node.parameters}
+    return Owner(Family.PORT, f"node '{node.name}'", what, members, elsewhere)

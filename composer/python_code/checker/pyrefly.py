@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import sysconfig
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, suppress
@@ -147,7 +146,7 @@ def _start(command: list[str], root: Path, files: Mapping[str, str]) -> subproce
 
 def _program() -> str:
     """Return the program that was installed with this Python."""
-    beside = Path(sysconfig.get_path("scripts"), "pyrefly")
+    beside = Path(sys.executable).with_name("pyrefly")
     found = str(beside) if beside.is_file() else shutil.which("pyrefly", path=os.defpath)
     if found is None:
         raise CheckerFailed("pyrefly is not installed: 'pip install pyrefly'")
@@ -170,9 +169,7 @@ def _options(search_paths: Iterable[str]) -> list[str]:
 
 def _package_folders() -> list[str]:
     """Return the folders of installed packages."""
-    paths = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
-    paths |= dict.fromkeys(path for path in sys.path if path.endswith("-packages"))
-    return [path for path in paths if Path(path).is_dir()]
+    return [path for path in sys.path if path.endswith("-packages") and Path(path).is_dir()]
 
 
 def _state_of_packages() -> Iterator[str]:

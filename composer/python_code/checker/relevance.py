@@ -26,20 +26,27 @@ _CERTAIN_KINDS = frozenset(
 _ALWAYS = frozenset({"invalid-syntax", "missing-module-attribute", "parse-error"})
 #: Kinds that are kept in classes if they are about a type of ROS.
 _KINDS_ABOUT_TYPES = frozenset(
-    {"bad-argument-type", "bad-assignment", "bad-index", "not-iterable", "unsupported-operation"}
+    {"bad-argument-type", "bad-index", "not-iterable", "unsupported-operation"}
 )
 #: All kinds that may be mistakes; the others are about annotations and definitions.
 _KINDS = (
     _CERTAIN_KINDS
     | _KINDS_ABOUT_TYPES
-    | {"bad-context-manager", "bad-keyword-argument", "bad-match", "bad-return", "bad-unpacking"}
+    | {
+        "bad-assignment",
+        "bad-context-manager",
+        "bad-keyword-argument",
+        "bad-match",
+        "bad-return",
+        "bad-unpacking",
+    }
     | {"incompatible-comparison", "invalid-argument", "invalid-format-spec", "missing-attribute"}
     | {"no-matching-overload", "not-async", "read-only", "regex", "unbound-name"}
     | {"unreachable-except-clause"}
 )
 _NUMPY = r"\b(?:ndarray|dtype|numpy|(?:un)?signedinteger|floating|bool_|generic\[)"
 _ROS = (
-    r"in function `(?:rclpy|\w+\.(?:msg|srv|action))\."
+    r"in function `(?:rclpy|composer|\w+\.(?:msg|srv|action))\."
     r"|`(?:Time|Duration|Parameter|Future\[|Client\[|Publisher\[|rclpy\.)"
     r"|between `Literal\['[^`]*` and `(?:int|float)`"
 )
@@ -88,8 +95,10 @@ class Relevance:
         kind, message = finding.kind, finding.message
         if kind == "unknown-name":
             # Names after 'global' may be set later, annotations of attributes are not evaluated.
+            # Names that the syntax does not have are in annotations that are texts.
             line = span.file.line(span.line)
-            return re.match(r"\s*(global |nonlocal |self\.\w+\s*:)", line) is None
+            is_used = re.match(r"\s*(global |nonlocal |self\.\w+\s*:)", line) is None
+            return is_used and span.text in self.code.names
         if kind == "missing-import":
             return re.search(_KNOWN_PACKAGE, message) is not None
         if kind in _ALWAYS or message.startswith("No attribute"):
@@ -111,12 +120,12 @@ class Relevance:
         node = self.code.expression_at(span)
         if kind == "missing-attribute":
             return self._keeps_attribute(message, node)
-        given = re.search(_GIVEN, message)
-        if given is not None and self._is_loose(given["given"], node):
-            return False
-        if not self.is_class or kind in _CERTAIN_KINDS:
-            return True
+        given = re.search(_GIVEN, message) if kind == "bad-argument-type" else None
         is_ros = re.search(_ROS, message) is not None
+        if given is not None and self._is_loose(given["given"], node, is_ros=is_ros):
+            return False
+        if not self.is_class or kind in _CERTAIN_KINDS or kind == "bad-assignment":
+            return True
         is_message = given is not None and self._is_message(given["given"])
         return kind in _KINDS_ABOUT_TYPES and (is_ros or is_message)
 
@@ -127,7 +136,9 @@ class Relevance:
             if node.attr.startswith("_") and not node.attr.startswith("__"):
                 return name in self.code.module.classes and node.attr not in self.attributes
             if name in self.code.module.classes or name.startswith("Self@"):
-                is_read = isinstance(node.ctx, ast.Load)
+                changed = (item for _, item in self.code.assigned_at(node.lineno))
+                is_changed = any(isinstance(item, ast.AugAssign) for item in changed)
+                is_read = isinstance(node.ctx, ast.Load) or is_changed
                 is_defined = node.attr in self.attributes or self.code.sets_computed_names
                 return is_read and not is_defined
             if name in _BUILTINS and isinstance(node.value, ast.Subscript):
@@ -160,14 +171,15 @@ class Relevance:
         imported = self.code.module.imports.get(name)
         return name in self.messages and (imported is None or imported.module.endswith(".msg"))
 
-    def _is_loose(self, given: str, node: ast.expr | None) -> bool:
+    def _is_loose(self, given: str, node: ast.expr | None, *, is_ros: bool) -> bool:
         """Return whether the value of an argument may have the right type after all."""
-        if not given.startswith("("):  # not a function
-            if self.is_class and "Unknown" in given:
-                return True
-            members = [item for item in given.split(" | ") if item not in ("Any", "Unknown")]
-            if len(members) > 1 and "None" not in members:
-                return True
+        if given.startswith("("):  # a function, which may be annotated loosely
+            return not is_ros
+        if self.is_class and "Unknown" in given:
+            return True
+        members = [item for item in given.split(" | ") if item not in ("Any", "Unknown")]
+        if len(members) > 1 and "None" not in members:
+            return True
         if node is None:
             return False
         if given == "int" and isinstance(node, ast.Subscript):
@@ -206,7 +218,7 @@ def unguarded_value(code: CodeIndex, span: Span, message: str) -> str | None:
             node = value
         case ast.BinOp(left=left, right=right):
             node = right if re.search(r" and `[^`]*None[^`]*`", message) else left
-        case ast.Call(func=value):
+        case ast.Call(func=value) if "callable" in message:
             node = value
     name = dotted(node)
     function, class_ = code.function_at(span.line), code.class_at(span.line)

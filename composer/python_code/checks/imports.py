@@ -73,12 +73,12 @@ def import_problems(
 ) -> Iterator[tuple[Problem, frozenset[str]]]:
     """Yield the problems of the imports in a file, each with the names that may be meant.
 
-    ``folder`` is that of the YAML file. Imports in a function, an ``if`` or a ``try`` may fail, so
+    ``folder`` is that of the YAML file. Imports in an ``if``, a ``try`` or a ``with`` may fail, so
     they are left out. A missing module is only an error if its name is a typo: it may be installed
     or generated where the code runs.
     """
     imports = _Imports(module, folder, interfaces)
-    for node in module.tree.body:
+    for node in walk(module.tree.body, closed=(ast.If, ast.Match, ast.Try, ast.With)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 for part, missing in imports.missing_modules(alias.name):

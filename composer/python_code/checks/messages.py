@@ -10,6 +10,7 @@ from composer.field_types import constant_problem, enumerator_problem, enumerato
 from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
 from composer.python_code.checks.scopes import Scope
 from composer.python_code.problems import Family, Problem
+from composer.python_code.source.trees import dotted, span_of
 
 
 def message_problems(scope: Scope) -> Iterator[Problem]:
@@ -46,10 +47,20 @@ def _field_problems(
         return
     problems = list(_value_problems(node, found[1].type, scope))
     yield from problems or _enumerator_problem(*found, node, scope)
-    value = scope.constant(node)
-    if isinstance(value, str) and value.startswith("/") and found[1].name.endswith("frame_id"):
+    if found[1].name.endswith("frame_id"):
+        yield from _frame_problem(node, scope)
+
+
+def _frame_problem(node: ast.expr, scope: Scope) -> Iterator[Problem]:
+    """Yield a frame ID with a slash: a constant, or the value of a parameter where it is set."""
+    value, span = scope.constant(node), span_of(node, scope.module.source)
+    name = dotted(node)
+    for parameter in scope.code.node.parameters if name.startswith("self.parameters.") else ():
+        if name == f"self.parameters.{parameter.name.value}" and parameter.value is not None:
+            value, span = str(parameter.value.value), parameter.value.span
+    if isinstance(value, str) and value.startswith("/"):
         message = f"frame ID '{value}' begins with a slash"
-        yield scope.problem(Family.FRAME, message, node, "remove the slash")
+        yield Problem(Family.FRAME, message, span, "remove the slash")
 
 
 def _value_problems(node: ast.expr, type_: object, scope: Scope) -> Iterator[Problem]:

@@ -89,7 +89,7 @@ def _follows(
         errors = context.once(earlier_errors)
         if not node.complete or node.name.value in errors.nodes:
             return True  # the port may be declared where the file is wrong
-    if problem.family is Family.NAME and _is_meant(problem, context, reported):
+    if _is_meant(problem, context, reported):
         return True
     if problem.family is Family.ARGUMENTS and any(
         item.rule.name in _ABOUT_SIGNATURES
@@ -97,18 +97,22 @@ def _follows(
         for item in reported
     ):
         return True
-    rule = RULE_OF[problem.family].code
-    return any(
-        problem.span.overlaps(item.primary)
-        or (item.rule.code == rule and problem.span.is_on_line_of(item.primary))
-        for item in reported
-    )
+    return any(_has_reported(item, problem) for item in reported)
+
+
+def _has_reported(item: Diagnostic, problem: Problem) -> bool:
+    """Return whether a rule has reported the same place, or the end of the same function."""
+    if not problem.span.is_on_line_of(item.primary):
+        return False
+    is_end = problem.family is Family.RETURN and item.rule is RULE_OF[Family.RETURN]
+    start = problem.span.column - item.primary.column
+    return is_end or 0 <= start < item.primary.length
 
 
 def _is_meant(problem: Problem, context: Context, reported: Sequence[Diagnostic]) -> bool:
-    """Return whether a name is missing because of a wrong import or signature."""
+    """Return whether a problem is there because of a wrong import or signature."""
     file, name = problem.span.file.path, problem.span.text
-    if (file, name) in names_meant(context):
+    if problem.family is Family.NAME and (file, name) in names_meant(context):
         return True
     return any(
         item.rule.name in _ABOUT_SIGNATURES

@@ -113,7 +113,7 @@ MISTAKES = [
     (
         "init",
         "self.create_service(SetBool, 'x', lambda request: None)",
-        "handler-signature",
+        "call-arguments",
         "lambda request: None",
     ),
     (
@@ -125,8 +125,8 @@ MISTAKES = [
     (
         "init",
         "self.create_subscription(String, 'x', self.count_up, 10)",
-        "handler-signature",
-        "count_up",
+        "call-arguments",
+        "self.count_up",
     ),
     ("init", "ActionServer(self, Fibonacci, 'x')", "call-arguments", "(self, Fibonacci, 'x')"),
     ("init", "QoSProfile(reliability=ReliabilityPolicy.BEST)", "missing-attribute", "BEST"),
@@ -153,7 +153,7 @@ MISTAKES = [
     ),
     ("goal", "goal_handle.request.size", "unknown-field", "size"),
     ("goal", "goal_handle.cancel()", "missing-attribute", "cancel"),
-    ("activate", "return True", "missing-return", "on_activate"),
+    ("activate", "return True", "missing-return", "True"),
     ("activate", "super().on_activate()", "call-arguments", "()"),
     ("tick", "self.stop.call_async(SetBool())", "call-arguments", "SetBool()"),
     (
@@ -165,8 +165,8 @@ MISTAKES = [
     (
         "tick",
         "self.stop.call_async(SetBool.Request()).add_done_callback(self.count_up)",
-        "handler-signature",
-        "count_up",
+        "call-arguments",
+        "self.count_up",
     ),
     (
         "tick",

@@ -136,7 +136,7 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
     "a module that a package of the project lacks": (
         {
             "system.yaml": HELPER,
-            "code.py": CODE % "drive.controller",
+            "code.py": CODE % "drive.contrl",
             "drive/__init__.py": "",
             "drive/control.py": "def step(): ...\n",
         },
