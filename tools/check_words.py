@@ -34,6 +34,7 @@ EXCLUDED = (
     "*.png",
     "*.svg",
     "*.xml",
+    "tests/corpus/code/*",
     "*node_modules*",
     "LICENSE",
     "tools/banned_words.txt",

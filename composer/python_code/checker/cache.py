@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
@@ -21,7 +22,7 @@ _MAXIMUM_BYTES = 4_000_000
 def entry_of(files: Mapping[str, str], options: Iterable[str]) -> Path:
     """Return the file that keeps what the checker says about files, with the given options."""
     home = os.environ.get("XDG_CACHE_HOME", "")
-    folder = Path(home) if Path(home).is_absolute() else Path.home() / ".cache"
+    folder = Path(home) if Path(home).is_absolute() else _home() / ".cache"
     digest = sha256()
     for part in (*options, *(text for name in sorted(files) for text in (name, files[name]))):
         digest.update(part.encode(errors="surrogatepass") + b"\0")
@@ -49,6 +50,13 @@ def keep_entry(entry: Path, found: list[dict[str, Any]]) -> None:
         written = entry.with_suffix(f".{os.getpid()}")
         written.write_text(json.dumps(found), encoding="utf-8")
         written.replace(entry)
+
+
+def _home() -> Path:
+    try:
+        return Path.home()
+    except RuntimeError:  # a user of a container who is not in /etc/passwd
+        return Path(tempfile.gettempdir())
 
 
 def _remove_oldest(folder: Path) -> None:

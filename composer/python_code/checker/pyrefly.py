@@ -33,7 +33,7 @@ _IGNORED = (
 )
 #: Kinds that are off by default and point to mistakes.
 _REPORTED = ("incompatible-comparison", "invalid-format-spec", "unreachable-except-clause")
-_WALL_S = 60.0
+TIME_LIMIT_S = 60.0
 #: The files that the checker writes.
 _OUTPUTS = ("output.json", "errors.txt")
 _LIMITS = {
@@ -79,15 +79,16 @@ class Check:
         if self._process is None or self._folder is None:
             raise CheckerFailed("it was not started")
         try:
-            self._process.wait(timeout=_WALL_S)
+            self._process.wait(timeout=TIME_LIMIT_S)
         except subprocess.TimeoutExpired:
-            raise CheckerFailed(f"it took longer than {_WALL_S:.0f} s") from None
+            raise CheckerFailed(f"it took longer than {TIME_LIMIT_S:.0f} s") from None
         finally:
             output, errors = (_read(Path(self._folder.name, name)) for name in _OUTPUTS)
             self.close()
         found = _parsed(output, errors, self._process.returncode)
+        findings = _findings(found)
         keep_entry(self._entry, found)
-        return _findings(found)
+        return findings
 
     def close(self) -> None:
         """End the process and remove its files."""
@@ -146,8 +147,8 @@ def _start(command: list[str], root: Path, files: Mapping[str, str]) -> subproce
 
 def _program() -> str:
     """Return the program that was installed with this Python."""
-    beside = Path(sys.executable).with_name("pyrefly")
-    found = str(beside) if beside.is_file() else shutil.which("pyrefly", path=os.defpath)
+    installed = Path(sys.executable).with_name("pyrefly")
+    found = str(installed) if installed.is_file() else shutil.which("pyrefly", path=os.defpath)
     if found is None:
         raise CheckerFailed("pyrefly is not installed: 'pip install pyrefly'")
     return found
@@ -204,7 +205,7 @@ def _parsed(output: bytes, errors: bytes, code: int) -> list[dict[str, Any]]:
         raise CheckerFailed(f"it was ended by {signal.Signals(-code).name}")
     try:
         found: list[dict[str, Any]] = json.loads(output)["errors"]
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         lines = errors.decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
         raise CheckerFailed(f"it failed: {lines[-1][:200]}") from None
     return found

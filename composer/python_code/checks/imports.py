@@ -227,7 +227,7 @@ class _Imports:
     ) -> Problem:
         """Return the problem of a part of an import, which begins with a text.
 
-        It is no error in a file that searches for modules itself.
+        It is not an error in a file that searches for modules itself.
         """
         family, hint = missing.family, missing.hint
         nodes = walk(self.module.tree.body)

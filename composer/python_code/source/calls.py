@@ -56,7 +56,7 @@ def read_body(function: Function, names: Mapping[str, str], source: SourceFile) 
         is_inside = is_inside or isinstance(node, SCOPES)
         pending += [(child, is_inside) for child in [*ast.iter_child_nodes(node)][::-1]]
     names = {**names, **full_names(imports_in(deferred))}
-    # A name that is assigned twice is ambiguous, so it is no alias.
+    # A name that is assigned twice is ambiguous, so it is not an alias.
     aliases = {
         name: values[0]
         for name, values in bindings(function).items()

@@ -1,6 +1,6 @@
 """Stubs of message, service and action packages.
 
-A field accepts more than it gives back: a list of numbers may be assigned where an ``array.array``
+A field accepts more than it returns: a list of numbers may be assigned where an ``array.array``
 is read. So such a field is a property whose setter has a wider type. A float field refuses ints,
 as ROS sends garbage for them (``Float64(data=3)`` arrives as 5e-324).
 """

@@ -35,7 +35,7 @@ INTERNAL_IMPORT = warning(
         "Only composer.behavior and composer.typed are an API: other modules change without "
         "notice, and may not work outside the process that they were written for."
     ),
-    bad=on_tick("print(join('a', 'b'))", head="from composer.names import join"),
+    bad=on_tick("print(join(self.name, self.name))", head="from composer.names import join"),
     good=on_tick("print(self.name)"),
 )
 UNDEFINED_NAME = warning(

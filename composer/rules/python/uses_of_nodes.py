@@ -18,7 +18,7 @@ _UNSET = (
     "    def on_tick(self):\n"
 )
 _EARLY = (
-    "class Counter:\n    def %s(self):\n        self.log.info('created')\n\n"
+    "class Counter:\n    def %s(self):\n        self.log.info(self.name)\n\n"
     "    def on_tick(self):\n        pass\n"
 )
 _READING = rclpy_class(

@@ -31,7 +31,7 @@ PASSED_ON: dict[str, Any] = {
     "LifecycleNodeMixin.create_lifecycle_publisher": rclpy.node.Node.create_publisher,
     "ActionClient.send_goal": rclpy.action.client.ActionClient.send_goal_async,
 }
-#: Services that a node has; nobody imports from these modules what they import themselves.
+#: Services of every node: a node creates them, and users do not import them.
 INTERNAL = {f"rclpy.{name}_service" for name in ("logging", "parameter", "type_description")} | {
     "rclpy.time_source",
     "rclpy.impl.implementation_singleton",

@@ -55,7 +55,7 @@ FAIL = [
     ("from std_srvs.msg import Trigger", "Trigger", "import it from 'std_srvs.srv'"),
     ("import geometry_msg.msg", "geometry_msg", "did you mean 'geometry_msgs'?"),
     ("from composer.behavior import CallCanceled", "CallCanceled", "did you mean 'CallCancelled'?"),
-    ("from composer.behaviour import Goal", "behaviour", "did you mean 'behavior'?"),
+    ("from composer.behavor import Goal", "behavor", "did you mean 'behavior'?"),
 ]  # fmt: skip
 
 

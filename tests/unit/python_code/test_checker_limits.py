@@ -1,0 +1,65 @@
+"""A type checker that crashes, prints rubbish or never ends costs a note, never the run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from composer.diagnostics import Severity
+from composer.python_code.checker import pyrefly
+from tests.unit.support.checking import diagnostics_in
+
+SYSTEM = """\
+system: demo
+nodes:
+  counter: {behavior: "code:Counter", timers: {tick: {rate_hz: 1}}}
+"""
+CODE = """\
+class Counter:
+    def on_tick(self):
+        self.log.inform("%s")
+"""
+BAD_CHECKERS = {
+    "crashes": ("os.kill(os.getpid(), signal.SIGSEGV)", "it was ended by SIGSEGV"),
+    "fails": ("sys.exit('out of luck')", "it failed: out of luck"),
+    "prints half of it": ("print('{')", "it failed: exit code 0"),
+    "prints another form": ("print('{\"errors\": [{}]}')", "its output has an unknown form"),
+    "prints deep JSON": ("print('{\"errors\":' + '[' * 100_000)", "it failed: exit code 0"),
+    "never ends": ("time.sleep(600)", "it took longer than 2 s"),
+    "wants memory": ("time.sleep(0.2); bytearray(3_000_000_000)", "it failed: MemoryError"),
+    "fills the disk": (
+        "signal.signal(signal.SIGXFSZ, signal.SIG_DFL); time.sleep(0.2);"
+        "os.write(1, b'x' * 16_000_000); os.write(1, b'x')",
+        "it was ended by SIGXFSZ",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD_CHECKERS)
+def test_checker_that_fails_is_a_note(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, reason = BAD_CHECKERS[name]
+    program = tmp_path / "bin" / "pyrefly"
+    program.parent.mkdir()
+    program.write_text(f"#!{sys.executable}\nimport os, signal, sys, time\n{code}\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
+    monkeypatch.setattr(pyrefly, "TIME_LIMIT_S", 2.0)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "code.py").write_text(CODE % name)
+    found = diagnostics_in(SYSTEM, tmp_path)
+    assert [(item.rule.name, item.severity) for item in found] == [("not-checked", Severity.INFO)]
+    assert reason in found[0].message
+
+
+def test_project_without_the_checker_is_checked_by_the_rules(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "code.py").write_text("class Counter:\n    def on_tik(self):\n        pass\n")
+    found = [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)]
+    assert sorted(found) == ["missing-handler", "not-checked"]
