@@ -55,7 +55,10 @@ _KNOWN_PACKAGE = r"`rclpy\."
 _BUILTINS = frozenset(
     {"Enum", "bool", "bytes", "dict", "float", "int", "list", "object", "set", "str", "tuple"}
 )
-_GIVEN = r"Argument `(?P<given>.+?)` is not assignable to parameter"
+_GIVEN = (
+    r"Argument `(?P<given>.+?)` is not assignable to parameter"
+    r"(?: `\w+`)?(?: with type `(?P<expected>[^`]*)`)?"
+)
 _OWNER = r"(?:Object of class|Class) `(?P<owner>[\w.@]+)` has no (?:class )?attribute"
 
 
@@ -122,7 +125,7 @@ class Relevance:
             return self._keeps_attribute(message, node)
         given = re.search(_GIVEN, message) if kind == "bad-argument-type" else None
         is_ros = re.search(_ROS, message) is not None
-        if given is not None and self._is_loose(given["given"], node, is_ros=is_ros):
+        if given is not None and self._is_loose(given, node, is_ros=is_ros):
             return False
         if not self.is_class or kind in _CERTAIN_KINDS or kind == "bad-assignment":
             return True
@@ -171,10 +174,12 @@ class Relevance:
         imported = self.code.module.imports.get(name)
         return name in self.messages and (imported is None or imported.module.endswith(".msg"))
 
-    def _is_loose(self, given: str, node: ast.expr | None, *, is_ros: bool) -> bool:
+    def _is_loose(self, match: re.Match[str], node: ast.expr | None, *, is_ros: bool) -> bool:
         """Return whether the value of an argument may have the right type after all."""
-        if given.startswith("("):  # a function, which may be annotated loosely
-            return not is_ros
+        given, expected = match["given"], match["expected"] or ""
+        if given.startswith("(") and (is_ros or expected.startswith("(")):
+            # Annotations of functions are often loose, the number of arguments never is.
+            return not is_ros and _arity(given) in (_arity(expected), None)
         if self.is_class and "Unknown" in given:
             return True
         members = [item for item in given.split(" | ") if item not in ("Any", "Unknown")]
@@ -197,6 +202,18 @@ class Relevance:
             if f"self.{function.name}" not in self.code.passed_on  # rclpy decides about callbacks
             for argument in arguments_of(function)
         )
+
+
+def _arity(function: str) -> int | None:
+    """Return how many arguments a function takes: 2 for ``(int, list[int]) -> int``."""
+    depth, count = 0, 0
+    inside = function[1 : function.find(") -> ")]
+    if re.search(r"[=*]|\.\.\.", inside):
+        return None
+    for letter in inside:
+        depth += (letter in "([") - (letter in ")]")
+        count += letter == "," and depth == 0
+    return count + bool(inside)
 
 
 _STARTS = frozenset({"__init__", "on_configure", "on_activate"})

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ast
-import dis
 import importlib
 import inspect
 import sys
-from itertools import pairwise
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 import pytest
@@ -77,13 +76,21 @@ def find(name: str) -> Any:
 
 
 def attributes(cls: type) -> set[str]:
-    """What the class itself has, with what its methods set: `self.x = ...`."""
-    functions = filter(inspect.isfunction, vars(cls).values())
-    pairs = (pair for function in functions for pair in pairwise(dis.get_instructions(function)))
+    """What the class itself has, with what its methods set: `self.x = ...`.
+
+    The source is read, since hosted nodes replace some methods of a process.
+    """
+    try:
+        [own] = ast.parse(dedent(inspect.getsource(cls))).body
+    except (OSError, TypeError):  # compiled
+        own = ast.Pass()
     stored = {
-        str(item.argval)
-        for before, item in pairs
-        if item.opname == "STORE_ATTR" and before.argval == "self"
+        item.attr
+        for function in getattr(own, "body", ())
+        if isinstance(function, ast.FunctionDef)
+        for item in ast.walk(function)
+        if isinstance(item, ast.Attribute) and isinstance(item.ctx, ast.Store)
+        if isinstance(item.value, ast.Name) and item.value.id == "self"
     }
     return stored | set(vars(cls)) | set(cls.__annotations__)
 
