@@ -55,7 +55,7 @@ def keep_entry(entry: Path, found: list[dict[str, Any]]) -> None:
 def _home() -> Path:
     try:
         return Path.home()
-    except RuntimeError:  # a user of a container who is not in /etc/passwd
+    except RuntimeError:  # in a container, users may be missing in /etc/passwd
         return Path(tempfile.gettempdir())
 
 
