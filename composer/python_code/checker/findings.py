@@ -221,7 +221,9 @@ class _Reader:
             return None  # most objects take any attribute
         if not is_own:
             self.about.append(f"type {named}")
-        names = _members(self.code, named) if is_own else ()
+        names = _members(self.code, named) if is_own else set[str]()
+        if is_own and not self._is_class:
+            names |= {item.removeprefix("self.") for item in self.owners.attributes}
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
         return self._made(Family.ATTRIBUTE, f"'{named}' has no attribute '{name}'", hint)
 
@@ -433,9 +435,10 @@ def _part_hint(expected: str, given: str) -> str | None:
 
 
 def _members(code: CodeIndex, class_name: str) -> set[str]:
-    """Return the methods of a class and the attributes that it uses."""
+    """Return the methods of a class and the attributes of its own that it uses."""
     for node in code.classes:
         if node.name == class_name:
-            names = {item.attr for item in ast.walk(node) if isinstance(item, ast.Attribute)}
+            used = [item for item in ast.walk(node) if isinstance(item, ast.Attribute)]
+            names = {item.attr for item in used if dotted(item) == f"self.{item.attr}"}
             return names | {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
     return set()
