@@ -156,7 +156,7 @@ def test_the_hint_about_an_unknown_type_is_short(tmp_path: Path, package: str) -
 
 @pytest.mark.parametrize(("wrong", "meant"), [("publisherz", "publishers"), ("lgo", "log")])
 def test_a_misspelt_attribute_of_a_behavior(tmp_path: Path, wrong: str, meant: str) -> None:
-    code = "class Counter:\n    def on_tick(self):\n        self.log.info('x')\n        self.%s.x.y()\n"
+    code = "class Counter:\n    def on_tick(self):\n        self.log.info('x'); self.%s.x.y()\n"
     (tmp_path / "code.py").write_text(code % wrong)
     text = 'system: x\nnodes: {n: {behavior: "code:Counter", timers: {tick: {rate_hz: 1}}}}\n'
     [found] = [item for item in diagnostics_in(text, tmp_path) if item.rule.name[:7] == "missing"]
