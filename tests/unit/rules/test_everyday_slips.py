@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from tests.unit.support.checking import quoted
@@ -149,12 +150,15 @@ def _code(statement: str) -> str:
 
 
 def test_a_slip_is_reported_once(tmp_path: Path) -> None:
-    results = diagnostics_of(SYSTEM, [_code(statement) for statement, _ in MISTAKES], tmp_path)
+    # What an array of numpy returns is known only where numpy is installed.
+    has_numpy = find_spec("numpy") is not None
+    mistakes = [case for case in MISTAKES if has_numpy or "covariance" not in case[0]]
+    results = diagnostics_of(SYSTEM, [_code(statement) for statement, _ in mistakes], tmp_path)
     reported = [
         (statement, *map(quoted, found))
-        for (statement, _), found in zip(MISTAKES, results, strict=True)
+        for (statement, _), found in zip(mistakes, results, strict=True)
     ]
-    assert reported == MISTAKES
+    assert reported == mistakes
 
 
 def test_right_code_is_not_reported(tmp_path: Path) -> None:
