@@ -38,8 +38,8 @@ FILES = sorted(Path(__file__).parent.glob("*.yaml"))
 MORE = sorted((Path(__file__).parent / "more").glob("*.yaml"))
 CODE = sorted((Path(__file__).parent / "code").glob("*.yaml"))
 MIN_FOUND, MIN_RIGHT, MAX_REPORTS = 0.97, 0.98, 1.1
-#: Found, reports each, and the right place, of the files in ``more``: what was measured, below the target for some.
-#: They may not get worse. Most mistakes not found are in Python code.
+#: Found, reports each, and the right place, of the files in ``more``: what was measured, below
+#: the target for some. They may not get worse. Most mistakes not found are in Python code.
 MEASURED = {
     "site": (0.99, 1.03, MIN_RIGHT),
     "code": (0.93, 1.10, 0.975),
@@ -47,8 +47,8 @@ MEASURED = {
     "swarms": (0.99, 1.13, MIN_RIGHT),
     "vehicles": (0.972, 1.12, MIN_RIGHT),
 }
-#: The same of the files in ``code``. The author of "machines"
-#: names as the right place where a wrong value comes from; most are reported where it is used.
+#: The same of the files in ``code``. The author of "machines" names as the right place where a
+#: wrong value comes from; most are reported where it is used.
 MEASURED_CODE = {
     "robots": (0.95, 1.04, 0.98),
     "vehicles": (0.91, 1.04, 0.98),
