@@ -138,10 +138,12 @@ def _policy(scope: Scope, name: str, node: ast.expr) -> object:
 
 def _duration_ms(scope: Scope, node: ast.expr) -> float:
     value = scope.followed(node)
-    if isinstance(value, ast.Call) and scope.full_name(value.func) == "rclpy.duration.Duration":
-        given = {item.arg: scope.literal(item.value) for item in value.keywords if item.arg}
-        numbers = [given.get(name, 0) for name in ("seconds", "nanoseconds")]
-        if not value.args and all(isinstance(item, int | float) for item in numbers):
-            seconds, nanoseconds = numbers
-            return float(seconds) * 1e3 + float(nanoseconds) * 1e-6  # type: ignore[arg-type]
-    raise NotLiteral(node)
+    if not isinstance(value, ast.Call) or value.args:
+        raise NotLiteral(node)
+    if scope.full_name(value.func) != "rclpy.duration.Duration":
+        raise NotLiteral(node)
+    given = {item.arg: scope.literal(item.value) for item in value.keywords if item.arg}
+    seconds, nanoseconds = (given.get(name, 0) for name in ("seconds", "nanoseconds"))
+    if not (isinstance(seconds, int | float) and isinstance(nanoseconds, int | float)):
+        raise NotLiteral(node)
+    return float(seconds) * 1e3 + float(nanoseconds) * 1e-6

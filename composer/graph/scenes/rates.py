@@ -72,10 +72,10 @@ def _names(method: Method) -> frozenset[str]:
 
 def _unconditional(method: Method) -> Iterator[str]:
     """Yield the ports that unconditional statements publish to, up to the first possible exit."""
-    names = {call.node: call.name for call in method.calls}
+    names: dict[ast.expr, str] = {call.node: call.name for call in method.calls}
     for statement in method.node.body if method.node is not None else ():
         if isinstance(statement, ast.Expr):
-            port = published_port(names.get(statement.value, ""))  # type: ignore[call-overload]
+            port = published_port(names.get(statement.value, ""))
             if port is not None:
                 yield port
         elif any(isinstance(inner, _EXITS) for inner in ast.walk(statement)):

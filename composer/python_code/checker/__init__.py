@@ -56,11 +56,11 @@ class RunningCheck:
         self, files: FileSet, copies: Mapping[str, CheckedFile], error: CheckerFailed
     ) -> None:
         """Report once that the checker does not work, and what is wrong without it."""
-        for item in copies.values() if not self.found else ():
+        if copies and not self.found:
+            item = next(iter(copies.values()))
             message = f"the type checker did not check the Python code: {error}"
             problem = Problem(Family.NOT_CHECKED, message, Span(item.copy.module.source, 1, 1))
             self.found.append((item.node, item.source, problem))
-            break
         self._add_broken(files, files.broken)
 
     def _add_broken(self, files: FileSet, refused: Container[str]) -> None:
@@ -97,7 +97,7 @@ class RunningCheck:
 
 
 def start(classes: Sequence[tuple[Node, BehaviorSource]], interfaces: Interfaces) -> RunningCheck:
-    """Start to check the classes of nodes; ``result`` waits for the findings."""
+    """Start to check the classes of nodes; ``problems`` waits for what they find."""
     check = RunningCheck(interfaces, file_sets(classes, interfaces)[:_MAXIMUM])
     check.fill()
     return check

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator, Mapping
 
 from composer.python_code.source import Module
-from composer.python_code.source.trees import argument, dotted
+from composer.python_code.source.trees import argument, called_name, dotted, last_name
 from composer.python_code.stubs.behaviors import Signature
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
@@ -51,7 +51,7 @@ def callback_signatures(node: ast.ClassDef, module: Module) -> dict[str, Signatu
 def _of_call(
     call: ast.Call, module: Module, clients: Mapping[str, str], futures: Mapping[str, str]
 ) -> Iterator[tuple[str, Signature]]:
-    match _last(call.func):
+    match called_name(call):
         case "create_subscription":
             type_ = _type(argument(call, 0, "msg_type"), module)
             yield from _bound(argument(call, 2, "callback"), type_, (("message", "{0}"),))
@@ -73,7 +73,7 @@ def _of_call(
             receiver = call.func.value
             made = futures.get(dotted(receiver), "")
             if isinstance(receiver, ast.Call):
-                made = _last(receiver.func)
+                made = last_name(receiver.func)
             future = (("future", _FUTURES.get(made, "")),)
             yield from _bound(argument(call, 0, "callback"), clients.get(made, ""), future)
 
@@ -86,7 +86,7 @@ def _bound(
     Arguments that ``partial(self.method, ...)`` adds have no known type, "".
     """
     before: tuple[tuple[str, str], ...] = ()
-    if isinstance(callback, ast.Call) and _last(callback.func) == "partial" and callback.args:
+    if isinstance(callback, ast.Call) and last_name(callback.func) == "partial" and callback.args:
         before = (("", ""),) * (len(callback.args) - 1)
         callback = callback.args[0]
     name = dotted(callback) if callback is not None else ""
@@ -101,22 +101,18 @@ def _futures(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
     for item in ast.walk(node):
         match item:
             case ast.Assign(targets=[target], value=ast.Call(func=function)):
-                if _last(function) in _FUTURES:
-                    yield dotted(target), _last(function)
+                if last_name(function) in _FUTURES:
+                    yield dotted(target), last_name(function)
 
 
 def _named(name: str, calls: list[ast.Call]) -> Iterator[ast.Call]:
-    yield from (call for call in calls if _last(call.func) == name)
+    yield from (call for call in calls if called_name(call) == name)
 
 
 def _only(types: Iterable[str]) -> str:
     """Return the type if there is one only, else ""."""
     found = {*types}
     return found.pop() if len(found) == 1 else ""
-
-
-def _last(node: ast.expr) -> str:
-    return str(getattr(node, "attr", getattr(node, "id", "")))
 
 
 def _type(node: ast.expr | None, module: Module) -> str:

@@ -6,11 +6,10 @@ import ast
 from collections import defaultdict
 from collections.abc import Iterator
 
-from composer.python_code.source import Module
-from composer.python_code.source.trees import catches, dotted, span_of
+from composer.python_code.source import Function, Module
+from composer.python_code.source.trees import catches, dotted, positional_arguments, span_of
 from composer.source import Span
 
-Function = ast.FunctionDef | ast.AsyncFunctionDef
 #: What code raises that uses a value of a wrong type.
 _ERRORS = frozenset({"AttributeError", "NameError", "TypeError"})
 
@@ -127,8 +126,7 @@ class CodeIndex:
 
 def arguments_of(function: Function) -> list[ast.arg]:
     """Return the arguments of a function that have a name."""
-    given = function.args
-    return [*given.posonlyargs, *given.args, *given.kwonlyargs]
+    return [*positional_arguments(function), *function.args.kwonlyargs]
 
 
 def _holds(node: ast.stmt, line: int) -> bool:

@@ -14,8 +14,9 @@ from typing import TypeGuard
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.source import Function, Module
-from composer.python_code.source.trees import characters, dotted, is_none
+from composer.python_code.source.trees import characters, dotted, is_none, positional_arguments
 from composer.python_code.stubs.behaviors import Signature
+from composer.python_code.stubs.messages import interface_modules
 
 #: The line that a copy gets, so that annotations can name what they need.
 _IMPORTS = "import composer.behavior, composer.typed, rclpy.action, rclpy.task, typing"
@@ -69,7 +70,8 @@ def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior
             signature = signatures.get(method.name)
             if signature is not None and method.node is not None:
                 edits.annotate(method.node, signature)
-                names.update(_interface_modules(signature))
+                types = [signature.result, *(type_ for _, type_ in signature.arguments)]
+                names.update(interface_modules(" ".join(types)))
     imports = ", ".join((_IMPORTS, *sorted(names)))
     edits.added.append((_lines_of_head(module.tree), imports))
     lines, columns = edits.apply()
@@ -136,7 +138,7 @@ class _Edits:
 
     def annotate(self, function: Function, signature: Signature) -> None:
         """Annotate the arguments of a method, and its result."""
-        arguments = [*function.args.posonlyargs, *function.args.args]
+        arguments = positional_arguments(function)
         if not any(_is_static(decorator) for decorator in function.decorator_list):
             arguments = arguments[1:]
         without_default = len(arguments) - len(function.args.defaults)
@@ -181,15 +183,6 @@ def _is_unset(statement: ast.stmt, attributes: Container[str]) -> TypeGuard[ast.
             is_one_line = statement.end_lineno == statement.lineno
             return is_one_line and dotted(target) in attributes
     return False
-
-
-def _interface_modules(signature: Signature) -> Iterator[str]:
-    """Yield the modules that the types of a signature name: ``geometry_msgs.msg``."""
-    for _, type_ in (*signature.arguments, ("", signature.result)):
-        for name in type_.replace("[", " ").replace("]", " ").replace(",", " ").split():
-            parts = name.split(".")
-            if len(parts) > 2 and parts[1] in ("msg", "srv", "action"):
-                yield ".".join(parts[:2])
 
 
 def _type_arguments(annotation: ast.expr, type_: str) -> str:

@@ -18,12 +18,14 @@ from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.owners import Owners
-from composer.python_code.checker.project import LIBRARIES, CheckedFile
+from composer.python_code.checker.project import CheckedFile
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.checker.relevance import Relevance, unguarded_value
+from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource
 from composer.python_code.source.trees import dotted, span_of
+from composer.python_code.stubs.folder import LIBRARIES
 from composer.source import Span
 
 #: What the checker says about code that Python refuses to compile.
@@ -116,11 +118,12 @@ def _relevant(
         if checked is not None and not checked.copy.is_inserted(finding.line, finding.column):
             by_path.setdefault(finding.path, []).append((finding, _span(finding, checked)))
     codes = {path: CodeIndex(files[path].copy.module) for path in by_path}
+    attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
     for path, in_file in by_path.items():
         changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
         is_class = files[path].node.behavior is None
         relevance = Relevance.of(
-            codes[path], changed, codes.values(), owners.messages, is_class=is_class
+            codes[path], changed, attributes, owners.messages, is_class=is_class
         )
         for finding, span in in_file:
             if relevance.keeps(finding, span):
@@ -349,7 +352,7 @@ class _Reader:
         self.about.append(f"name {name}")
         if name in sys.stdlib_module_names:
             hint = f"add 'import {name}'"
-        elif name in self.owners.api_names:
+        elif name in API_CLASSES:
             hint = f"add 'from composer.behavior import {name}'"
         else:
             module = self.checked.copy.module

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import inspect
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 from functools import cached_property
@@ -15,6 +14,7 @@ from composer.interfaces import Interfaces, Message
 from composer.interfaces.definitions import parts
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
+from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family
 from composer.python_code.source import Module
 from composer.python_code.source.trees import dotted
@@ -71,10 +71,9 @@ class Owners:
         full = self._full_name(name, module)
         if full is not None:
             return self.message(full)
-        api = getattr(behavior, name, None) if with_api else None
-        if not (inspect.isclass(api) and api.__module__ == behavior.__name__):
+        if not with_api or name not in API_CLASSES:
             return None
-        names = tuple(item for item in dir(api) if not item.startswith("_"))
+        names = tuple(item for item in dir(getattr(behavior, name)) if not item.startswith("_"))
         return Owner(Family.PORT, f"{name} of composer.behavior", "attribute", names)
 
     def message(self, name: str) -> Owner | None:
@@ -121,12 +120,6 @@ class Owners:
         """The attributes that the composer sets, as code names them."""
         names = behavior.Behavior.__slots__
         return frozenset(f"self.{name}" for name in names if name[0] != "_")
-
-    @cached_property
-    def api_names(self) -> frozenset[str]:
-        """The classes that behaviors may import from ``composer.behavior``."""
-        classes = inspect.getmembers(behavior, inspect.isclass)
-        return frozenset(name for name, item in classes if item.__module__ == behavior.__name__)
 
     def _definition(self, name: str) -> Message | None:
         """Return a message by its full name, or the part ``package/srv/Name_Request``."""

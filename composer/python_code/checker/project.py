@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-from composer import behavior
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
@@ -24,13 +23,12 @@ from composer.python_code.stubs.behaviors import (
     behavior_module,
     signatures,
 )
+from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
 from composer.typed import SUFFIX
 
 _FILES = "files"
 _STUBS = "stubs"
-#: The stubs of libraries that come with the composer.
-LIBRARIES = Path(__file__).parent.parent / "stubs" / "libraries"
 #: What the API of behaviors uses, and the packages that the stubs of rclpy use.
 _API_MESSAGES = ("builtin_interfaces/msg/Time", "geometry_msgs/msg/TransformStamped")
 _RCLPY_PACKAGES = frozenset(
@@ -126,7 +124,7 @@ class FileSet:
         names.update(name for name in every if name.partition("/")[0] in packages)
         files = message_stubs(interfaces, sorted(names))
         files["composer/__init__.pyi"] = ""
-        files["composer/behavior.pyi"] = Path(behavior.__file__).read_text(encoding="utf-8")
+        files["composer/behavior.pyi"] = api_stub()
         files["composer/typed.pyi"] = behavior_module(
             self.behaviors, interfaces, sorted(typed - self.behaviors.keys())
         )

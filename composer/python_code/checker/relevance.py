@@ -81,7 +81,7 @@ class Relevance:
         cls,
         code: CodeIndex,
         changed_lines: Iterable[int],
-        others: Iterable[CodeIndex],
+        attributes: frozenset[str],
         messages: Container[str],
         *,
         is_class: bool,
@@ -90,8 +90,7 @@ class Relevance:
         targets = (dotted(x) for line in changed_lines for x, _ in code.assigned_at(line))
         names = (name.removeprefix("self.") for name in targets)
         reassigned = frozenset(name for name in names if name and "." not in name)
-        attributes = (name for other in (code, *others) for name in other.attributes_set())
-        return cls(code, is_class, reassigned, frozenset(attributes), messages)
+        return cls(code, is_class, reassigned, attributes, messages)
 
     def keeps(self, finding: Finding, span: Span) -> bool:
         """Return whether a finding points to a mistake."""

@@ -11,12 +11,11 @@ from composer.python_code.checks.scopes import Code, Scope
 from composer.python_code.nodes.behaviors import reached_methods
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import Method, published_port
-from composer.python_code.source.trees import argument, dotted, span_of, walk
+from composer.python_code.source.trees import SCOPES, argument, dotted, span_of, walk
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
 
 #: The attributes that the composer sets after the constructor.
 _SET_LATER = frozenset({"clock", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES})
-_DEFERRED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 #: Texts that show that a file may run an event loop of asyncio, such as in a thread.
 _RUNS_ASYNCIO = ("asyncio.run", "run_until_complete", "run_forever", "asyncio.Runner")
 
@@ -47,7 +46,7 @@ def _early_attributes(code: Code) -> Iterator[Problem]:
     constructor = code.source.method("__init__")
     names = _SET_LATER - code.assigned - {method.name for method in code.source.methods}
     for method in reached_methods(code.source, constructor) if constructor is not None else ():
-        nodes = list(walk(method.node.body if method.node else [], closed=_DEFERRED))
+        nodes = list(walk(method.node.body if method.node else [], closed=SCOPES))
         # A class may be used without the composer, and ask for what is there.
         if any(isinstance(x, ast.Try) or getattr(x, "id", "") == "hasattr" for x in nodes):
             continue

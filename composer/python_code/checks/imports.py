@@ -10,10 +10,11 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from composer import behavior
 from composer.diagnostics import suggestion
 from composer.interfaces import Interfaces
+from composer.interfaces.sources import FOLDERS
 from composer.project import Project
+from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import Module
 from composer.python_code.source.modules import (
@@ -29,12 +30,7 @@ from composer.source import shown_path
 from composer.spelling import edit_distance
 
 _API = "composer.behavior"
-_API_NAMES = frozenset({"Any", "Changes"}).union(
-    name
-    for name, item in vars(behavior).items()
-    if isinstance(item, type) and item.__module__ == _API
-)
-_INTERFACE_FOLDERS = frozenset({"action", "msg", "srv"})
+_API_NAMES = API_CLASSES | {"Any", "Changes"}
 #: Packages that users often import. They need not be installed where files are validated.
 _USUAL = frozenset(
     {"ament_index_python", "composer", "cv2", "cv_bridge", "launch", "launch_ros", "numpy"}
@@ -169,13 +165,13 @@ class _Imports:
             names = own.names if own is not None else frozenset()
             return _Contents(names | _USUAL | packages, is_closed=False)
         if own is not None and module in packages:
-            return _Contents(own.names | _INTERFACE_FOLDERS, is_closed=False)
-        if own is not None or package not in packages or folder not in ("", *_INTERFACE_FOLDERS):
+            return _Contents(own.names.union(FOLDERS), is_closed=False)
+        if own is not None or package not in packages or folder not in ("", *FOLDERS):
             return own
         prefix = f"{package}/{folder}/"
         listed = self.interfaces.names(folder) if folder else ()
         interfaces = {name.removeprefix(prefix) for name in listed if name.startswith(prefix)}
-        known = frozenset(interfaces) if folder else _INTERFACE_FOLDERS
+        known = frozenset(interfaces) if folder else frozenset(FOLDERS)
         return _Contents(known, is_closed=bool(folder))
 
     def _read_own(self, module: str) -> _Contents | None:
@@ -209,8 +205,8 @@ class _Imports:
         """Return the only module that has all these interfaces: in the same package, or any."""
         package, _, folder = module.partition(".")
         packages = self.interfaces.packages()
-        own = [f"{package}.{part}" for part in sorted(_INTERFACE_FOLDERS)]
-        others = [f"{other}.{folder}" for other in packages if folder in _INTERFACE_FOLDERS]
+        own = [f"{package}.{part}" for part in sorted(FOLDERS)]
+        others = [f"{other}.{folder}" for other in packages if folder in FOLDERS]
         for modules in (own, others) if package in packages else ():
             paths = {home: home.replace(".", "/") for home in modules}
             found = [

@@ -23,12 +23,10 @@ def message_problems(scope: Scope) -> Iterator[Problem]:
                         yield from _field_problems(scope.field(target), value, scope)
                     elif isinstance(target, ast.Subscript):
                         yield from _value_problems(value, scope.type(target), scope)
-            case ast.Call(func=function, keywords=keywords):
-                message = scope.message_class(function) if keywords else None
-                for keyword in keywords if message is not None else ():
-                    field = message.field(keyword.arg or "")  # type: ignore[union-attr]
-                    found = (message, field) if message and field else None
-                    yield from _field_problems(found, keyword.value, scope)
+            case ast.Call(func=function, keywords=[_, *_] as keywords):
+                message = scope.message_class(function)
+                if message is not None:
+                    yield from _keyword_problems(message, keywords, scope)
             case ast.Subscript(value=owner, slice=index):
                 yield from _index_problem(owner, index, scope)
             case ast.Compare(
@@ -38,6 +36,15 @@ def message_problems(scope: Scope) -> Iterator[Problem]:
             ):
                 yield from _comparison(left, getattr(right, "elts", [right]), scope)
                 yield from _comparison(right, [left], scope)
+
+
+def _keyword_problems(
+    message: Message, keywords: list[ast.keyword], scope: Scope
+) -> Iterator[Problem]:
+    for keyword in keywords:
+        field = message.field(keyword.arg or "")
+        if field is not None:
+            yield from _field_problems((message, field), keyword.value, scope)
 
 
 def _field_problems(

@@ -12,8 +12,14 @@ from composer.python_code.checks.scopes import Code, Scope
 from composer.python_code.nodes.behaviors import GENERAL_HANDLERS, handlers
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import Method
-from composer.python_code.source.flow import called_name, lacks_self, reaches_end, returns_nothing
-from composer.python_code.source.trees import argument, dotted, walk
+from composer.python_code.source.flow import lacks_self, reaches_end, returns_nothing
+from composer.python_code.source.trees import (
+    argument,
+    called_name,
+    dotted,
+    positional_arguments,
+    walk,
+)
 
 #: Methods of goals, ports and timers that have no meaning as plain attributes.
 _METHODS = frozenset(
@@ -71,7 +77,7 @@ def missing_self(code: Code) -> Iterator[Problem]:
     own = {id(class_) for _, class_ in code.source.own_classes} if is_behavior else set()
     for module in code.source.own_modules:
         lacking = [
-            (class_, method, method.node.args)
+            (class_, method, positional_arguments(method.node))
             for class_ in module.classes.values()
             for method in class_.methods
             if method.node is not None
@@ -82,7 +88,7 @@ def missing_self(code: Code) -> Iterator[Problem]:
         for class_, method, arguments in lacking:
             # What the class or its body uses is a plain function.
             if not named & {method.name, f"{class_.name}.{method.name}"}:
-                names = (item.arg for item in (*arguments.posonlyargs, *arguments.args))
+                names = (item.arg for item in arguments)
                 hint = f"write 'def {method.name}({', '.join(('self', *names))})'"
                 message = f"method '{method.name}' of '{class_.name}' lacks 'self'"
                 yield Problem(Family.SELF, message, method.span, hint, is_behavior)

@@ -12,8 +12,8 @@ from composer.python_code.nodes.class_interfaces import (
     passes_node_on,
 )
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import imported_from
 from composer.python_code.source.flow import returned_values, returns_nothing
+from composer.python_code.source.lookup import imported_from, is_of_rclpy
 from composer.python_code.source.trees import catches, dotted, span_of, walk
 
 #: The parameters that every node has.
@@ -122,7 +122,7 @@ def _missing_calls(code: Code) -> Iterator[Problem]:
     )
     for module, class_ in code.source.own_classes:
         origin = imported_from(module, class_.bases[0]) if len(class_.bases) == 1 else None
-        if origin is None or origin.module.partition(".")[0] != "rclpy":
+        if origin is None or not is_of_rclpy(origin):
             continue
         for method in class_.methods:
             transition = method.name.removeprefix("on_")

@@ -16,14 +16,14 @@ from typing import TypeAlias
 from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING, ValueType, fields_of
 from composer.interfaces import Field, FieldType, Interfaces, Message, parts
+from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource, Function, Method, Module
-from composer.python_code.source.trees import bindings, dotted, span_of, walk
+from composer.python_code.source.trees import bindings, dotted, positional_arguments, span_of, walk
 from composer.python_code.stubs.behaviors import signatures
 
-_FOLDERS = ("msg", "srv", "action")
 #: Maximum number of names and fields to follow.
 _MAXIMUM_STEPS = 16
 _MAXIMUM_BITS = 128
@@ -136,7 +136,7 @@ class Scope:
     def message_class(self, node: ast.expr | str) -> Message | None:
         """Return the message whose class an expression is."""
         names = self.full_name(node).split(".")
-        if len(names) not in (3, 4) or names[1] not in _FOLDERS:
+        if len(names) not in (3, 4) or names[1] not in FOLDERS:
             return None
         definition = self.code.interfaces.find("/".join(names[:3]))
         part = names[3].lower() if len(names) == 4 else "message"
@@ -172,6 +172,6 @@ class Scope:
     def _argument(self, name: str) -> ValueType:
         if self.function is None:
             return ANYTHING
-        given = (*self.function.args.posonlyargs, *self.function.args.args)
+        given = positional_arguments(self.function)
         annotation = next((item.annotation for item in given if item.arg == name), None)
         return self.message_class(annotation or self.passed.get(name, "")) or ANYTHING

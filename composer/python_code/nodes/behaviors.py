@@ -7,12 +7,19 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
+from composer import behavior
 from composer.fast_dataclass import dataclass
 from composer.model import Node, Port, PortKind, System
 from composer.python_code.source import BehaviorSource, Method, find_behavior
 from composer.resolve.tree_values import is_opaque
 from composer.source import Located
 
+#: The classes that behaviors may import from ``composer.behavior``.
+API_CLASSES = frozenset(
+    name
+    for name, item in vars(behavior).items()
+    if isinstance(item, type) and item.__module__ == behavior.__name__
+)
 #: A node that names a behavior, and the source of the behavior.
 NodeBehavior: TypeAlias = tuple[Node, BehaviorSource]
 

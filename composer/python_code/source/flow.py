@@ -5,7 +5,14 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 
-from composer.python_code.source.trees import SCOPES, Function, is_none, walk
+from composer.python_code.source.trees import (
+    SCOPES,
+    Function,
+    called_name,
+    is_none,
+    positional_arguments,
+    walk,
+)
 
 #: Functions of the standard library that do not return.
 EXITS = frozenset({"exit", "quit", "_exit", "abort"})
@@ -22,7 +29,7 @@ def lacks_self(function: Function, arguments: int | None = None) -> bool:
     """
     if function.decorator_list or function.name in _CLASS_METHODS:
         return False
-    positional = [item.arg for item in (*function.args.posonlyargs, *function.args.args)]
+    positional = [item.arg for item in positional_arguments(function)]
     if not positional:
         return function.args.vararg is None
     if positional[0] in _RECEIVERS or positional[0].startswith("_"):
@@ -61,13 +68,6 @@ def returns_nothing(function: Function) -> bool:
     if function.decorator_list or is_empty(function.body) or not reaches_end(function):
         return False
     return next(returned_values(function), None) is None
-
-
-def called_name(node: ast.AST) -> str:
-    """Return the last part of the name of the function that ``node`` calls, or ""."""
-    if not isinstance(node, ast.Call):
-        return ""
-    return str(getattr(node.func, "attr", getattr(node.func, "id", "")))
 
 
 def is_true(test: ast.expr) -> bool:

@@ -20,6 +20,7 @@ from composer.python_code.source.trees import (
     full_names,
     imports_in,
     name_span,
+    positional_arguments,
     span_of,
     walk,
 )
@@ -63,7 +64,7 @@ class Method:
         """Whether the signature is known: no decorator and no assignment hides it."""
         if self.node is None or not {*map(_plain_name, self.node.decorator_list)} <= _TRANSPARENT:
             return False
-        return self._is_static or bool(self.node.args.posonlyargs or self.node.args.args)
+        return self._is_static or bool(positional_arguments(self.node))
 
     @property
     def _is_static(self) -> bool:
@@ -75,7 +76,7 @@ class Method:
         """The positional arguments without ``self``."""
         if self.node is None:
             return ()
-        names = [item.arg for item in (*self.node.args.posonlyargs, *self.node.args.args)]
+        names = [item.arg for item in positional_arguments(self.node)]
         return tuple(names if self._is_static else names[1:])
 
     @property

@@ -73,6 +73,21 @@ def argument(call: ast.Call, position: int, name: str) -> ast.expr | None:
     return next((item.value for item in call.keywords if item.arg == name), None)
 
 
+def positional_arguments(function: Function) -> list[ast.arg]:
+    """Return the arguments of a function that may be passed by position, with ``self``."""
+    return [*function.args.posonlyargs, *function.args.args]
+
+
+def called_name(node: ast.AST) -> str:
+    """Return the last part of the name of the function that ``node`` calls, or ""."""
+    return last_name(node.func) if isinstance(node, ast.Call) else ""
+
+
+def last_name(node: ast.AST) -> str:
+    """Return the last part of a name, also of one that belongs to an expression; else ""."""
+    return str(getattr(node, "attr", getattr(node, "id", "")))
+
+
 def is_none(node: ast.expr | None) -> bool:
     """Return whether an expression is None as written."""
     return isinstance(node, ast.Constant) and node.value is None

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 from composer.fast_dataclass import dataclass
+from composer.interfaces.sources import FOLDERS
 from composer.python_code.source.syntax import Class, Module
 from composer.python_code.source.trees import Function, bindings, dotted, walk
 from composer.tree import Plain
@@ -15,7 +16,6 @@ T = TypeVar("T")
 
 _MAXIMUM_STEPS = 8
 _MAXIMUM_ITEMS = 1000
-_FOLDERS = ("msg", "srv", "action")
 
 
 class NotLiteral(Exception):
@@ -76,7 +76,7 @@ class Scope:
         Raises NotLiteral.
         """
         parts = self.full_name(self.followed(node)).split(".")
-        if len(parts) == 3 and parts[1] in _FOLDERS:
+        if len(parts) == 3 and parts[1] in FOLDERS:
             return "/".join(parts)
         raise NotLiteral(node)
 

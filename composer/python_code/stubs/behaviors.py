@@ -9,7 +9,7 @@ from keyword import iskeyword
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node, Parameter, Port, PortKind
-from composer.python_code.stubs.messages import python_name
+from composer.python_code.stubs.messages import interface_modules, python_name
 from composer.typed import SUFFIX
 
 #: The types of parameters in Python.
@@ -85,13 +85,12 @@ def behavior_module(
     """
     lines = [line for name, node in classes.items() for line in _class(name, node, interfaces)]
     lines += (f"class {name}(composer.behavior.Behavior): ..." for name in others)
-    used = sorted(set(re.findall(r"\b([a-z]\w*\.(?:msg|srv|action))\.[A-Z]", "\n".join(lines))))
     head = [
         "from collections.abc import Awaitable",
         "from typing import Any, Literal, overload",
         "",
         "import composer.behavior",
-        *(f"import {module}" for module in used),
+        *(f"import {module}" for module in interface_modules("\n".join(lines))),
         "",
     ]
     return "\n".join((*head, *lines, ""))

@@ -138,10 +138,15 @@ def python_name(interface: str) -> str:
     return interface.replace("/", ".")
 
 
+def interface_modules(text: str) -> list[str]:
+    """Return the modules of the interfaces that types in a text name: ``geometry_msgs.msg``."""
+    return sorted({*re.findall(r"(?<![\w.])([a-z]\w*\.(?:msg|srv|action))\.[A-Z]", text)})
+
+
 def _module(text: str) -> str:
     """Return the text of ``package/msg.pyi`` or of one like it."""
-    used = sorted(set(re.findall(r"\b([a-z]\w*\.msg)\.[A-Z]", text)))
-    return "\n".join((*_HEAD, *(f"import {module}" for module in used), "", text, ""))
+    imports = (f"import {module}" for module in interface_modules(text))
+    return "\n".join((*_HEAD, *imports, "", text, ""))
 
 
 def _text(name: str, definition: Interface) -> str:

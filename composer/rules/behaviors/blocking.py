@@ -17,8 +17,8 @@ from composer.python_code.nodes.behaviors import (
     reached_methods,
 )
 from composer.python_code.source import BehaviorSource, Call, Function, Method
-from composer.python_code.source.flow import EXITS, called_name, is_empty, is_true
-from composer.python_code.source.trees import SCOPES, start_span, walk
+from composer.python_code.source.flow import EXITS, is_empty, is_true
+from composer.python_code.source.trees import SCOPES, called_name, start_span, walk
 from composer.rules.python.definitions import on_tick, warning
 from composer.source import Span
 
