@@ -113,7 +113,7 @@ def load_files(paths: Iterable[Path]) -> list[LoadResult]:
 
 @_without_cycle_collection()
 def load_models(paths: Iterable[Path]) -> list[LoadResult]:
-    """Load the files without checking them; ``diagnostics`` are those of reading them."""
+    """Load the files without checking them; ``diagnostics`` say what reading them found."""
     return [
         LoadResult(
             None if item.context is None else item.context.system,

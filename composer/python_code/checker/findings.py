@@ -1,7 +1,7 @@
 """What the type checker says, in our words: as problems with a family and a hint.
 
-The messages are those of the pinned version of the checker. One that is not understood is passed
-on in its own words.
+The patterns fit the messages of the pinned version of the checker. A message that fits none is
+passed on in its own words.
 """
 
 from __future__ import annotations

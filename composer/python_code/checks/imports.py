@@ -31,7 +31,7 @@ from composer.spelling import edit_distance
 
 _API = "composer.behavior"
 _API_NAMES = API_CLASSES | {"Any", "Changes"}
-#: Packages that users often import. They need not be installed where files are validated.
+#: Packages that users often import. Where files are validated, they may be missing.
 _USUAL = frozenset(
     {"ament_index_python", "composer", "cv2", "cv_bridge", "launch", "launch_ros", "numpy"}
     | {"message_filters", "rclpy", "sensor_msgs_py", "tf2_geometry_msgs", "tf2_py", "tf2_ros"}
@@ -69,7 +69,7 @@ def import_problems(
 ) -> Iterator[tuple[Problem, frozenset[str]]]:
     """Yield the problems of the imports in a file, each with the names that may be meant.
 
-    ``folder`` is that of the YAML file. Imports in an ``if``, a ``try`` or a ``with`` may fail, so
+    ``folder`` has the YAML file. Imports in an ``if``, a ``try`` or a ``with`` may fail, so
     they are left out. A missing module is only an error if its name is a typo: it may be installed
     or generated where the code runs.
     """

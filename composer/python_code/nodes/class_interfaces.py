@@ -78,7 +78,7 @@ def _pair(item: ast.expr) -> tuple[ast.expr | None, ast.expr | None]:
 
 
 def passes_node_on(source: BehaviorSource, harmless: frozenset[str] = _OF_ROS) -> bool:
-    """Return whether a class passes its object to other code than that of some packages."""
+    """Return whether a class passes its object to other code than some packages."""
     return any(_passes_on(scope, harmless) for scope in scopes_in(source.classes))
 
 

@@ -36,7 +36,7 @@ _PLAIN_MODULES = frozenset({"abc", "composer.behavior", "composer.typed", "typin
 
 @dataclass(frozen=True, slots=True)
 class BrokenModule:
-    """A file of the project that is not Python. The text is that of the span's file."""
+    """A file of the project that is not Python. The span's file has the text."""
 
     path: Path
     message: str

@@ -98,7 +98,7 @@ def stubs(
 
 
 def _project(paths: Sequence[Path]) -> Project:
-    """Return the project of all paths, by default that of the current folder."""
+    """Return the project of all paths, by default the project of the current folder."""
     from composer.project import Project
 
     folders = list(map(_folder, paths)) or [Path.cwd()]
