@@ -260,7 +260,14 @@ class TestClient:
         wait_until(lambda: seen == [0.0, 1.0, 2.0])
 
     def test_cancels(self, client: ActionClient) -> None:
-        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.1)))
+        """Once the goal runs: rclpy's server loses one that is canceled just before it executes."""
+        feedback = threading.Event()
+        handle = wait_for(
+            client.send_goal_async(
+                Navigate.Goal(max_velocity=0.1), feedback_callback=lambda _: feedback.set()
+            )
+        )
+        wait_until(feedback.is_set, "the goal runs")
         result = handle.get_result_async()
         assert len(wait_for(handle.cancel_goal_async()).goals_canceling) == 1
         assert wait_for(result).status == GoalStatus.STATUS_CANCELED

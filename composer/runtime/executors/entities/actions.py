@@ -137,7 +137,7 @@ class ActionSource:
             later = partial(self._execute, taken, 2 * retry_after_s)
             self._loop.call_later(retry_after_s, later)
             return
-        for future in self._waitable._futures:
+        for future in tuple(self._waitable._futures):  # other threads add to it
             future._set_executor(self._executor)
         self._loop.run_task(self._waitable.execute(taken))
 
