@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from html import escape
 from tempfile import NamedTemporaryFile
-from xml.sax.saxutils import escape
 
 from composer.runtime.middleware.dds_profiles import is_own_profile
 from composer.runtime.middleware.dds_xml import Profile, child, extend
