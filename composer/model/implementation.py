@@ -28,6 +28,11 @@ class ImplementationKind(StrEnum):
         """Whether the node runs in the process of the composer."""
         return self not in (ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
 
+    @property
+    def declares_everything(self) -> bool:
+        """Whether the node was written for the composer: it only has what it declares."""
+        return self in (ImplementationKind.BEHAVIOR, ImplementationKind.DECLARATIVE)
+
 
 class ExecutableKind(StrEnum):
     """When an executable has started successfully."""

@@ -125,6 +125,7 @@ class Node:
     hosted_class: HostedClass | None = None
     executable: Executable | None = None
     external: External | None = None  # takes precedence over the implementation of its type
+    only_declared: bool = False  # True: nothing undeclared is passed on
     parameters: tuple[Parameter, ...] = ()
     #: With the values of parameter files that the system replaces.
     overridden_parameters: tuple[Parameter, ...] = field(default=(), compare=False)
@@ -173,6 +174,11 @@ class Node:
         return ImplementationKind.DECLARATIVE
 
     @property
+    def gets_undeclared(self) -> bool:
+        """Whether parameters and remappings reach the node even if it does not declare them."""
+        return not (self.only_declared or self.implementation.declares_everything)
+
+    @property
     def full_name(self) -> str:
         """The full name of the node in ROS."""
         return join_node_name(self.namespace.value, self.ros_name.value)
@@ -189,8 +195,7 @@ class Node:
     @property
     def visible_ports(self) -> tuple[Port, ...]:
         """The same, as ROS tools see them: the manager listens to /tf for our own nodes."""
-        kinds = (ImplementationKind.BEHAVIOR, ImplementationKind.DECLARATIVE)
-        if self.transforms is None or self.implementation not in kinds:
+        if self.transforms is None or not self.implementation.declares_everything:
             return self.all_ports
         return self.ports + self.transforms.publishers
 

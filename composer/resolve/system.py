@@ -136,6 +136,7 @@ def resolve_node_type(
         behavior=declared.implementation.behavior,
         hosted_class=declared.implementation.hosted_class,
         executable=declared.implementation.executable,
+        only_declared=declared.only_declared,
         parameters=parameters,
         ports=place_ports(declared.ports, names, (), {}),
         timers=declared.timers,

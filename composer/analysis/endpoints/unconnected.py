@@ -140,7 +140,7 @@ def _uncertain(context: Context) -> _Uncertain:
         if node.name.value in affected:
             uncertain.add_ports_of(node)
             uncertain.names.update(port.full_name for port in node.ports)
-        for remapping in node.remappings:
+        for remapping in () if node.gets_undeclared else node.remappings:
             if not any(matched_ports(node, remapping)):
                 uncertain.add_ports_of(node)
                 uncertain.names.add(own_name(node, remapping.target.value))

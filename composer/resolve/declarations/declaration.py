@@ -20,7 +20,7 @@ from composer.resolve.declarations.reactions import NODE_EVENTS, Events, node_re
 from composer.resolve.declarations.transforms import merged_transforms, read_transforms
 from composer.resolve.qos import QosTable
 from composer.resolve.source_folders import SourceFolders
-from composer.resolve.tree_values import entries, key, plain_text
+from composer.resolve.tree_values import entries, flag, key, plain_text
 from composer.source import Located
 from composer.tree import Entry, Mapping, Plain, Tree, plain
 
@@ -37,6 +37,7 @@ class Declaration:
     state: tuple[tuple[Located[str], Plain], ...]
     reactions: Events
     introspection: Tree | None = None
+    only_declared: bool = False
     transforms: Transforms | None = None
 
 
@@ -53,12 +54,13 @@ def declare(
         state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
         reactions=node_reactions(tree, diagnostics),
         introspection=tree.get("introspection"),
+        only_declared=flag(tree.get("only_declared"), default=False),
         transforms=read_transforms(tree.entry("transforms")),
     )
 
 
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
-_REPLACED_KEYS = ("description", *(name for name, _ in NODE_EVENTS))
+_REPLACED_KEYS = ("description", "only_declared", *(name for name, _ in NODE_EVENTS))
 _OVERLAID_KEYS = ("state", "arguments", "executable")
 _TRANSFORMS = "transforms"
 _PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)

@@ -130,6 +130,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         hosted_class=declared.implementation.hosted_class,
         executable=declared.implementation.executable,
         external=external,
+        only_declared=declared.only_declared,
         parameters=parameters,
         overridden_parameters=replaced,
         ports=place_ports(declared.ports, names, remappings, context.port_connections),

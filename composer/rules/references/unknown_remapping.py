@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.endpoints.references import matched_ports, own_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
 from composer.model import Node, Remapping
 from composer.names import topic_name_problem
+from composer.source import Located
+from composer.spelling import is_typo
 
 RULE = register(
     Rule(
@@ -16,7 +19,11 @@ RULE = register(
         name="unknown-remapping",
         severity=Severity.ERROR,
         summary="A remapping names a topic, service or action that no port of the node uses.",
-        why="ROS ignores such a remapping silently, and the port keeps its name.",
+        why=(
+            "ROS ignores such a remapping silently, and the port keeps its name. A class, an "
+            "executable or an external node may use names that it does not declare: without "
+            "'only_declared', only a probable misspelling is reported, as an info."
+        ),
         bad="""\
 system: renamed
 nodes:
@@ -34,6 +41,7 @@ nodes:
     )
 )
 
+_RULE_IF_PASSED_ON = replace(RULE, severity=Severity.INFO)
 #: Names that every ROS node has without declaring them, before expansion.
 _EVERY_NODE = (
     "/clock",
@@ -62,14 +70,21 @@ def check(context: Context) -> Iterator[Diagnostic]:
         if not node.complete or any(is_unresolved(port.ros_name.value) for port in node.ports):
             continue
         for remapping in node.remappings:
-            if not _known(node, remapping):
-                source = remapping.source
-                yield Diagnostic(
-                    RULE,
-                    f"node '{node.name}' has no port named '{source}' to remap",
-                    source.span,
-                    hint=_hint(node, source.value),
-                )
+            source = remapping.source
+            if _known(node, remapping) or (
+                node.gets_undeclared and not _is_misspelled(node, source)
+            ):
+                continue
+            yield Diagnostic(
+                _RULE_IF_PASSED_ON if node.gets_undeclared else RULE,
+                f"node '{node.name}' has no port named '{source}' to remap",
+                source.span,
+                hint=_hint(node, source.value),
+            )
+
+
+def _is_misspelled(node: Node, source: Located[str]) -> bool:
+    return any(is_typo(source.value, port.ros_name.value) for port in node.ports)
 
 
 def _known(node: Node, remapping: Remapping) -> bool:
