@@ -1,11 +1,11 @@
-"""The callbacks of rclpy classes: which methods are passed to rclpy, and with what arguments."""
+"""The callbacks of rclpy classes: which methods rclpy calls, and with what arguments."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
 
-from composer.python_code.source import Module
+from composer.python_code.source import Module, imported_from
 from composer.python_code.source.trees import argument, called_name, dotted, last_name
 from composer.python_code.stubs.behaviors import Signature
 
@@ -18,6 +18,10 @@ _OF_ACTION_SERVERS = {
     "cancel_callback": (None, ("goal_handle", _HANDLE), ""),
     "handle_accepted_callback": (None, ("goal_handle", _HANDLE), ""),
 }
+_TRANSITIONS = ("activate", "cleanup", "configure", "deactivate", "error", "shutdown")
+_TRANSITION = Signature(
+    (("state", "rclpy.lifecycle.LifecycleState"),), "rclpy.lifecycle.TransitionCallbackReturn"
+)
 _FEEDBACK = "rclpy.action.client._FeedbackMessage[{0}.Feedback]"
 _FUTURES = {
     "call_async": "rclpy.task.Future[{0}.Response]",
@@ -27,7 +31,7 @@ _FUTURES = {
 
 
 def callback_signatures(node: ast.ClassDef, module: Module) -> dict[str, Signature]:
-    """Return the methods of a class that it passes to rclpy, with what they are called with.
+    """Return the methods of a class that rclpy calls, with what they are called with.
 
     A method that is passed as a callback of several types is left out. A callback of a client or
     future has a known type if the class has clients of one service, or of one action, only.
@@ -45,6 +49,9 @@ def callback_signatures(node: ast.ClassDef, module: Module) -> dict[str, Signatu
     for call in calls:
         for name, signature in _of_call(call, module, clients, futures):
             found.setdefault(name, set()).add(signature)
+    origins = [imported_from(module, dotted(base)) for base in node.bases]
+    if any(origin is not None and origin.name == "LifecycleNode" for origin in origins):
+        found |= {f"on_{name}": {_TRANSITION} for name in _TRANSITIONS}
     return {name: items.pop() for name, items in found.items() if len(items) == 1}
 
 

@@ -19,7 +19,9 @@ from composer.python_code.stubs.behaviors import Signature
 from composer.python_code.stubs.messages import interface_modules
 
 #: The line that a copy gets, so that annotations can name what they need.
-_IMPORTS = "import composer.behavior, composer.typed, rclpy.action, rclpy.task, typing"
+_IMPORTS = (
+    "import composer.behavior, composer.typed, rclpy.action, rclpy.lifecycle, rclpy.task, typing"
+)
 
 
 @dataclass(frozen=True, slots=True)

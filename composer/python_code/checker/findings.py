@@ -23,8 +23,8 @@ from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.checker.relevance import Relevance, unguarded_value
 from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource
-from composer.python_code.source.trees import dotted, span_of
+from composer.python_code.source import BehaviorSource, Function
+from composer.python_code.source.trees import dotted, name_span, span_of
 from composer.python_code.stubs.folder import LIBRARIES
 from composer.source import Span
 
@@ -61,6 +61,16 @@ _ASSIGNMENT = (
     r"`(?P<given>.+?)` is not assignable to (?:attribute `\w+` with type |declared return type )?"
     r"`(?P<expected>.+?)`"
 )
+_MISSING_RETURN = "missing an explicit `return`"
+#: The types that rclpy and the composer expect from functions, with what these return.
+_RESULTS = {
+    "Response": ("the response", "response"),
+    "Result": ("the result", "result"),
+    "TransitionCallbackReturn": (
+        "a TransitionCallbackReturn",
+        "TransitionCallbackReturn.SUCCESS",
+    ),
+}
 _NAME = r"Could not find name `(\w+)`"
 _FUNCTION = r"in function `([\w.]+)`"
 _MEANT = r"Did you mean `(\w+)`\?"
@@ -115,7 +125,11 @@ def _relevant(
     by_path: dict[str, list[tuple[Finding, Span]]] = {}
     for finding in findings:
         checked = files.get(finding.path)
-        if checked is not None and not checked.copy.is_inserted(finding.line, finding.column):
+        # A missing 'return' is reported at the type of the result, which may be inserted.
+        if checked is not None and (
+            finding.message.endswith(_MISSING_RETURN)
+            or not checked.copy.is_inserted(finding.line, finding.column)
+        ):
             by_path.setdefault(finding.path, []).append((finding, _span(finding, checked)))
     codes = {path: CodeIndex(files[path].copy.module) for path in by_path}
     attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
@@ -369,17 +383,32 @@ class _Reader:
     def _return(self) -> Problem | None:
         found = re.search(_ASSIGNMENT, self.finding.message)
         function = self.code.function_at(self.span.line)
-        is_handler = function is not None and function.returns is None
-        is_message = found is not None and found["expected"] in self.owners.messages
-        if self._is_class and not (is_handler or is_message):
-            return None  # an annotation may be wrong
+        if self.finding.message.endswith(_MISSING_RETURN) and function is not None:
+            return self._missing_return(function)
         if found is None or "Falsy" in found["given"]:
             return None if found is not None else self._in_its_words()
         if _may_be_none(found["given"], found["expected"]):
             return self._none()
-        types = [self.owners.shown(found[x], self.code.module) for x in ("expected", "given")]
+        shown = [self.owners.shown(found[x], self.code.module) for x in ("expected", "given")]
+        expected, given = map(_plain, shown)
         hint = _part_hint(found["expected"], found["given"])
-        return self._made(Family.RETURN, f"this must return {types[0]}, not {types[1]}", hint)
+        value = _RESULTS.get(_last_word(expected), ("", ""))[1]
+        if hint is None and value:
+            hint = f"write 'return {value}'"
+        return self._made(Family.RETURN, f"this must return {expected}, not {given}", hint)
+
+    def _missing_return(self, function: Function) -> Problem | None:
+        expected = _plain(self.finding.message.split("`")[1])
+        part = _last_word(expected)
+        if part == "Result" and not self._is_class and function.returns is None:
+            return None  # the composer sends an empty result
+        what, value = _RESULTS.get(part, (expected, ""))
+        if function.name.startswith("accept_"):
+            what, value = "the decision", "True"
+        message = f"'{function.name}' must return {what}, but may end without a 'return'"
+        span = name_span(function, "def", self.span.file)
+        hint = f"end it with 'return {value}'" if value else None
+        return Problem(Family.RETURN, message, span, hint)
 
     def _none(self) -> Problem | None:
         """Return the problem of a value that may be None, unless the class checks it elsewhere."""
@@ -414,8 +443,13 @@ def _is_near(name: str, other: str) -> bool:
 def _plain(text: str) -> str:
     """Return a type as a reader knows it."""
     literals = re.sub(_LITERAL, lambda found: found[1].replace("'", '"'), text)
-    text = re.sub(_MODULE, "", literals)
+    text = re.sub(_MODULE, "", literals).replace("ReturnType", "Return")
     return text.replace("Float | Scalar", "float").replace("Values[", "list[")
+
+
+def _last_word(type_: str) -> str:
+    """Return ``Response`` for ``std_srvs/srv/Trigger_Response``."""
+    return re.split(r"\W|_", type_)[-1]
 
 
 def _may_be_none(given: str, expected: str) -> bool:

@@ -119,6 +119,9 @@ class Relevance:
     def _is_kept(self, kind: str, message: str, span: Span) -> bool:
         if kind == "unbound-name":
             return not self.is_class and "may be" not in message
+        if kind == "bad-return" and self.is_class:  # an annotation may be wrong
+            function = self.code.function_at(span.line)
+            return function is not None and function.returns is None
         node = self.code.expression_at(span)
         if kind == "missing-attribute":
             return self._keeps_attribute(message, node)

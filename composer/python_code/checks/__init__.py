@@ -10,7 +10,6 @@ from composer.python_code.checks.behaviors import behavior_problems
 from composer.python_code.checks.messages import message_problems
 from composer.python_code.checks.methods import (
     callback_problems,
-    handler_problems,
     missing_self,
     unawaited_values,
     unused_values,
@@ -34,6 +33,5 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
     yield from missing_self(code)
     if node.behavior is not None:
         yield from behavior_problems(code)
-        yield from handler_problems(code)
     else:
         yield from node_class_problems(code)

@@ -1,7 +1,4 @@
-"""Methods without ``self`` or a result, and functions that are called, or not called, by mistake.
-
-The type checker reports callbacks that take other arguments.
-"""
+"""Methods without ``self``, and functions that are called, or not called, by mistake."""
 
 from __future__ import annotations
 
@@ -9,14 +6,13 @@ import ast
 from collections.abc import Iterator
 
 from composer.python_code.checks.scopes import Code, Scope
-from composer.python_code.nodes.behaviors import GENERAL_HANDLERS, handlers
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import Method
-from composer.python_code.source.flow import lacks_self, reaches_end, returns_nothing
+from composer.python_code.source import Function, Method
 from composer.python_code.source.trees import (
-    argument,
+    SCOPES,
     called_name,
     dotted,
+    is_empty,
     positional_arguments,
     walk,
 )
@@ -25,16 +21,13 @@ from composer.python_code.source.trees import (
 _METHODS = frozenset(
     {"abort", "cancel", "canceled", "destroy", "publish", "publish_feedback", "reset", "succeed"}
 )
+_RETURNS = (ast.Return, ast.Yield, ast.YieldFrom)
+_CLASS_METHODS = frozenset({"__new__", "__init_subclass__", "__class_getitem__"})
 _TAKING_CALLBACKS = frozenset(
     {"ActionServer", "add_done_callback", "add_on_set_parameters_callback"}
     | {"create_guard_condition", "create_service", "create_subscription", "create_timer"}
     | {"send_goal", "send_goal_async"}
 )
-#: Where callbacks that return something are passed: their position, name and result.
-_RETURNING = {
-    "create_service": (2, "callback", "response"),
-    "ActionServer": (3, "execute_callback", "result"),
-}
 
 
 def unused_values(scope: Scope) -> Iterator[Problem]:
@@ -71,17 +64,13 @@ def unawaited_values(scope: Scope) -> Iterator[Problem]:
 
 def missing_self(code: Code) -> Iterator[Problem]:
     """Yield the methods that lack their first argument."""
-    expected = {name: len(arguments) for name, arguments in GENERAL_HANDLERS.items()}
-    expected |= {item.name: len(item.arguments) for item in handlers(code.node)}
     is_behavior = code.node.behavior is not None
-    own = {id(class_) for _, class_ in code.source.own_classes} if is_behavior else set()
     for module in code.source.own_modules:
         lacking = [
             (class_, method, positional_arguments(method.node))
             for class_ in module.classes.values()
             for method in class_.methods
-            if method.node is not None
-            and lacks_self(method.node, expected.get(method.name) if id(class_) in own else None)
+            if method.node is not None and _lacks_self(method.node)
         ]
         nodes = walk(module.tree.body if lacking else [])
         named = {dotted(node) for node in nodes if isinstance(node, ast.Name | ast.Attribute)}
@@ -95,47 +84,37 @@ def missing_self(code: Code) -> Iterator[Problem]:
 
 
 def callback_problems(scope: Scope) -> Iterator[Problem]:
-    """Yield the callbacks that are called at once, or that return nothing."""
+    """Yield the callbacks that are called at once."""
     for call in scope.nodes:
-        name = called_name(call)
-        if not isinstance(call, ast.Call) or name not in _TAKING_CALLBACKS:
+        if not isinstance(call, ast.Call) or called_name(call) not in _TAKING_CALLBACKS:
             continue
         for item in (*call.args, *(keyword.value for keyword in call.keywords)):
             method = _method(item.func, scope) if isinstance(item, ast.Call) else None
-            if method is not None and (method.is_async or _returns_nothing(method)):
+            if method is not None and (method.is_async or _returns_nothing(method.node)):
                 message = "the function is called here, not passed"
                 hint = f"write self.{method.name} without '()'"
                 yield scope.problem(Family.SIGNATURE, message, item, hint)
-        if name in _RETURNING:
-            position, role, result = _RETURNING[name]
-            method = _method(argument(call, position, role), scope)
-            if method is not None and _returns_nothing(method):
-                yield _no_result(method, result)
 
 
-def handler_problems(code: Code) -> Iterator[Problem]:
-    """Yield the handlers of a behavior that may end without a response or a decision.
-
-    The type checker reports a plain 'return'.
-    """
-    for handler in handlers(code.node):
-        method = code.source.method(handler.name)
-        is_service = handler.kind == "service"
-        is_needed = is_service or handler.name.startswith("accept_")
-        if not is_needed or method is None or method.node is None or not method.known:
-            continue
-        if reaches_end(method.node):
-            yield _no_result(method, "response" if is_service else "decision")
+def _lacks_self(function: Function) -> bool:
+    """Return whether a method has no argument at all, or uses ``self`` without having it."""
+    if function.decorator_list or function.name in _CLASS_METHODS:
+        return False
+    arguments = [*positional_arguments(function), *function.args.kwonlyargs]
+    if not arguments:
+        return function.args.vararg is None
+    names = (node for node in ast.walk(function) if isinstance(node, ast.Name))
+    uses = {type(node.ctx) for node in names if node.id == "self"}
+    return uses == {ast.Load} and all(item.arg != "self" for item in arguments)
 
 
-def _no_result(method: Method, result: str) -> Problem:
-    message = f"'{method.name}' must return the {result}, but may end without a 'return'"
-    value = "True" if result == "decision" else result
-    return Problem(Family.RETURN, message, method.span, f"end it with 'return {value}'")
-
-
-def _returns_nothing(method: Method) -> bool:
-    return method.node is not None and returns_nothing(method.node)
+def _returns_nothing(function: Function | None) -> bool:
+    """Return whether a method returns None and does not wait to be overridden."""
+    statements = function.body if function is not None else []
+    return not is_empty(statements) and not any(
+        isinstance(node, _RETURNS) and node.value is not None
+        for node in walk(statements, closed=SCOPES)
+    )
 
 
 def _method(node: ast.expr | None, scope: Scope) -> Method | None:

@@ -12,7 +12,6 @@ from composer.python_code.nodes.class_interfaces import (
     passes_node_on,
 )
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source.flow import returned_values, returns_nothing
 from composer.python_code.source.lookup import imported_from, is_of_rclpy
 from composer.python_code.source.trees import catches, dotted, span_of, walk
 
@@ -139,18 +138,12 @@ def _missing_calls(code: Code) -> Iterator[Problem]:
                 message = f"'{method.name}' is called with the state, but takes ({takes})"
                 hint = f"write 'def {method.name}(self, state)'"
                 yield Problem(Family.SIGNATURE, message, method.span, hint)
-            values = list(returned_values(method.node))
-            wrong = [x for x in values if isinstance(x, ast.Constant) and x.value in (True, False)]
-            if wrong or returns_nothing(method.node):
-                message = f"'{method.name}' must return a TransitionCallbackReturn"
-                hint = "write 'return TransitionCallbackReturn.SUCCESS'"
-                span = span_of(wrong[0], module.source) if wrong else method.span
-                yield Problem(Family.RETURN, message, span, hint)
             is_switch = transition in ("activate", "deactivate")
             if is_switch and has_publishers and not _calls_base(method.node, method.name):
                 message = f"'{method.name}' does not {transition} the lifecycle publishers"
                 hint = f"end it with 'return super().{method.name}(state)'"
-                span = span_of(values[-1], module.source) if values else method.span
+                returned = [x for x in method.node.body if isinstance(x, ast.Return)]
+                span = span_of(returned[0], module.source) if returned else method.span
                 yield Problem(Family.CONSTRUCTOR, message, span, hint, is_certain=False)
 
 

@@ -93,6 +93,15 @@ def is_none(node: ast.expr | None) -> bool:
     return isinstance(node, ast.Constant) and node.value is None
 
 
+def is_empty(body: Iterable[ast.stmt]) -> bool:
+    """Return whether a body only has a docstring, 'pass' or '...'."""
+    return all(
+        isinstance(item, ast.Pass)
+        or (isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant))
+        for item in body
+    )
+
+
 def catches(handler: ast.ExceptHandler, errors: frozenset[str]) -> bool:
     """Return whether an ``except`` catches everything, or names one of these exceptions."""
     if handler.type is None:

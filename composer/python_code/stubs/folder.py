@@ -52,12 +52,12 @@ def api_stub() -> str:
 def stub_files(classes: Mapping[str, Node], interfaces: Interfaces) -> dict[str, str]:
     """Return the texts of all stubs, by their paths in the folder, sorted."""
     files = message_stubs(interfaces)
-    files["_ros.pyi"] = files["_ros.pyi"].replace(*_FLOAT_FIELD)
     files["composer/__init__.pyi"] = _OPEN_PACKAGE
     files["composer/behavior.pyi"] = api_stub()
     files[_TYPED] = behavior_module(classes, interfaces)
     for path in LIBRARIES.rglob("*.pyi"):
         files[path.relative_to(LIBRARIES).as_posix()] = path.read_text(encoding="utf-8")
+    files["_ros.pyi"] = files["_ros.pyi"].replace(*_FLOAT_FIELD)
     return {name: HEADER + files[name] for name in sorted(files)}
 
 

@@ -2,7 +2,8 @@
 
 A field accepts more than it returns: a list of numbers may be assigned where an ``array.array``
 is read. So such a field is a property whose setter has a wider type. A float field refuses ints,
-as ROS sends garbage for them (``Float64(data=3)`` arrives as 5e-324).
+as ROS sends garbage for them (``Float64(data=3)`` arrives as 5e-324). The types that packages share
+are in ``libraries/_ros.pyi``.
 """
 
 from __future__ import annotations
@@ -24,85 +25,6 @@ from composer.interfaces import (
     parts,
 )
 from composer.interfaces.sources import FOLDERS
-
-#: What all generated modules use, as the module ``_ros``. Only float has both methods of ``Real``:
-#: a parameter annotated ``float`` would accept an int. Scalars of numpy are let through, since
-#: numpy's own annotations rarely say which of them a function returns.
-SUPPORT = '''\
-"""The types that message packages share."""
-
-from collections.abc import Iterator, Set
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
-
-T = TypeVar("T")
-Item = TypeVar("Item", covariant=True)
-Req = TypeVar("Req")
-Res = TypeVar("Res")
-Goal = TypeVar("Goal")
-Result = TypeVar("Result")
-Feedback = TypeVar("Feedback")
-
-class Float(Protocol):
-    """A float: ROS does not convert an int."""
-    def hex(self) -> str: ...
-    def is_integer(self) -> bool: ...
-
-class Scalar(Protocol):
-    """A number of numpy."""
-    @property
-    def dtype(self) -> Any: ...
-    def item(self) -> Any: ...
-
-class Values(Protocol[Item]):
-    """Several values, as a list, a tuple or an array: a text is none."""
-    def __len__(self) -> int: ...
-    def __iter__(self) -> Iterator[Item]: ...
-
-Real = Float | Scalar
-Texts = list[str] | tuple[str, ...] | Set[str]
-
-class MessageType:
-    SLOT_TYPES: ClassVar[tuple[Any, ...]]
-    @classmethod
-    def get_fields_and_field_types(cls) -> dict[str, str]: ...
-
-class Array(list[T]):
-    """An array.array of numbers."""
-    typecode: str
-    itemsize: int
-    def tolist(self) -> list[T]: ...
-    def tobytes(self) -> bytes: ...
-    def __buffer__(self, flags: int, /) -> memoryview: ...
-    def frombytes(self, buffer: Any, /) -> None: ...
-    def fromlist(self, list: list[T], /) -> None: ...
-
-class FixedArray(Generic[T]):
-    """A numpy.ndarray of fixed length."""
-    def __len__(self) -> int: ...
-    def __iter__(self) -> Iterator[T]: ...
-    def __contains__(self, value: object, /) -> bool: ...
-    def __getitem__(self, index: Any, /) -> Any: ...
-    def __setitem__(self, index: Any, value: Any, /) -> None: ...
-    def __getattr__(self, name: str, /) -> Any: ...
-    def __add__(self, other: Any, /) -> Any: ...
-    def __radd__(self, other: Any, /) -> Any: ...
-    def __sub__(self, other: Any, /) -> Any: ...
-    def __rsub__(self, other: Any, /) -> Any: ...
-    def __mul__(self, other: Any, /) -> Any: ...
-    def __rmul__(self, other: Any, /) -> Any: ...
-    def __truediv__(self, other: Any, /) -> Any: ...
-    def __matmul__(self, other: Any, /) -> Any: ...
-    def __lt__(self, other: Any, /) -> Any: ...
-    def __le__(self, other: Any, /) -> Any: ...
-    def __gt__(self, other: Any, /) -> Any: ...
-    def __ge__(self, other: Any, /) -> Any: ...
-
-class ServiceType(Generic[Req, Res]):
-    Event: Any
-
-class ActionType(Generic[Goal, Result, Feedback]):
-    Impl: Any
-'''
 
 _HEAD = (
     "from typing import Final, TypeAlias",
@@ -128,8 +50,7 @@ def message_stubs(interfaces: Interfaces, names: Iterable[str] | None = None) ->
     for name in sorted(definitions):
         package, folder, short = name.split("/")
         modules.setdefault(f"{package}/{folder}.pyi", []).append(_text(short, definitions[name]))
-    files = {"_ros.pyi": SUPPORT}
-    files |= {f"{path.partition('/')[0]}/__init__.pyi": "" for path in modules}
+    files = {f"{path.partition('/')[0]}/__init__.pyi": "" for path in modules}
     return files | {path: _module("\n".join(texts)) for path, texts in modules.items()}
 
 

@@ -17,8 +17,7 @@ from composer.python_code.nodes.behaviors import (
     reached_methods,
 )
 from composer.python_code.source import BehaviorSource, Call, Function, Method
-from composer.python_code.source.flow import EXITS, is_empty, is_true
-from composer.python_code.source.trees import SCOPES, called_name, start_span, walk
+from composer.python_code.source.trees import SCOPES, called_name, is_empty, start_span, walk
 from composer.rules.python.definitions import on_tick, warning
 from composer.source import Span
 
@@ -63,7 +62,10 @@ _SYNCHRONOUS_CALL = re.compile(r"(.+\.)?\w*(client|cli)\.call")
 _LEAVES = (ast.Return, ast.Raise, ast.Break)
 _WAITS = (ast.Await, ast.AsyncFor, ast.AsyncWith, ast.Yield, ast.YieldFrom)
 #: Calls that end a loop, that wait, or that would wait if they were awaited.
-_ENDS_OR_WAITS = EXITS | {"sleep", "call", "send_goal", "result", "wait", "get", "join"}
+_ENDS_OR_WAITS = frozenset(
+    {"exit", "quit", "_exit", "abort"}
+    | {"sleep", "call", "send_goal", "result", "wait", "get", "join"}
+)
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
@@ -144,7 +146,8 @@ def _never_ends(loop: ast.While) -> bool:
     if any(isinstance(node, _LEAVES) or called_name(node) in _ENDS_OR_WAITS for node in inside):
         return False
     # Only other code can end a loop that does nothing.
-    return is_true(loop.test) or _waits_for_cancel(loop.test) or is_empty(loop.body)
+    is_forever = isinstance(loop.test, ast.Constant) and bool(loop.test.value)
+    return is_forever or _waits_for_cancel(loop.test) or is_empty(loop.body)
 
 
 def _waits_for_cancel(test: ast.expr) -> bool:

@@ -16,8 +16,7 @@ from composer.python_code.nodes.behaviors import (
     unbound_handlers,
 )
 from composer.python_code.source import BehaviorSource, Method
-from composer.python_code.source.flow import lacks_self
-from composer.python_code.source.trees import span_of
+from composer.python_code.source.trees import positional_arguments, span_of
 from composer.python_code.source.values import scopes_in
 from composer.rules.python.definitions import error, on_tick
 from composer.rules.python.uses_of_nodes import HANDLER_ANNOTATION
@@ -111,15 +110,14 @@ def _signatures(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     expected |= {item.name: (item.arguments, item.of.span) for item in handlers(node)}
     for name, (arguments, span) in expected.items():
         method = source.method(name)
-        if method is None or method.accepts(len(arguments)):
+        if method is None or method.node is None or method.accepts(len(arguments)):
             continue
-        if method.node is None or not lacks_self(method.node, len(arguments)):
-            takes = ", ".join(("self", *method.arguments))
-            gets = ", ".join(("self", *arguments))
-            message = f"'{name}' of '{class_name}' is called with ({gets}), but takes ({takes})"
-            label = Label(span, "called here")
-            hint = f"write 'def {name}({gets})'"
-            yield Diagnostic(HANDLER_SIGNATURE, message, method.span, (label,), hint)
+        takes = ", ".join(item.arg for item in positional_arguments(method.node))
+        gets = ", ".join(("self", *arguments))
+        message = f"'{name}' of '{class_name}' is called with ({gets}), but takes ({takes})"
+        label = Label(span, "called here")
+        hint = f"write 'def {name}({gets})'"
+        yield Diagnostic(HANDLER_SIGNATURE, message, method.span, (label,), hint)
 
 
 def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:

@@ -130,34 +130,8 @@ FILES = [
     """,
     """
     class Robot:
-        def on_reset(self, request, response):  # RETURN
-            response.success = True
-
-        def accept_fibonacci(self, request):
-            if request.order > 9:
-                return  # the type checker reports it
-            return True
-
         def on_fibonacci(self, goal):
             goal.succeed  # UNUSED
-    """,
-    """
-    class Robot:
-        def on_reset(self, request, response):
-            try:
-                response.success = True
-            finally:
-                return response
-
-        def accept_fibonacci(self, request):
-            return request.order < 9
-
-        def helper(self):
-            return
-
-        def on_tick(self):
-            \"\"\"Do nothing.\"\"\"
-            ...
     """,
     """
     class Robot:
@@ -176,9 +150,6 @@ FILES = [
     """
     class Robot:
         def on_tick():  # SELF
-            pass
-
-        def on_odometry(message):  # SELF
             pass
 
         def helper(value):  # SELF
@@ -221,8 +192,8 @@ def test_texts(tmp_path: Path) -> None:
         def on_configure(self):
             self.publishers.velocity.publish(self.parameters["limt"])
 
-        def on_reset(request, response):
-            return response
+        def reset(request, response):
+            return self.response
     """
     assert {(item.message, item.hint) for item in problems(text, tmp_path, "behavior")} == {
         (
@@ -231,7 +202,7 @@ def test_texts(tmp_path: Path) -> None:
         ),
         ("the node has no parameter 'limt'", "did you mean 'limit'?"),
         (
-            "method 'on_reset' of 'Robot' lacks 'self'",
-            "write 'def on_reset(self, request, response)'",
+            "method 'reset' of 'Robot' lacks 'self'",
+            "write 'def reset(self, request, response)'",
         ),
     }

@@ -248,11 +248,8 @@ FILES = [
         def on_deactivate(self, state):
             return super().on_deactivate(state)
 
-        def on_cleanup(self, state):  # RETURN
+        def on_cleanup(self, state):
             self.publisher = None
-
-        def on_shutdown(self, state):
-            return True  # RETURN
     """,
     """
     class Robot(LifecycleNode):
@@ -274,24 +271,6 @@ FILES = [
     class Robot(LifecycleNode):
         def on_activate(self, state):
             return TransitionCallbackReturn.SUCCESS
-    """,
-    """
-    class Robot(Node):
-        def __init__(self):
-            super().__init__('robot')
-            self.create_service(SetBool, 'a', self.on_a)
-            self.create_service(SetBool, 'b', self.on_b)
-            ActionServer(self, Fibonacci, 'c', self.on_c)
-
-        def on_a(self, request, response):  # RETURN
-            response.success = True
-
-        def on_b(self, request, response):
-            if request.data:
-                return response
-
-        def on_c(self, goal_handle):  # RETURN
-            goal_handle.succeed()
     """,
     """
     class Robot(Node):

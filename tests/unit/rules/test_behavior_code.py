@@ -381,3 +381,16 @@ def test_each_mistake_is_reported_once_where_it_is(tmp_path: Path) -> None:
     assert reported == [
         (place, statement, (rule, text)) for place, statement, rule, text in MISTAKES
     ]
+
+
+def test_a_service_without_a_response(tmp_path: Path) -> None:
+    code = code_with("reset", "if request:\n    return response").replace(
+        "return response\n\n    async", "pass\n\n    async"
+    )
+    [[found]] = diagnostics_of(SYSTEM, [code], tmp_path)
+    message = "'on_reset' must return the response, but may end without a 'return'"
+    assert (found.message, found.hint, quoted(found)) == (
+        message,
+        "end it with 'return response'",
+        "on_reset",
+    )

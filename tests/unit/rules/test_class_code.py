@@ -320,6 +320,27 @@ def test_functions_may_have_attributes(tmp_path: Path) -> None:
     assert _found(tmp_path, "from functools import cache\n" + code) == [[]]
 
 
+@pytest.mark.parametrize(
+    ("returned", "method", "hint"),
+    [
+        ("return response", "on_reset", "end it with 'return response'"),
+        ("return Fibonacci.Result(sequence=[1])", "on_goal", "end it with 'return result'"),
+        (
+            "return TransitionCallbackReturn.SUCCESS",
+            "on_activate",
+            "end it with 'return TransitionCallbackReturn.SUCCESS'",
+        ),
+    ],
+)
+def test_a_callback_returns_a_result(returned: str, method: str, hint: str, tmp_path: Path) -> None:
+    code = _code("tick", "pass")
+    codes = [
+        code.replace(returned, text) for text in ("pass", "if self.count:\n            " + returned)
+    ]
+    for [item] in diagnostics_of(SYSTEM, codes, tmp_path):
+        assert (item.rule.name, quoted(item), item.hint) == ("missing-return", method, hint)
+
+
 def test_a_transition_gets_the_state(tmp_path: Path) -> None:
     code = _code("tick", "pass").replace("def on_activate(self, state)", "def on_activate(self)")
     assert _found(tmp_path, code) == [[("handler-signature", "on_activate")]]
