@@ -10,8 +10,8 @@ from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.python_code.nodes.class_interfaces import calls_on_self, passes_node_on
 from composer.python_code.nodes.classes import ClassOfNode
+from composer.python_code.source.scopes import NotLiteral, Scope
 from composer.python_code.source.trees import argument, dotted, span_of, walk
-from composer.python_code.source.values import NotLiteral, Scope
 from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 from composer.source import Span
 
@@ -75,7 +75,7 @@ def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
             scope.known(scope.text, argument(call, 1, names[1])),
             scope.known(scope.interface, argument(call, 0, names[0])),
             scope.known(partial(qos_profile, scope), qos),
-            span_of(call, scope.module.source),
+            span_of(call, scope.source),
         )
 
 

@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping
 
 from composer.fast_dataclass import dataclass
 from composer.model import Node
-from composer.python_code.source import BehaviorSource
+from composer.python_code.source import BehaviorSource, Scope, scopes_in
 from composer.python_code.source.trees import argument, dotted, span_of
-from composer.python_code.source.values import Scope, scopes_in
 from composer.source import Located, Span
 
 BROADCAST = "broadcast"
@@ -47,7 +46,7 @@ def frame_uses(node: Node, source: BehaviorSource) -> Iterator[FrameUse]:
                     if _name(owner, scope) == _TRANSFORMS:
                         given = (argument(call, *place) for place in _METHODS[name])
                         frames = (_frame(item, scope, node) for item in given if item is not None)
-                        span = span_of(call.func, scope.module.source)
+                        span = span_of(call.func, scope.source)
                         yield FrameUse(name, span, tuple(filter(None, frames)))
 
 
@@ -59,7 +58,7 @@ def _frame(expression: ast.expr, scope: Scope, node: Node) -> Located[str] | Non
         value = parameter.value.value if parameter is not None and parameter.value else None
     else:
         value = scope.known(scope.literal, expression)
-    place = span_of(expression, scope.module.source)
+    place = span_of(expression, scope.source)
     return Located(value, place) if isinstance(value, str) else None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -16,11 +16,11 @@ from composer.model import BehaviorReference, PortKind
 from composer.project import Project
 from composer.python_code.source import (
     BehaviorSource,
-    Function,
     find_behavior,
     nearby_modules,
 )
-from composer.python_code.source.values import NotLiteral, Scope, scopes_in
+from composer.python_code.source.scopes import NotLiteral, Scope
+from composer.python_code.source.syntax import scopes_in
 from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
@@ -123,8 +123,10 @@ class _ClassReader:
 
     def read(self, scope: Scope) -> None:
         """Read one method."""
-        for call in _calls(scope.method):
-            place = f"{scope.module.path.name}:{call.lineno}"
+        for call in scope.nodes:
+            if not isinstance(call, ast.Call):
+                continue
+            place = f"{Path(scope.source.path).name}:{call.lineno}"
             name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
             full_name = scope.full_name(call.func)
             if name in CREATORS and full_name.startswith("self."):
@@ -225,11 +227,6 @@ class _ClassReader:
         except NotLiteral as error:
             self.unknown.append(f"{what}, because of {error}")
             return None
-
-
-def _calls(method: Function) -> Iterator[ast.Call]:
-    calls = [node for node in ast.walk(method) if isinstance(node, ast.Call)]
-    yield from sorted(calls, key=lambda call: (call.lineno, call.col_offset))
 
 
 def _arguments(call: ast.Call, names: tuple[str, ...]) -> dict[str, ast.expr]:

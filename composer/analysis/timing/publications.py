@@ -136,7 +136,7 @@ def _reached_ports(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
 
 def _passed_on(source: BehaviorSource) -> frozenset[str]:
     """Return the publishers that a behavior passes on or stores; their uses are unknown."""
-    names = (name for method in source.methods for name in method.body.mentioned)
+    names = (name for method in source.methods for name in method.mentioned)
     stored = (name.removesuffix(".publish") for name in names)
     parts = (name.removeprefix("self.publishers.") for name in stored if name.count(".") == 2)
     return frozenset(name for name in parts if "." not in name)

@@ -66,7 +66,7 @@ def _always_publishes(timer: Timer, port: str, handlers: Mapping[str, Method]) -
 
 def _names(method: Method) -> frozenset[str]:
     """Return the first three parts of the names in a method: ``self.publishers.status``."""
-    names = (*(call.name for call in method.calls), *method.body.mentioned)
+    names = (*(call.name for call in method.calls), *method.mentioned)
     return frozenset(".".join(name.split(".")[:3]) for name in names)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from composer.diagnostics import suggestion
 from composer.field_types import STATUS, Word
-from composer.python_code.checks.scopes import Code, Scope
+from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.nodes.behaviors import reached_methods
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import Method, published_port
@@ -79,17 +79,17 @@ def _early_calls(handler: str, method: Method, code: Code) -> Iterator[Problem]:
             yield Problem(Family.EARLY, message, call.span, hint)
 
 
-def _awaited(call: ast.Call, scope: Scope) -> Iterator[Problem]:
+def _awaited(call: ast.Call, scope: NodeScope) -> Iterator[Problem]:
     full = scope.full_name(call.func)
     is_pause = scope.constant(argument(call, 0, "delay")) == 0  # that needs no event loop
-    text = scope.module.source.text
+    text = scope.source.text
     if full.startswith("asyncio.") and not is_pause and not any(x in text for x in _RUNS_ASYNCIO):
         message = f"'{full}' needs the event loop of asyncio, which does not run here"
         hint = "use self.clock.sleep" if full == "asyncio.sleep" else None
         yield scope.problem(Family.ASYNCIO, message, call.func, hint)
 
 
-def _key(owner: str, index: ast.expr, scope: Scope) -> Iterator[Problem]:
+def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     """Yield the constant keys of ports and parameters that the node does not have."""
     node, key = scope.code.node, scope.constant(index)
     section = owner.removeprefix("self.") if scope.method is not None and node.complete else ""
@@ -104,7 +104,7 @@ def _key(owner: str, index: ast.expr, scope: Scope) -> Iterator[Problem]:
         yield scope.problem(Family.PORT, message, index, suggestion(key, names))
 
 
-def _word(node: ast.expr, scope: Scope) -> Word | None:
+def _word(node: ast.expr, scope: NodeScope) -> Word | None:
     """Return the type of a parameter with choices, or of the status of a goal."""
     match node:
         case ast.Attribute(value=ast.Attribute(value=ast.Name(id="self"), attr="parameters")):

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from composer.diagnostics import suggestion
 from composer.field_types import constant_problem, enumerator_problem, enumerators
 from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
-from composer.python_code.checks.scopes import Scope
+from composer.python_code.checks.scopes import NodeScope
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source.trees import dotted, span_of
 
 
-def message_problems(scope: Scope) -> Iterator[Problem]:
+def message_problems(scope: NodeScope) -> Iterator[Problem]:
     """Yield what is assigned to the fields of messages, or compared with them, and does not fit."""
     for node in scope.nodes:
         match node:
@@ -39,7 +39,7 @@ def message_problems(scope: Scope) -> Iterator[Problem]:
 
 
 def _keyword_problems(
-    message: Message, keywords: list[ast.keyword], scope: Scope
+    message: Message, keywords: list[ast.keyword], scope: NodeScope
 ) -> Iterator[Problem]:
     for keyword in keywords:
         field = message.field(keyword.arg or "")
@@ -48,7 +48,7 @@ def _keyword_problems(
 
 
 def _field_problems(
-    found: tuple[Message, Field] | None, node: ast.expr, scope: Scope
+    found: tuple[Message, Field] | None, node: ast.expr, scope: NodeScope
 ) -> Iterator[Problem]:
     if found is None:
         return
@@ -58,9 +58,9 @@ def _field_problems(
         yield from _frame_problem(node, scope)
 
 
-def _frame_problem(node: ast.expr, scope: Scope) -> Iterator[Problem]:
+def _frame_problem(node: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     """Yield a frame ID with a slash: a constant, or the value of a parameter where it is set."""
-    value, span = scope.constant(node), span_of(node, scope.module.source)
+    value, span = scope.constant(node), span_of(node, scope.source)
     name = dotted(node)
     for parameter in scope.code.node.parameters if name.startswith("self.parameters.") else ():
         if name == f"self.parameters.{parameter.name.value}" and parameter.value is not None:
@@ -70,7 +70,7 @@ def _frame_problem(node: ast.expr, scope: Scope) -> Iterator[Problem]:
         yield Problem(Family.FRAME, message, span, "remove the slash")
 
 
-def _value_problems(node: ast.expr, type_: object, scope: Scope) -> Iterator[Problem]:
+def _value_problems(node: ast.expr, type_: object, scope: NodeScope) -> Iterator[Problem]:
     """Yield why an expression does not fit a field or an element of ``type_``."""
     if not isinstance(type_, FieldType):
         return
@@ -94,7 +94,7 @@ def _value_problems(node: ast.expr, type_: object, scope: Scope) -> Iterator[Pro
             yield scope.problem(Family.VALUE, found[0], node, found[1])
 
 
-def _array_problems(node: ast.expr, type_: FieldType, scope: Scope) -> Iterator[Problem]:
+def _array_problems(node: ast.expr, type_: FieldType, scope: NodeScope) -> Iterator[Problem]:
     count = _length(node, scope)
     size, bound = type_.array_size, type_.array_bound
     if count is not None and (
@@ -111,7 +111,7 @@ def _array_problems(node: ast.expr, type_: FieldType, scope: Scope) -> Iterator[
             return  # the others have the same cause
 
 
-def _length(node: ast.expr, scope: Scope) -> int | None:
+def _length(node: ast.expr, scope: NodeScope) -> int | None:
     """Return the number of elements of a list, None if only running the code shows it."""
     match node:
         case ast.List(elts=items) | ast.Tuple(elts=items):
@@ -126,7 +126,7 @@ def _length(node: ast.expr, scope: Scope) -> int | None:
     return None
 
 
-def _index_problem(owner: ast.expr, index: ast.expr, scope: Scope) -> Iterator[Problem]:
+def _index_problem(owner: ast.expr, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     at = scope.constant(index)
     array = scope.type(owner) if isinstance(at, int) else None
     size = array.array_size if isinstance(array, FieldType) else None
@@ -135,7 +135,7 @@ def _index_problem(owner: ast.expr, index: ast.expr, scope: Scope) -> Iterator[P
         yield scope.problem(Family.INDEX, f"{array} has no element {at}", index, hint)
 
 
-def _comparison(left: ast.expr, others: list[ast.expr], scope: Scope) -> Iterator[Problem]:
+def _comparison(left: ast.expr, others: list[ast.expr], scope: NodeScope) -> Iterator[Problem]:
     """Yield the values that a field never has, among those that it is compared with."""
     found = scope.field(left) if isinstance(left, ast.Attribute) else None
     if found is None or found[1].type.is_array or not found[1].type.is_primitive:
@@ -153,7 +153,7 @@ def _comparison(left: ast.expr, others: list[ast.expr], scope: Scope) -> Iterato
 
 
 def _enumerator_problem(
-    message: Message, field: Field, node: ast.expr, scope: Scope
+    message: Message, field: Field, node: ast.expr, scope: NodeScope
 ) -> Iterator[Problem]:
     """Yield why a value is none of the constants for a field."""
     if field.type.is_array:

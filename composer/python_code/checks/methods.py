@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.python_code.checks.scopes import Code, Scope
+from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import Function, Method
 from composer.python_code.source.trees import (
@@ -30,7 +30,7 @@ _TAKING_CALLBACKS = frozenset(
 )
 
 
-def unused_values(scope: Scope) -> Iterator[Problem]:
+def unused_values(scope: NodeScope) -> Iterator[Problem]:
     """Yield the comparisons that are not used, and the functions that are not called."""
     for node in scope.nodes:
         match node:
@@ -45,7 +45,7 @@ def unused_values(scope: Scope) -> Iterator[Problem]:
                     yield scope.problem(Family.UNUSED, message, value, "add '()'")
 
 
-def unawaited_values(scope: Scope) -> Iterator[Problem]:
+def unawaited_values(scope: NodeScope) -> Iterator[Problem]:
     """Yield the coroutines of the class that are assigned, and then used as if they were values.
 
     The type checker reports those whose attributes are used, and those that are not used.
@@ -83,7 +83,7 @@ def missing_self(code: Code) -> Iterator[Problem]:
                 yield Problem(Family.SELF, message, method.span, hint, is_behavior)
 
 
-def callback_problems(scope: Scope) -> Iterator[Problem]:
+def callback_problems(scope: NodeScope) -> Iterator[Problem]:
     """Yield the callbacks that are called at once."""
     for call in scope.nodes:
         if not isinstance(call, ast.Call) or called_name(call) not in _TAKING_CALLBACKS:
@@ -117,7 +117,7 @@ def _returns_nothing(function: Function | None) -> bool:
     )
 
 
-def _method(node: ast.expr | None, scope: Scope) -> Method | None:
+def _method(node: ast.expr | None, scope: NodeScope) -> Method | None:
     """Return the method of the class that an expression is, None if it is not known."""
     match node:
         case ast.Attribute(value=ast.Name(id="self"), attr=name) if scope.method is not None:

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator, Sequence
 
 from composer.diagnostics import nearest
-from composer.python_code.checks.scopes import Code, Scope
+from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.nodes.class_interfaces import (
     declared_parameters,
     passes_node_on,
@@ -73,11 +73,11 @@ def _may_have_others(call: ast.Call) -> bool:
     return is_open or name in _ASKING
 
 
-def _catches_errors(scope: Scope) -> bool:
+def _catches_errors(scope: NodeScope) -> bool:
     return any(isinstance(x, ast.ExceptHandler) and catches(x, _ERRORS) for x in scope.nodes)
 
 
-def _declared_twice(body: Sequence[ast.stmt], scope: Scope) -> Iterator[Problem]:
+def _declared_twice(body: Sequence[ast.stmt], scope: NodeScope) -> Iterator[Problem]:
     """Yield the parameters that a function declares again, which raises an error."""
     declared: set[str] = set()
     statements = [item for item in body if isinstance(item, ast.Assign | ast.Expr)]
@@ -107,7 +107,7 @@ def _values_used(node: ast.AST) -> Sequence[ast.expr]:
     return ()
 
 
-def _is_parameter(node: ast.expr, scope: Scope) -> bool:
+def _is_parameter(node: ast.expr, scope: NodeScope) -> bool:
     value = scope.value(node.id) if isinstance(node, ast.Name) else node
     return isinstance(value, ast.Call) and dotted(value.func) == "self.get_parameter"
 

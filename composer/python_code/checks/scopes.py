@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
-from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
 from composer.field_types import ANYTHING, ValueType, fields_of
@@ -20,15 +19,13 @@ from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource, Function, Method, Module
-from composer.python_code.source.trees import bindings, dotted, positional_arguments, span_of, walk
+from composer.python_code.source import BehaviorSource, Function, Method
+from composer.python_code.source.scopes import Scope
+from composer.python_code.source.trees import bindings, positional_arguments, span_of
 from composer.python_code.stubs.behaviors import signatures
 
 #: Maximum number of names and fields to follow.
 _MAXIMUM_STEPS = 16
-_MAXIMUM_BITS = 128
-
-Constant: TypeAlias = str | bytes | int | float | None
 
 
 @dataclass(eq=False)
@@ -40,9 +37,9 @@ class Code:
     interfaces: Interfaces
 
     @cached_property
-    def scopes(self) -> Sequence[Scope]:
+    def scopes(self) -> Sequence[NodeScope]:
         """All files and functions."""
-        own: dict[int, tuple[Method, Mapping[str, str]]] = {}
+        own: dict[int, tuple[ast.ClassDef, Method, Mapping[str, str]]] = {}
         for module, class_ in self.source.own_classes:
             if self.node.hosted_class is not None:
                 known = callback_signatures(class_.node, module)
@@ -51,15 +48,19 @@ class Code:
             for method in class_.methods:
                 signature = known.get(method.name)
                 types = [type_ for _, type_ in signature.arguments] if signature else []
-                own[id(method.node)] = method, dict(zip(method.arguments, types, strict=False))
-        modules = [Scope(self, module) for module in self.source.own_modules]
-        functions = (
-            Scope(self, home.module, node, *own.get(id(node), ()))
-            for home in modules
-            for node in home.nodes
-            if isinstance(node, Function)
-        )
-        return (*modules, *functions)
+                passed = dict(zip(method.arguments, types, strict=False))
+                own[id(method.node)] = class_.node, method, passed
+        scopes = [
+            NodeScope(module.source, module.tree, module.names, code=self)
+            for module in self.source.own_modules
+        ]
+        functions = ((home, x) for home in scopes for x in home.nodes if isinstance(x, Function))
+        for home, node in tuple(functions):
+            scope = replace(home, function=node)
+            if id(node) in own:
+                scope.class_, scope.method, scope.passed = own[id(node)]
+            scopes.append(scope)
+        return tuple(scopes)
 
     @cached_property
     def assigned(self) -> frozenset[str]:
@@ -69,69 +70,30 @@ class Code:
 
 
 @dataclass(eq=False)
-class Scope:
-    """A function, or the statements of a file outside of functions.
+class NodeScope(Scope):
+    """A function in the files of a node, or the statements of a file outside of functions.
 
     ``passed`` are the arguments that the composer or rclpy passes, with their types.
     """
 
-    code: Code = field(repr=False)
-    module: Module
-    function: Function | None = None
+    code: Code = field(kw_only=True, repr=False)
     method: Method | None = None
     passed: Mapping[str, str] = field(default_factory=dict)
-
-    @cached_property
-    def nodes(self) -> Sequence[ast.AST]:
-        """All syntax in the function, or all of the file that is outside of functions."""
-        if self.function is not None:
-            return tuple(walk([self.function]))
-        return tuple(walk(self.module.tree.body, closed=(ast.FunctionDef, ast.AsyncFunctionDef)))
 
     def problem(
         self, family: Family, message: str, place: ast.expr, hint: str | None = None
     ) -> Problem:
         """Return a problem at an expression."""
-        return Problem(family, message, span_of(place, self.module.source), hint)
+        return Problem(family, message, span_of(place, self.source), hint)
 
     def doubt(self, message: str, place: ast.expr, hint: str | None = None) -> Problem:
         """Return the problem of a value that is probably wrong, but does not fail."""
-        span = span_of(place, self.module.source)
-        return Problem(Family.VALUE, message, span, hint, is_certain=False)
+        return Problem(Family.VALUE, message, span_of(place, self.source), hint, is_certain=False)
 
-    def bound(self, name: str) -> Sequence[ast.expr | None]:
-        """Return what is assigned to a name; None for changes and for what is not plain."""
-        if self.function is not None and name in bindings(self.function):
-            return bindings(self.function)[name]
-        if "global " in self.module.source.text:
-            return ()
-        return bindings(self.module.tree).get(name, ())
-
-    def value(self, name: str) -> ast.expr | None:
-        """Return what is assigned to a name, if that happens once and is not changed."""
-        bound = self.bound(name)
-        return bound[0] if len(bound) == 1 else None
-
-    def constant(self, node: ast.expr | None) -> Constant:
-        """Return the value of a constant, or of a name for one."""
-        if isinstance(node, ast.Name):
-            node = self.value(node.id)
-        match node:
-            case ast.Constant(value=int() as value) if value.bit_length() > _MAXIMUM_BITS:
-                return None  # Python refuses to show it
-            case ast.Constant(value=str() | bytes() | int() | float() as value):
-                return value
-            case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as operand):
-                number = self.constant(operand)
-                return -number if isinstance(number, int | float) else None
-        return None
-
-    def full_name(self, node: ast.expr | str) -> str:
-        """Return a dotted name with imports resolved: ``std_msgs.msg.Bool``; "" for others."""
-        text = node if isinstance(node, str) else dotted(node)
-        first, dot, rest = text.partition(".")
-        is_local = self.function is not None and first in bindings(self.function)
-        return "" if is_local else f"{self.module.names.get(first, first)}{dot}{rest}"
+    def constant(self, node: ast.expr | None) -> str | int | float | None:
+        """Return the value of a number or text, None if it is not known."""
+        value = self.known(self.literal, node)
+        return value if isinstance(value, str | int | float) else None
 
     def message_class(self, node: ast.expr | str) -> Message | None:
         """Return the message whose class an expression is."""

@@ -6,9 +6,8 @@ import ast
 from collections.abc import Iterator
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.source import BehaviorSource
+from composer.python_code.source import BehaviorSource, Scope, scopes_in
 from composer.python_code.source.trees import argument, span_of, walk
-from composer.python_code.source.values import Scope, scopes_in
 from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located
 
@@ -64,7 +63,7 @@ def _declare(scope: Scope, call: ast.Call, method: str, parameters: DeclaredPara
         name = f"{prefix}.{name}" if prefix else name
         is_certain = name not in parameters.types and not _may_change(call)
         type_ = rclpy_type(scope.known(scope.literal, default)) if is_certain else None
-        where = span_of(call, scope.module.source)
+        where = span_of(call, scope.source)
         parameters.types[name] = Located(type_, where) if type_ is not None else None
 
 

@@ -5,7 +5,6 @@ read from the syntax tree. What syntax does not determine (a base class in anoth
 decorator, ``__getattr__``) is marked as unknown, and rules do not report it as missing.
 """
 
-from composer.python_code.source.calls import Call, published_port
 from composer.python_code.source.lookup import (
     BehaviorSource,
     BrokenModule,
@@ -13,7 +12,8 @@ from composer.python_code.source.lookup import (
     imported_from,
 )
 from composer.python_code.source.nearby_modules import NearbyModules, nearby_modules
-from composer.python_code.source.syntax import Class, Method, Module
+from composer.python_code.source.scopes import Call, Scope, published_port
+from composer.python_code.source.syntax import Class, Method, Module, scopes_in
 from composer.python_code.source.trees import Function
 
 __all__ = [
@@ -25,8 +25,10 @@ __all__ = [
     "Method",
     "Module",
     "NearbyModules",
+    "Scope",
     "find_behavior",
     "imported_from",
     "nearby_modules",
     "published_port",
+    "scopes_in",
 ]

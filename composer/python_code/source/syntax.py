@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import ast
 import warnings
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.source.calls import Body, Call, read_body
 from composer.python_code.source.modules import Unreadable, read_text
+from composer.python_code.source.scopes import Call, Scope
 from composer.python_code.source.trees import (
     SCOPES,
     Function,
@@ -34,25 +34,29 @@ _TRANSPARENT = frozenset({"staticmethod", "classmethod", "override", "typing.ove
 
 @dataclass(frozen=True)
 class Method:
-    """A method of a behavior; ``names`` maps the imports of the file to full names.
+    """A method of a class.
 
-    ``node`` is None for an attribute of the class, whose value may be a function.
+    ``scope`` is None for an attribute of the class, whose value may be a function.
     """
 
     name: str
     span: Span = field(compare=False)
-    node: Function | None = field(default=None, repr=False)
-    names: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+    scope: Scope | None = field(default=None, repr=False)
 
-    @cached_property
-    def body(self) -> Body:
-        """The calls and names in the method."""
-        return Body() if self.node is None else read_body(self.node, self.names, self.span.file)
+    @property
+    def node(self) -> Function | None:
+        """The definition of the method."""
+        return self.scope.function if self.scope is not None else None
 
     @property
     def calls(self) -> tuple[Call, ...]:
         """The calls in the method, in source order."""
-        return self.body.calls
+        return self.scope.calls if self.scope is not None else ()
+
+    @property
+    def mentioned(self) -> tuple[str, ...]:
+        """The names that the method uses without calling them."""
+        return self.scope.mentioned if self.scope is not None else ()
 
     @property
     def is_async(self) -> bool:
@@ -155,7 +159,8 @@ def _read_module(path: Path, shown: str, _changed_ns: int, _bytes: int) -> Modul
     imports = {name: found for name, (found, *others) in origins.items() if not others}
     names = full_names(imports.items())
     functions = {item.name for item in statements if isinstance(item, Function)}
-    classes = [_class(item, names, source) for item in statements if isinstance(item, ast.ClassDef)]
+    everywhere = Scope(source, tree, names)
+    classes = [_class(item, everywhere) for item in statements if isinstance(item, ast.ClassDef)]
     return Module(
         path=path,
         source=source,
@@ -195,6 +200,12 @@ def parse(source: SourceFile) -> ast.Module:
     return tree
 
 
+def scopes_in(classes: Iterable[tuple[Module, Class]]) -> Iterator[Scope]:
+    """Yield the methods of classes."""
+    methods = (method for _, class_ in classes for method in class_.methods)
+    yield from (method.scope for method in methods if method.scope is not None)
+
+
 @lru_cache(maxsize=128)
 def defined_names(module: Module) -> frozenset[str]:
     """Return the names that a file defines or imports, at its top level or below."""
@@ -207,12 +218,13 @@ def defined_names(module: Module) -> frozenset[str]:
     return frozenset(names)
 
 
-def _class(node: ast.ClassDef, names: Mapping[str, str], source: SourceFile) -> Class:
-    methods = {}
+def _class(node: ast.ClassDef, module: Scope) -> Class:
+    methods, source = {}, module.source
     for item in walk(node.body, closed=SCOPES):
         if isinstance(item, Function):
             span = name_span(item, "def", source)
-            methods[item.name] = Method(item.name, span, item, names)
+            scope = replace(module, function=item, class_=node)
+            methods[item.name] = Method(item.name, span, scope)
         elif isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store):
             methods[item.id] = Method(item.id, span_of(item, source))
     return Class(

@@ -15,9 +15,8 @@ from composer.python_code.nodes.behaviors import (
     handlers,
     unbound_handlers,
 )
-from composer.python_code.source import BehaviorSource, Method
+from composer.python_code.source import BehaviorSource, Method, scopes_in
 from composer.python_code.source.trees import positional_arguments, span_of
-from composer.python_code.source.values import scopes_in
 from composer.rules.python.definitions import error, on_tick
 from composer.rules.python.uses_of_nodes import HANDLER_ANNOTATION
 
@@ -124,13 +123,13 @@ def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     """Report the handlers of subscriptions that annotate another message than they get."""
     types = {f"on_{port.name}": port.interface for port in node.ports_of(PortKind.SUBSCRIPTION)}
     for scope in scopes_in(source.own_classes):
-        type_, arguments = types.get(scope.method.name), scope.method.args.args
-        annotation = arguments[1].annotation if len(arguments) > 1 else None
-        if type_ is None or annotation is None:
+        if scope.function is None or scope.function.name not in types:
             continue
+        name, type_ = scope.function.name, types[scope.function.name]
+        annotation = next((x.annotation for x in positional_arguments(scope.function)[1:]), None)
         annotated = scope.known(scope.interface, annotation)
-        if annotated not in (None, type_.value):
-            message = f"'{scope.method.name}' gets a {type_}, not a {annotated}"
+        if annotation is not None and annotated not in (None, type_.value):
+            message = f"'{name}' gets a {type_}, not a {annotated}"
             label = Label(source.reference.text.span, "the behavior of this node")
-            span = span_of(annotation, scope.module.source)
+            span = span_of(annotation, scope.source)
             yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,))
