@@ -58,7 +58,7 @@ run: $(READY)
 
 # Five workers for two CPUs: tests with ROS mostly wait. Tests of a file share fixtures, so they stay together.
 # A dead worker fails the run: xdist would wait forever for its tests.
-test: $(READY) $(STAMPS)/tf2_msgs $(STAMPS)/dev
+test: $(READY) $(STAMPS)/dev
 	@echo "==> pytest"
 	@$(BIN)/python -m pytest --numprocesses 5 $(XDIST)
 
@@ -69,7 +69,7 @@ test-fast: $(STAMPS)/composer $(STAMPS)/dev
 	  tests/unit tests/golden tests/properties tests/cli
 
 # Problems that appear only after hundreds of starts, shutdowns and transitions.
-soak: $(READY) $(STAMPS)/tf2_msgs $(STAMPS)/dev
+soak: $(READY) $(STAMPS)/dev
 	@echo "==> pytest -m soak (a quarter of an hour)"
 	@$(BIN)/python -m pytest --soak -m soak
 	@$(BIN)/python -m pytest --hypothesis-profile thorough --timeout 600 tests/properties
@@ -165,26 +165,16 @@ $(STAMPS)/tools: requirements/tools.txt $(STAMPS)/environment
 	@$(INSTALL_PINNED)/tools.txt
 	@touch $@
 
+# With the messages of tf2, which are not on PyPI: they are built from the definitions that come with the composer.
 # pip cannot check hashes in the build environments that it makes, so this makes one itself.
-define BUILD_INTERFACES
+$(STAMPS)/interfaces: $(INTERFACES) requirements/interfaces.txt | $(STAMPS)/composer
+	@echo "==> compiling the example interfaces and tf2_msgs (once, about a minute)"
 	@rm -rf $(BUILD) && $(BIN)/python -m venv --without-pip $(BUILD)
 	@$(PIP) --python $(BUILD) install -qq --require-hashes -r requirements/interfaces.txt
+	@$(BIN)/compose interfaces build tf2_msgs --generate $(BUILD)/tf2_msgs >/dev/null
 	@$(if $(HEADERS),CPATH=$(HEADERS):$(dir $(HEADERS))) $(PIP) --python $(BUILD) wheel -qq \
 	  --no-deps --no-build-isolation --wheel-dir $(BUILD)/dist \
-	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) $(1)
+	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) ./interfaces $(abspath $(BUILD))/tf2_msgs
 	@$(INSTALL) --force-reinstall --no-deps --no-index $(BUILD)/dist/*.whl
 	@rm -rf $(BUILD)
-endef
-
-$(STAMPS)/interfaces: $(INTERFACES) requirements/interfaces.txt $(STAMPS)/environment
-	@echo "==> compiling the example interfaces (once, about half a minute)"
-	$(call BUILD_INTERFACES,./interfaces)
-	@touch $@
-
-# Not on PyPI: built from the definitions that come with the composer, for tests with transforms.
-$(STAMPS)/tf2_msgs: requirements/interfaces.txt $(STAMPS)/composer
-	@echo "==> compiling tf2_msgs (once, about half a minute)"
-	@rm -rf build/tf2_msgs
-	@$(BIN)/compose interfaces build tf2_msgs --generate build/tf2_msgs >/dev/null
-	$(call BUILD_INTERFACES,./build/tf2_msgs)
 	@touch $@

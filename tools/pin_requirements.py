@@ -29,7 +29,8 @@ def environments() -> dict[str, tuple[list[str], list[str]]]:
     build = [*_build_requirements(ROOT), EDITABLE]
     interfaces = [*_build_requirements(ROOT / "interfaces"), *BUILD_PROGRAMS]
     return {
-        "run": (["ros", "dashboard"], build),
+        # pytest for the tests of projects that compose new writes.
+        "run": (["ros", "dashboard"], [*build, "pytest>=9.0"]),
         "dev": (["ros", "dev", "docs"], build),
         "test": (["test"], build),
         "interfaces": ([], interfaces),
