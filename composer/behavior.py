@@ -250,7 +250,7 @@ class Transforms(Protocol):
         """Broadcast the transform from a declared frame to its parent.
 
         ``transform`` is a geometry_msgs/msg/Transform; by default, ``stamp`` is the current time.
-        The frame is declared in `static` or `dynamic`, without values and without `from`; that
+        The frame is declared in `static` with `from_code`, or in `dynamic` without `from`; that
         determines the topic. Raises ValueError for another frame, or a rotation that is not
         a unit quaternion.
         """

@@ -31,14 +31,17 @@ _STATIC_LISTENER = QosProfile(depth=100, durability=Durability.TRANSIENT_LOCAL)
 
 @dataclass(frozen=True, slots=True)
 class StaticTransform:
-    """A transform that does not change; without ``values``, the code of the node broadcasts it.
+    """A transform that does not change; without ``values``, child and parent coincide.
 
-    ``angles_rad`` are the angles of the rotation that are written in radians.
+    With ``from_code``, the code of the node broadcasts it. What nodes that were not written for the
+    composer broadcast is up to them. ``angles_rad`` are the angles of the rotation that are written
+    in radians.
     """
 
     child: Located[str]
     parent: Located[str]
     values: Located[Transform] | None
+    from_code: bool = False
     angles_rad: tuple[Located[float], ...] = ()
 
 

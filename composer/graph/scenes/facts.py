@@ -68,6 +68,8 @@ def transform_facts(declared: StaticTransform | DynamicTransform) -> Details:
     facts: dict[str, Plain] = {}
     if isinstance(declared, DynamicTransform):
         facts["from"] = None if declared.source is None else declared.source.value
+    elif declared.from_code:
+        facts["from_code"] = True
     elif declared.values is not None:
         translation, rotation = declared.values.value
         facts["translation_m"] = [*translation]

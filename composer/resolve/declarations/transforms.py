@@ -12,7 +12,7 @@ from composer.model import (
     Transforms,
     transform_ports,
 )
-from composer.resolve.tree_values import entries, key, number, text, text_or_opaque, texts
+from composer.resolve.tree_values import entries, flag, key, number, text, text_or_opaque, texts
 from composer.source import Located
 from composer.tree import Entry, Mapping, Sequence, Tree
 
@@ -64,6 +64,7 @@ def _static(entry: Entry) -> StaticTransform:
         key(entry),
         text_or_opaque(tree.get("parent"), entry.key.span),
         _values(entry, tree),
+        flag(tree.get("from_code"), default=False),
         tuple(angle for angle in angles if angle is not None),
     )
 

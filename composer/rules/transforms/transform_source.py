@@ -23,8 +23,8 @@ RULE = register(
         severity=Severity.ERROR,
         summary="Nothing broadcasts a declared transform.",
         why=(
-            "A static transform has values, and a dynamic one comes from a subscription with "
-            "poses. Without these, the node needs code that broadcasts it."
+            "A dynamic transform comes from a subscription with poses. Without it, or for a static "
+            "transform with 'from_code', the node needs code that broadcasts it."
         ),
         bad="""\
 system: rover
@@ -58,8 +58,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
         if errors.may_declare(node.name.value, _SUBSCRIPTION.section):
             continue
         for static in node.transforms.static:
-            if static.values is None:
-                yield from _by_code(node, static, "add 'translation_m' or a rotation")
+            if static.from_code:
+                yield from _by_code(node, static, "remove 'from_code'")
         for dynamic in node.transforms.dynamic:
             if dynamic.source is None:
                 yield from _by_code(node, dynamic, "add 'from' with a subscription")

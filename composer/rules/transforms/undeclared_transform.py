@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.frame_uses import BROADCAST, FrameUse
-from composer.analysis.frames import Declared, place, uses_of_behaviors
+from composer.analysis.frames import place, uses_of_behaviors
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
-from composer.model import DynamicTransform, Node
+from composer.model import DynamicTransform, Node, StaticTransform
 from composer.source import Located
 
 RULE = register(
@@ -89,14 +89,18 @@ def _broadcast(node: Node, frame: Located[str]) -> Iterator[Diagnostic]:
         message = f"node '{node.name}' does not declare the frame '{frame}'"
         hint = suggestion(frame.value, known) or "declare it under 'transforms: {dynamic: ...}'"
         yield Diagnostic(RULE, message, span, labels, hint)
-    elif _has_values(found):
-        message = f"the declaration of frame '{frame}' has its values already"
+    elif not _is_from_code(found):
+        message = f"the declaration broadcasts the frame '{frame}' already"
         label = Label(found.child.span, "declared here")
-        hint = "remove the values or 'from' there, or do not broadcast it here"
+        change = "remove 'from'"
+        if isinstance(found, StaticTransform):
+            values = " instead of the values" if found.values is not None else ""
+            change = f"write 'from_code: true'{values}"
+        hint = f"{change} there, or do not broadcast it here"
         yield Diagnostic(RULE, message, span, (*labels, label), hint)
 
 
-def _has_values(declared: Declared) -> bool:
+def _is_from_code(declared: StaticTransform | DynamicTransform) -> bool:
     if isinstance(declared, DynamicTransform):
-        return declared.source is not None
-    return declared.values is not None
+        return declared.source is None
+    return declared.from_code

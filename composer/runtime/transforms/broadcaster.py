@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from composer.geometry import IDENTITY
 from composer.model import (
     TF_STATIC_TOPIC,
     TF_TOPIC,
@@ -49,11 +50,11 @@ class Broadcaster:
         yield from self._publishers.values()
 
     def begin(self) -> None:
-        """Publish the static transforms with declared values: the node is being activated."""
+        """Publish the static transforms of the declaration: the node is being activated."""
         stamp = self._now()
         for child, declared in self._declared.items():
-            if isinstance(declared, StaticTransform) and declared.values is not None:
-                values = transform_message(declared.values.value)
+            if isinstance(declared, StaticTransform) and not declared.from_code:
+                values = transform_message(declared.values.value if declared.values else IDENTITY)
                 self._static[child] = stamped(declared.parent.value, child, stamp, values)
         if self._static:
             self._publish_static()

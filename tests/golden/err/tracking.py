@@ -11,6 +11,7 @@ class Tracker:
         self.transforms.look("camera", "mark")
         self.transforms.broadcast("persn", Transform())
         self.transforms.broadcast("fixed", Transform())
+        self.transforms.broadcast("same", Transform())
         self.transforms.broadcast("mark", Vector3())
         self.transforms.broadcast("/person", Transform(), stamp=None)
 

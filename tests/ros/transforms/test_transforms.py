@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseStamped, Transform, TransformStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
@@ -176,7 +176,8 @@ nodes:
     transforms:
       static:
         base: {parent: world, translation_m: {x: 0.25, z: 1}, rotation_deg: {yaw: 90}}
-        wrist: {parent: base}
+        wrist: {parent: base, from_code: true}
+        plate: {parent: base}
       dynamic: {gripper: {parent: wrist}}
   localization:
     lifecycle: {autostart: inactive}
@@ -197,11 +198,13 @@ def test_nodes_broadcast_while_they_are_active(tmp_path: Path, peer: Peer) -> No
         arm.on_tick()
         assert (dynamic, static) == ([], [])
         system.change("arm", "activate")
-        wait_until(lambda: static and len(static[-1].transforms) == 2, "static transforms")
-        base, wrist = static[-1].transforms
+        wait_until(lambda: static and len(static[-1].transforms) == 3, "static transforms")
+        frames = {item.child_frame_id: item for item in static[-1].transforms}
+        base, plate, wrist = frames["base"], frames["plate"], frames["wrist"]
         assert (base.header.frame_id, base.child_frame_id) == ("world", "base")
         assert (base.transform.translation.x, base.transform.translation.z) == (0.25, 1.0)
         assert base.transform.rotation.w == pytest.approx(math.sqrt(0.5))
+        assert plate.transform == Transform()  # the identity
         assert (wrist.child_frame_id, wrist.transform.rotation.z) == ("wrist", 0.6)
         wait_until(lambda: dynamic, "a transform on /tf")
         (gripper,) = dynamic[0].transforms
@@ -211,7 +214,7 @@ def test_nodes_broadcast_while_they_are_active(tmp_path: Path, peer: Peer) -> No
         latched: list[Any] = []
         late.create_subscription(TFMessage, "/tf_static", latched.append, STATIC)
         wait_until(lambda: latched, "latched transforms")
-        assert len(latched[0].transforms) == 2
+        assert len(latched[0].transforms) == 3
         assert "'grip' is not declared in 'transforms'" in arm.refused("grip")
         zero = TransformStamped().transform
         zero.rotation.w = 0.0
