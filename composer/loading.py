@@ -30,6 +30,7 @@ from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_over
 from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.python.type_check import TypeCheck
+from composer.rules.unused.unused_ignore import RULE as UNUSED_IGNORE
 from composer.rules.unused.unused_ignore import without_ignored
 from composer.rules.unused.unused_node_type import unused_node_types
 from composer.schema import check_schema, kind_of, kinds
@@ -58,7 +59,7 @@ class LoadResult:
     interfaces: Interfaces
     tree: Mapping | None = None
     #: What was left out because it follows from another diagnostic, also if other systems with
-    #: the same node types report it.
+    #: the same node types report it; and the used comments that they would report as unused.
     follow_ups: frozenset[_Identity] = frozenset()
 
     @property
@@ -283,7 +284,8 @@ def _finish(file: _Resolved, types: TypeCheck) -> LoadResult:
     diagnostics = add_include_labels(diagnostics, file.merged.included)
     # Comments in a node type may be about rules that only apply to the systems that use it.
     is_complete = context is not None and not context.system.node_type
-    kept = without_ignored(diagnostics, source, complete=is_complete)
+    kept, used = without_ignored(diagnostics, source, complete=is_complete)
+    follow_ups |= {(UNUSED_IGNORE.code, str(comment)) for comment in used}
     all_checks()  # import every rule, so that all names in the settings are known
     selected = [
         *apply_rule_settings(kept, project.settings),
@@ -409,6 +411,6 @@ def project_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
     diagnostics: list[Diagnostic] = []
     for diagnostic in unused_node_types(systems):
         file = diagnostic.primary.file
-        kept = without_ignored([diagnostic], file, complete=False)
+        kept, _ = without_ignored([diagnostic], file, complete=False)
         diagnostics += apply_rule_settings(kept, settings[file.path])
     return in_order(diagnostics)

@@ -79,8 +79,8 @@ class Ignore:
 
 def without_ignored(
     diagnostics: Iterable[Diagnostic], source: SourceFile, *, complete: bool
-) -> list[Diagnostic]:
-    """Return the diagnostics that no comment ignores, and one for each unused comment.
+) -> tuple[list[Diagnostic], set[Span]]:
+    """Return the diagnostics that no comment ignores, and the places of the comments that do.
 
     Unused comments are reported for ``source`` only, and only if ``complete``: if every rule ran.
     """
@@ -105,7 +105,7 @@ def without_ignored(
         names = tuple(name for rule in registered_rules() for name in (rule.code, rule.name))
         unused = (ignore for ignore in ignores_in(source) if ignore.span not in used)
         kept += [_unused(ignore, names, is_error=ignore.span in errors) for ignore in unused]
-    return kept
+    return kept, used
 
 
 def ignores_in(source: SourceFile) -> Iterator[Ignore]:
@@ -163,7 +163,8 @@ def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagno
         return Diagnostic(RULE, message, ignore.span, hint="errors cannot be ignored; fix it")
     if ignore.rule in names:
         message = f"there is no '{ignore.rule}' to ignore here"
-        return Diagnostic(RULE, message, ignore.span, hint="remove the comment")
+        hint = "remove it, unless a system that includes this file needs it"
+        return Diagnostic(RULE, message, ignore.span, hint=hint)
     close = nearest(ignore.rule, names)
     hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
     return Diagnostic(RULE, f"no rule is named '{shown(ignore.rule)}'", ignore.span, hint=hint)

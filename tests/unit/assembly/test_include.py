@@ -210,6 +210,20 @@ def test_comments_silence_in_the_file_and_where_it_is_included(tmp_path: Path) -
     assert (reported(there.diagnostics), reported(here.diagnostics)) == ([], [])
 
 
+def test_a_comment_that_only_an_including_system_needs_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    part = "system: part\nnodes:\n  b:\n    # compose: ignore[dependency-not-reached] by hand\n"
+    part += "    lifecycle: {depends_on: [a]}\n  a: {lifecycle: {autostart: active}}\n"
+    changed = "overrides: {nodes: {a: {lifecycle: {autostart: inactive}}}}"
+    whole = f"system: whole\ninclude: [{{file: part.yaml, {changed}}}]\n"
+    project(tmp_path, part=part, whole=whole)
+    unused = ["part.yaml:4:23 unused-ignore"]
+    assert reported(collect_diagnostics(load_files([Path("part.yaml")]))) == unused
+    assert collect_diagnostics(load_files([Path("part.yaml"), Path("whole.yaml")])) == []
+
+
 def test_a_folder_reports_each_diagnostic_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
