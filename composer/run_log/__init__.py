@@ -12,7 +12,7 @@ See docs/decisions/0051-run-logs.md.
 
 from composer.run_log.record import Record
 from composer.run_log.rotation import RotatingFile
-from composer.run_log.runs import Run, RunFolder, find_runs
+from composer.run_log.runs import Run, RunFolder, current_domain, find_runs
 from composer.run_log.selection import Selection, parse_since
 from composer.run_log.system_log import SystemLog
 
@@ -23,6 +23,7 @@ __all__ = [
     "RunFolder",
     "Selection",
     "SystemLog",
+    "current_domain",
     "find_runs",
     "parse_since",
 ]

@@ -46,6 +46,11 @@ class Run:
         return str(self.about().get("host", ""))
 
     @property
+    def domain(self) -> str:
+        """The ROS domain id; empty if it is not known."""
+        return str(self.about().get("domain", ""))
+
+    @property
     def whole_system(self) -> str:
         """The full name of the system, if the run is that of a process of it."""
         return self.system.rpartition("/")[0]
@@ -106,7 +111,7 @@ class RunFolder:
         # Not inherited by processes that user code forks, as a lock of flock() would be.
         self._about = (self.path / _ABOUT).open("x", encoding="utf-8")
         about = {"system": system, "host": socket.gethostname(), "pid": os.getpid()}
-        about |= {"part": part, "forwarded": forwarded}
+        about |= {"part": part, "forwarded": forwarded, "domain": current_domain()}
         self._about.write(f"{json.dumps(about)}\n")
         self._about.flush()
         with suppress(OSError):  # a file system without locks: the run does not look running
@@ -117,6 +122,11 @@ class RunFolder:
     def close(self) -> None:
         """Mark the run as ended."""
         self._about.close()
+
+
+def current_domain() -> str:
+    """Return the ROS domain id of this process, without leading zeros."""
+    return os.environ.get("ROS_DOMAIN_ID", "").lstrip("0") or "0"
 
 
 def find_runs(logs: Path, system: str | None = None) -> list[Run]:
@@ -142,7 +152,9 @@ def find_runs(logs: Path, system: str | None = None) -> list[Run]:
 
 def find_parts(logs: Path, whole: Run) -> list[Run]:
     """Return the runs of processes of a system whose lines its own run does not log."""
-    own = {"part": True, "forwarded": False, "host": whole.host}
+    own: dict[str, Any] = {"part": True, "forwarded": False, "host": whole.host}
+    if whole.domain:
+        own["domain"] = whole.domain
     return [
         run
         for name, folder in _systems(logs)

@@ -32,7 +32,8 @@ class SystemLog:
         self._run = run
         self._reader = RunReader(run)
         self._parts: dict[Path, RunReader] = {}
-        runs = [each for each in find_runs(logs, run.system) if each.system == run.system]
+        same = (run.system, run.domain)
+        runs = [each for each in find_runs(logs, run.system) if (each.system, each.domain) == same]
         names = [each.name for each in runs]
         number = names.index(run.name) if run.name in names else 0
         self._from_ns = _start_ns(run) if number > 0 else 0

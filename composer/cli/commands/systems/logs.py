@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 EPILOGS = {
     "logs": examples(
-        "compose logs                                  the latest run",
+        "compose logs                                  the latest run in this domain",
         "compose logs planner motor_controller         two nodes",
         "compose logs -f --level warn                  follow warnings and errors",
         "compose logs --since 10m '/perception/*'      the last ten minutes",
@@ -79,7 +79,7 @@ def logs(
             "-s",
             metavar="SYSTEM",
             help="Name or file of the system.",
-            show_default="the system that was started last",
+            show_default="the system that was started last in this ROS domain",
         ),
     ] = None,
     run: Annotated[
@@ -92,6 +92,9 @@ def logs(
     json: Json = False,
 ) -> None:
     """Print the log of a run, also after its end.
+
+    By default, this is the last run in the current ROS domain (ROS_DOMAIN_ID), or of all domains if
+    there is none. A heading on stderr names it.
 
     The log of a system includes its processes on this computer, whatever has started them, and
     those on other computers that 'compose up --hosts' has started here.
@@ -109,6 +112,8 @@ def logs(
     from composer.run_log import SystemLog
 
     folder = _folder()
+    if not json:
+        say(_heading(chosen))
     printed = 0
     try:
         with SystemLog(folder, chosen) as log:
@@ -169,7 +174,10 @@ def _folder() -> Path:
 
 def _chosen(runs: list[Run], name: str | None) -> Run:
     if name is None:
-        return runs[-1]
+        from composer.run_log import current_domain
+
+        domain = current_domain()
+        return next((run for run in reversed(runs) if run.domain == domain), runs[-1])
     for run in runs:
         if run.name == name:
             return run
@@ -182,6 +190,16 @@ def _chosen(runs: list[Run], name: str | None) -> Run:
     )
 
 
+def _heading(run: Run) -> str:
+    domain = f", domain {run.domain}" if run.domain else ""
+    state = "running" if run.is_running() else "ended"
+    return f"==> {run.system}{domain}, started {_local(run)}, {state} (run {run.name})"
+
+
+def _local(run: Run) -> str:
+    return run.started.strftime("%Y-%m-%d %H:%M:%S")
+
+
 def _listed(runs: list[Run], *, json: bool) -> str:
     if json:
         from composer.cli.support.output.results import as_json
@@ -190,6 +208,7 @@ def _listed(runs: list[Run], *, json: bool) -> str:
             {
                 "run": run.name,
                 "system": run.system,
+                "domain": run.domain or None,
                 "started": run.started.isoformat(timespec="milliseconds"),
                 "running": run.is_running(),
                 "folder": str(run.folder),
@@ -197,11 +216,11 @@ def _listed(runs: list[Run], *, json: bool) -> str:
             for run in runs
         ]
         return as_json(content, indent=2)
-    rows = [("run", "system", "started", "process", "folder")]
+    rows = [("run", "system", "domain", "started", "process", "folder")]
     for run in runs:
-        started = run.started.strftime("%Y-%m-%d %H:%M:%S")
         process = f"{run.pid} (running)" if run.is_running() else run.pid
-        rows.append((run.name, run.system, started, process, _short(run.folder)))
+        domain = run.domain or "-"
+        rows.append((run.name, run.system, domain, _local(run), process, _short(run.folder)))
     return columns(rows)
 
 
