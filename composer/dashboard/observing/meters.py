@@ -7,7 +7,6 @@ between, so the rate is right although a fast topic is not read completely.
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 from composer.dashboard.observing.large_messages import LARGE_BYTES, LARGE_TYPES, large_profile
 from composer.model import PortKind
 from composer.qos import Durability, QosProfile, Reliability
+from composer.remote.messages.rates import TopicRate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +28,6 @@ _DEPTH = 100
 _WINDOW_S = 3.0
 #: A topic is silent after this many times the length of the window.
 _SILENT_PERIODS = 3
-_MAX_SAMPLES = 3000
 _MAX_TAKEN = 200
 
 
@@ -57,10 +56,7 @@ class _Meter:
     messages: int = 0
     lost: int = 0
     last_number: int = 0
-    #: Source time, size, and messages that were published since the sample before.
-    window: deque[tuple[float, int, int]] = field(
-        default_factory=lambda: deque(maxlen=_MAX_SAMPLES)
-    )
+    rate: TopicRate = field(default_factory=TopicRate)
 
 
 class TopicMeters:
@@ -139,13 +135,13 @@ def _take(meter: _Meter) -> None:
     samples = meter.sampled.take(_MAX_TAKEN)
     is_complete = len(samples) < meter.profile.depth
     for sample in samples:
-        published = 1
+        missed = 0
         if meter.has_one_publisher and 0 < meter.last_number < sample.number:
-            published = sample.number - meter.last_number
-            meter.lost += (published - 1) * is_complete
+            missed = sample.number - meter.last_number - 1
+            meter.lost += missed * is_complete
         meter.last_number = sample.number
         meter.messages += 1
-        meter.window.append((sample.at_s, len(sample.content), published))
+        meter.rate.add(sample.at_s, len(sample.content), missed)
     large = large_profile(meter.profile)
     if large != meter.profile and any(len(sample.content) >= LARGE_BYTES for sample in samples):
         meter.sampled.close()
@@ -154,21 +150,18 @@ def _take(meter: _Meter) -> None:
 
 
 def _figures(meter: _Meter, now_s: float) -> TopicFigures:
-    window = meter.window
-    while len(window) > 2 and window[0][0] < now_s - _WINDOW_S:
-        window.popleft()
-    if not window:
+    rate = meter.rate
+    rate.forget_before(now_s - _WINDOW_S)
+    mean_bytes = rate.mean_bytes
+    if mean_bytes is None:
         return TopicFigures(None, None, None, None, 0, 0)
-    passed_s = window[-1][0] - window[0][0]
-    is_silent = now_s - window[-1][0] > max(_WINDOW_S, _SILENT_PERIODS * passed_s)
-    published = sum(item[2] for item in list(window)[1:])
-    sizes = sum(item[1] for item in window) / len(window)
-    rate_hz = 0.0 if is_silent else published / passed_s if passed_s > 0.0 else None
+    is_silent = now_s - rate.last_s > max(_WINDOW_S, _SILENT_PERIODS * rate.span_s)
+    rate_hz = 0.0 if is_silent else rate.hertz
     return TopicFigures(
         rate_hz=rate_hz,
-        bytes_per_s=None if rate_hz is None else rate_hz * sizes,
-        mean_bytes=sizes,
-        age_s=max(0.0, now_s - window[-1][0]),
+        bytes_per_s=None if rate_hz is None else rate_hz * mean_bytes,
+        mean_bytes=mean_bytes,
+        age_s=max(0.0, now_s - rate.last_s),
         messages=meter.messages,
         lost=meter.lost,
     )

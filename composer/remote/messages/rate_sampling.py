@@ -13,6 +13,7 @@ from typing import Any, Self
 
 from rclpy.subscription import Subscription
 
+from composer.remote.messages.rates import TopicRate
 from composer.remote.messages.topics import measuring_qos
 from composer.remote.messages.values import InvalidValueError, class_of
 from composer.remote.session import Session
@@ -28,13 +29,13 @@ class RateMeter:
     def __init__(self, session: Session, topics: Mapping[str, tuple[str, ...]]) -> None:
         self._graph = session.graph
         self._node = session.node
-        self._sent_ns: dict[str, list[int]] = {}
+        self._rates: dict[str, TopicRate] = {}
         self._subscriptions: dict[str, Subscription] = {}
         for topic, types in topics.items():
             subscription = self._subscribe(topic, types)
             if subscription is not None:
                 self._subscriptions[topic] = subscription
-                self._sent_ns[topic] = []
+                self._rates[topic] = TopicRate()
 
     def __enter__(self) -> Self:
         return self
@@ -44,17 +45,15 @@ class RateMeter:
             self._node.destroy_subscription(subscription)
 
     def measure(self, duration_s: float) -> dict[str, float]:
-        """Return messages per second by topic, for topics with at least two messages."""
+        """Return messages per second by topic, for topics with at least two bursts of messages."""
         end_s = time.monotonic() + duration_s
         while time.monotonic() < end_s:
             for topic, subscription in self._subscriptions.items():
-                self._sent_ns[topic] += _take_timestamps(subscription)
+                for at_s in _take_timestamps(subscription):
+                    self._rates[topic].add(at_s)
             time.sleep(_POLL_PERIOD_S)
-        return {
-            topic: (len(times) - 1) * 1e9 / (times[-1] - times[0])
-            for topic, times in self._sent_ns.items()
-            if len(times) > 1 and times[-1] > times[0]
-        }
+        rates = {topic: rate.hertz for topic, rate in self._rates.items()}
+        return {topic: hertz for topic, hertz in rates.items() if hertz is not None}
 
     def _subscribe(self, topic: str, types: tuple[str, ...]) -> Subscription | None:
         publishers = self._graph.topic(topic, types).publishers
@@ -74,10 +73,10 @@ def _ignore(_: Any) -> None:
     """Serve as a callback that is never called."""
 
 
-def _take_timestamps(subscription: Subscription) -> list[int]:
-    """Take all messages; return their source timestamps in nanoseconds."""
+def _take_timestamps(subscription: Subscription) -> list[float]:
+    """Take all messages; return their source timestamps in seconds."""
     times = []
     with subscription.handle:
         while (found := subscription.handle.take_message(subscription.msg_type, True)) is not None:
-            times.append(int(found[1]["source_timestamp"]))
+            times.append(int(found[1]["source_timestamp"]) / 1e9)
     return times

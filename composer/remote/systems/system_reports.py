@@ -12,7 +12,7 @@ from typing import TypeAlias, TypeVar
 from composer.fast_dataclass import dataclass
 from composer.report.display import visible
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, merged_chains
-from composer.runtime.metrics.numbers import finite, whole
+from composer.runtime.metrics.numbers import finite, optional, whole
 from composer.runtime.ros.diagnostic_arrays import read_array
 
 
@@ -25,10 +25,10 @@ class NodeReport:
     """A node as its manager reports it. ``since_s`` is in seconds since 1970.
 
     ``depends_on`` are the states that the nodes it depends on must have, by their full names.
-    ``sent``, ``received`` and ``dropped`` count messages by topic; the last is without zeros.
-    ``process`` is the process of the system that it runs in, empty for the one that reports.
-    ``host`` and ``pid`` are those of the operating system's process; ``pid`` is empty while none
-    runs or it is not known.
+    Rates and ``busy`` are None if they are not known, as of an executable. ``sent``, ``received``
+    and ``dropped`` count messages by topic; the last is without zeros. ``process`` is the process
+    of the system that it runs in, empty for the one that reports. ``host`` and ``pid`` are those of
+    the operating system's process; ``pid`` is empty while none runs or it is not known.
     """
 
     node: str
@@ -39,9 +39,9 @@ class NodeReport:
     errors: int
     last_error: str
     held_down: str
-    sent_hz: float
-    received_hz: float
-    busy: float
+    sent_hz: float | None
+    received_hz: float | None
+    busy: float | None
     slowest: str
     overruns: int
     queue_drops: int
@@ -233,9 +233,9 @@ def _node_report(status_name: str, values: Mapping[str, str], host: str) -> Node
         errors=whole(values["errors"]),
         last_error=values["last_error"],
         held_down=values["held_down"],
-        sent_hz=finite(values["sent_hz"]),
-        received_hz=finite(values["received_hz"]),
-        busy=finite(values["busy"]),
+        sent_hz=optional(values["sent_hz"]),
+        received_hz=optional(values["received_hz"]),
+        busy=optional(values["busy"]),
         slowest=values["slowest"],
         overruns=whole(values["overruns"]),
         queue_drops=whole(values["queue_drops"]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from composer.runtime.metrics.figures import ChainFigures
+from composer.runtime.metrics.numbers import optional_text
 from composer.runtime.ros.diagnostic_arrays import Level, Status
 from composer.runtime.supervision.status import NodeStatus, SystemStatus
 
@@ -78,9 +79,9 @@ def _of_node(system: str, node: NodeStatus) -> Status:
         "errors": str(node.errors),
         "last_error": node.last_error,
         "held_down": node.held_down,
-        "sent_hz": f"{node.sent_hz:.1f}",
-        "received_hz": f"{node.received_hz:.1f}",
-        "busy": f"{node.busy:.4f}",
+        "sent_hz": optional_text(node.sent_hz, 1),
+        "received_hz": optional_text(node.received_hz, 1),
+        "busy": optional_text(node.busy, 4),
         "slowest": node.slowest,
         "overruns": str(node.overruns),
         "queue_drops": str(node.queue_drops),

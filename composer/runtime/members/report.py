@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from composer.runtime.metrics.numbers import finite
+from composer.runtime.metrics.numbers import finite, optional
 from composer.runtime.ros.diagnostic_arrays import read_array
 
 #: Processes report every second. One that has not reported for this time is lost.
@@ -108,7 +108,7 @@ def _node(values: Mapping[str, str], host: str) -> MemberState:
 def _figures(values: Mapping[str, str], host: str) -> Mapping[str, Any]:
     """Return the figures in a report from a host; none if it is not of this version."""
     try:
-        rates = {name: finite(values[name]) for name in _RATES}
+        rates = {name: optional(values[name]) for name in _RATES}
         counts = {name: int(values[name]) for name in _COUNTS}
         by_name = {name: _counts(values[name]) for name in _COUNTS_BY_NAME}
     except (KeyError, ValueError):

@@ -22,3 +22,13 @@ def whole(text: str) -> int:
         return int(text)
     except ValueError:
         raise ValueError(f"'{text:.80}' is not an integer") from None
+
+
+def optional_text(number: float | None, digits: int) -> str:
+    """Return a number as text with some digits after the point; empty if it is not known."""
+    return "" if number is None else f"{number:.{digits}f}"
+
+
+def optional(text: str) -> float | None:
+    """Return the number of :func:`optional_text`. Raises ValueError."""
+    return finite(text) if text else None

@@ -32,8 +32,9 @@ class NodeStatus:
     and ``host`` its computer, empty for that of the process that reports.
 
     Rates are in hertz over the last second, and so is ``busy``, the share of a thread that its
-    callbacks took. ``slowest`` is the callback with the longest call so far, and its time.
-    ``calls`` and ``skipped`` are as in a ``NodeSummary``.
+    callbacks took; they are None if they are not known, as of an executable. ``slowest`` is the
+    callback with the longest call so far, and its time. ``calls`` and ``skipped`` are as in a
+    ``NodeSummary``.
     ``overruns`` counts calls over their ``budget_ms``, ``queue_drops`` messages and calls that full
     queues dropped, ``qos_events`` the events of :mod:`composer.runtime.ports.qos_events` by name.
     ``sent``, ``received`` and ``dropped`` count messages by topic.
@@ -53,9 +54,9 @@ class NodeStatus:
     last_error: str = ""
     held_down: str = ""
     errors: int = 0
-    sent_hz: float = 0.0
-    received_hz: float = 0.0
-    busy: float = 0.0
+    sent_hz: float | None = None
+    received_hz: float | None = None
+    busy: float | None = None
     slowest: str = ""
     overruns: int = 0
     queue_drops: int = 0
@@ -154,6 +155,7 @@ class Status:
         self._counters_before: dict[str, _Counters] = {}
         now_s = time.time()
         models = {node.name.value: node for node in system.nodes}
+        self._in_process = {name for name, node in models.items() if node.in_process}
         self._topics = {
             name: {port.name.value: port.full_name for port in node.ports}
             for name, node in models.items()
@@ -276,7 +278,9 @@ class Status:
         return replace(node, **reported) if reported else node
 
     def _counted(self, name: str, node: NodeStatus, counters: Statistics) -> NodeStatus:
-        rates = self._counters[name].rates(self._counters_before.get(name))
+        rates: Mapping[str, float] = {}
+        if name in self._in_process:
+            rates = self._counters[name].rates(self._counters_before.get(name))
         return replace(
             node,
             **rates,  # type: ignore[arg-type]  # of fields that are floats

@@ -52,9 +52,9 @@ def ps(
     """List running systems and their nodes.
 
     For each node, the list has the state and its duration, the number of restarts and errors, the
-    message rates over the last second, and the last error. Nodes of other processes of a system are
-    listed there, with the process. Lifecycle nodes that do not belong to a system are listed with
-    their states. If a system is of another version of ros2-composer, only
+    message rates over the last second (- if they are not known), and the last error. Nodes of other
+    processes of a system are listed there, with the process. Lifecycle nodes that do not belong to
+    a system are listed with their states. If a system is of another version of ros2-composer, only
     the states of its nodes are listed. With --json, the output includes callback timings, which
     'compose top' shows as a table.
 
@@ -167,8 +167,8 @@ def _row(node: NodeReport) -> tuple[str, ...]:
         _duration(time.time() - node.since_s),
         str(node.restarts),
         str(node.errors),
-        f"{node.sent_hz:.1f}",
-        f"{node.received_hz:.1f}",
+        "-" if node.sent_hz is None else f"{node.sent_hz:.1f}",
+        "-" if node.received_hz is None else f"{node.received_hz:.1f}",
         node.last_error,
     )
 
