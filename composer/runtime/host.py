@@ -97,7 +97,7 @@ class Host:
         self._up, self._down = up, down
         self._options = options or HostOptions()
         self._main_queue: MainQueue[Item] = MainQueue()
-        self._reporter = Reporter(report)
+        self._reporter = Reporter(report, self._options.started_at_s)
         order = in_dependency_order(system, dependency_edges(system))
         self._status = Status(system, order, self._options.started_by)
         self._node_set = NodeSet(

@@ -29,7 +29,8 @@ class HostOptions:
     then: the end of Python may hang as well. It also limits each call of the start that may never
     return from the middleware and, with a minute to spare, the bring-up and a run of ``run_for_s``.
     ``ends_process`` promises that the process ends after the run, by ``os._exit`` if the outcome
-    requires it. ``on_alive()`` is called every second.
+    requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
+    by ``time.monotonic()``; by default, from when the host is created.
     """
 
     run_for_s: float | None = None
@@ -44,6 +45,7 @@ class HostOptions:
     fail_on_error: bool = False
     ends_process: bool = False
     on_alive: Callable[[], None] = lambda: None
+    started_at_s: float | None = None
     process: Process | None = None
     started_by: str = ""
     member_command: Sequence[str] = ()

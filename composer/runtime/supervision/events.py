@@ -17,7 +17,7 @@ from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 
 @dataclass(frozen=True, slots=True)
 class StateChanged:
-    """A node has reached a primary state; ``elapsed_s`` counts from the start of the host."""
+    """A node has reached a primary state; ``elapsed_s`` counts from the start."""
 
     elapsed_s: float
     node: str
@@ -182,11 +182,12 @@ class Reporter:
     The system keeps running without its listener: the first exception of it ends the reports.
     """
 
-    def __init__(self, listener: Report | None) -> None:
+    def __init__(self, listener: Report | None, started_at_s: float | None = None) -> None:
+        """Count times of events from ``started_at_s``, by ``time.monotonic()``; or from now."""
         self._listener = listener
         # Reentrant: garbage collection may run a finalizer that logs, at any allocation.
         self._lock = threading.RLock()
-        self._started_at_s = time.monotonic()
+        self._started_at_s = time.monotonic() if started_at_s is None else started_at_s
 
     @property
     def elapsed_s(self) -> float:

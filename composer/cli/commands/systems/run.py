@@ -344,6 +344,7 @@ def _options(
     from composer.cli.support.process import end_within
     from composer.model import LogLevel
     from composer.runtime.host_options import HostOptions
+    from composer.runtime.process.start_time import process_start_s
 
     return HostOptions(
         run_for_s=run_for,
@@ -352,4 +353,5 @@ def _options(
         log_level=LogLevel.INFO if level is None else LogLevel(level.value),
         end_within=end_within,
         ends_process=True,
+        started_at_s=process_start_s(),
     )
