@@ -50,6 +50,7 @@ _ROS = (
     r"|`(?:Time|Duration|Parameter|Future\[|Client\[|Publisher\[|rclpy\.)"
     r"|between `Literal\['[^`]*` and `(?:int|float)`"
 )
+_RESULT_FOR_RCLPY = r" return (?:type )?`[\w.]*(?:_Response|_Result|CallbackReturnType)`"
 #: A missing module of rclpy; the composer checks other imports itself.
 _KNOWN_PACKAGE = r"`rclpy\."
 _BUILTINS = frozenset(
@@ -119,9 +120,8 @@ class Relevance:
     def _is_kept(self, kind: str, message: str, span: Span) -> bool:
         if kind == "unbound-name":
             return not self.is_class and "may be" not in message
-        if kind == "bad-return" and self.is_class:  # an annotation may be wrong
-            function = self.code.function_at(span.line)
-            return function is not None and function.returns is None
+        if kind == "bad-return" and self.is_class:  # other annotations may be wrong
+            return re.search(_RESULT_FOR_RCLPY, message) is not None
         node = self.code.expression_at(span)
         if kind == "missing-attribute":
             return self._keeps_attribute(message, node)

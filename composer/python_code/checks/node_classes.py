@@ -142,8 +142,10 @@ def _missing_calls(code: Code) -> Iterator[Problem]:
             if is_switch and has_publishers and not _calls_base(method.node, method.name):
                 message = f"'{method.name}' does not {transition} the lifecycle publishers"
                 hint = f"end it with 'return super().{method.name}(state)'"
-                returned = [x for x in method.node.body if isinstance(x, ast.Return)]
-                span = span_of(returned[0], module.source) if returned else method.span
+                values = [
+                    x.value for x in method.node.body if isinstance(x, ast.Return) and x.value
+                ]
+                span = span_of(values[-1], module.source) if values else method.span
                 yield Problem(Family.CONSTRUCTOR, message, span, hint, is_certain=False)
 
 
