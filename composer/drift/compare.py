@@ -14,6 +14,7 @@ from composer.model import ExecutableKind, LifecycleKind, Node, PrimaryState, Sy
 from composer.plan import bring_up
 
 _MANAGER = "manager"
+_NODES_HINT = "if its program creates them all, list their names under 'nodes' of the executable"
 _MANAGER_SERVICE = "is_active"
 #: States in which a node has its ports.
 _WITH_PORTS = ("inactive", "active")
@@ -41,11 +42,14 @@ def _differences(
     ignored: Sequence[str],
 ) -> Iterator[Drift]:
     states = states_after_bring_up(system, autostart)
-    declared = {node.full_name for node in system.nodes}
+    declared = {name for node in system.nodes for name in (node.full_name, *node.inner_nodes)}
     others = [node for node in snapshot.nodes if node.full_name not in declared]
     for node in system.nodes:
         observed = snapshot.node(node.full_name)
         state = states[node.name.value]
+        if not _may_be_absent(node, state):
+            absent = (name for name in node.inner_nodes if snapshot.node(name) is None)
+            yield from (Drift(DriftKind.MISSING_NODE, name, span=node.name.span) for name in absent)
         if observed is None:
             if _may_be_absent(node, state):
                 continue
@@ -64,7 +68,8 @@ def _may_be_absent(node: Node, state: str) -> bool:
     executable = node.executable
     if executable is None or node.external is not None:
         return False
-    if executable.kind is ExecutableKind.TASK:
+    are_unknown = node.keeps_names and not executable.nodes
+    if are_unknown or executable.kind is ExecutableKind.TASK:
         return True
     is_managed = executable.lifecycle is LifecycleKind.MANAGED
     return state == "unconfigured" or (state == "inactive" and not is_managed)
@@ -105,6 +110,7 @@ def _of_node(node: Node, observed: ObservedNode, state: str) -> Iterator[Drift]:
             node.full_name,
             declared="1",
             live=str(observed.count),
+            hint=_NODES_HINT if node.executable is not None and not node.keeps_names else "",
             span=node.name.span,
         )
     yield from _of_state(node, observed, state)

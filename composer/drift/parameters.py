@@ -2,48 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from composer.diagnostics import shown
 from composer.drift.drift import Drift, DriftKind
 from composer.drift.snapshot import ObservedNode
-from composer.model import Node
+from composer.model import Node, Parameter
+from composer.source import Located
+from composer.tree import Plain
 
 
 def compare_parameters(node: Node, observed: ObservedNode) -> Iterator[Drift]:
-    """Yield the declared parameters that the node does not have, or has with another value.
+    """Yield the declared parameters that the node does not have, and those with another value.
 
     Further parameters of the node, such as ``use_sim_time``, are ignored.
     """
-    valued = [parameter for parameter in node.parameters if parameter.value is not None]
-    if not valued:
-        return
+    declared = _values(node.parameters)
     if observed.parameters is None:
-        yield Drift(DriftKind.NO_ANSWER, node.full_name, "parameters", span=node.name.span)
+        if declared:
+            yield Drift(DriftKind.NO_ANSWER, node.full_name, "parameters", span=node.name.span)
         return
-    for parameter in valued:
+    names = {parameter.name.value for parameter, _ in declared}
+    for parameter, value in declared + _values(node.undeclared_parameters):
         name = parameter.name.value
         subject = f"parameter {name}"
-        if parameter.value is None:
-            continue
-        value = parameter.value.value
-        if name not in observed.parameters:
+        if name in observed.parameters:
+            live = observed.parameters[name]
+            if not _same(value.value, live):
+                yield Drift(
+                    DriftKind.WRONG_PARAMETER,
+                    node.full_name,
+                    subject,
+                    shown(value.value),
+                    shown(live),
+                    span=value.span,
+                )
+        elif name in names:
             yield Drift(
                 DriftKind.MISSING_PARAMETER,
                 node.full_name,
                 subject,
-                shown(value),
+                shown(value.value),
                 span=parameter.name.span,
             )
-        elif not _same(value, observed.parameters[name]):
-            yield Drift(
-                DriftKind.WRONG_PARAMETER,
-                node.full_name,
-                subject,
-                shown(value),
-                shown(observed.parameters[name]),
-                span=parameter.value.span,
-            )
+
+
+def _values(parameters: Iterable[Parameter]) -> list[tuple[Parameter, Located[Plain]]]:
+    return [(item, item.value) for item in parameters if item.value is not None]
 
 
 def _same(declared: object, live: object) -> bool:

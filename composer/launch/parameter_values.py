@@ -27,7 +27,7 @@ def parameter_values(
                 f"parameters of {full_name} in {text}: {problem.message}"
                 for problem in read_parameter_file(Path(text), files)
             ]
-            entries = files.all_values(full_name)
+            entries = files.given(full_name)
             values |= {name: plain(entry.value) for name, entry in entries.items()}
             continue
         name, _, value_text = text.partition(":=")

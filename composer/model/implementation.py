@@ -83,6 +83,11 @@ class Executable:
     relative ``working_directory`` is below ``folder``, that of the YAML file. A process that does
     not end after SIGINT gets SIGTERM after ``sigterm_timeout_ms``, and SIGKILL after another
     ``sigkill_timeout_ms``.
+
+    ``nodes`` are the names of the nodes that the program creates: the first is that of its entry in
+    the system, and the program keeps all of them unless the entry has a ``name``. If ``nodes`` is
+    empty, the names are not known. None: the program creates one node, which gets the name of the
+    entry.
     """
 
     span: Span = field(compare=False)
@@ -91,6 +96,7 @@ class Executable:
     name: Located[str] | None = None
     command: tuple[Located[str], ...] = ()
     arguments: tuple[Located[str], ...] = ()
+    nodes: tuple[Located[str], ...] | None = None
     environment: tuple[tuple[Located[str], str], ...] = ()
     working_directory: Located[str] | None = None
     kind: ExecutableKind = ExecutableKind.NODE

@@ -246,3 +246,11 @@ class Parameter:
     read_only: bool = False
     unit: str = ""
     description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSection:
+    """The parameters for the nodes that a name with wildcards matches, as in a parameter file."""
+
+    name: str
+    parameters: tuple[Parameter, ...]

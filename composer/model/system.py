@@ -27,6 +27,7 @@ from composer.model.ports import (
     Isolation,
     LogLevel,
     Parameter,
+    ParameterSection,
     Port,
     PortKind,
     Qos,
@@ -124,9 +125,17 @@ class Node:
     behavior: BehaviorReference | None = None
     hosted_class: HostedClass | None = None
     executable: Executable | None = None
+    conflicting: tuple[Located[str], ...] = ()  # the keys of its implementations, if several
     external: External | None = None  # takes precedence over the implementation of its type
-    only_declared: bool = False  # True: nothing undeclared is passed on
+    #: Names of nodes that its program keeps, besides its own. See ``Executable.nodes``.
+    inner_nodes: tuple[str, ...] = ()
+    keeps_names: bool = False
+    #: Whether parameters and remappings reach it even if it does not declare them.
+    gets_undeclared: bool = False
     parameters: tuple[Parameter, ...] = ()
+    undeclared_parameters: tuple[Parameter, ...] = ()  # those that it gets, with their values
+    #: What the program of an executable gets, in the order of a parameter file.
+    parameter_sections: tuple[ParameterSection, ...] = field(default=(), compare=False)
     #: With the values of parameter files that the system replaces.
     overridden_parameters: tuple[Parameter, ...] = field(default=(), compare=False)
     ports: tuple[Port, ...] = ()
@@ -172,11 +181,6 @@ class Node:
         if self.behavior is not None:
             return ImplementationKind.BEHAVIOR
         return ImplementationKind.DECLARATIVE
-
-    @property
-    def gets_undeclared(self) -> bool:
-        """Whether parameters and remappings reach the node even if it does not declare them."""
-        return not (self.only_declared or self.implementation.declares_everything)
 
     @property
     def full_name(self) -> str:

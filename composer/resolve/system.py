@@ -17,19 +17,24 @@ from composer.model import (
 from composer.names import join
 from composer.resolve.connections import read_chains, read_connections
 from composer.resolve.declarations.declaration import declare
-from composer.resolve.declarations.parameters import with_use_sim_time, with_values
+from composer.resolve.declarations.parameters import (
+    unknown_parameters,
+    with_use_sim_time,
+    with_values,
+)
 from composer.resolve.deployment.discovery import read_discovery
 from composer.resolve.deployment.hosts import read_hosts
 from composer.resolve.deployment.processes import processes_of_nodes, read_processes
 from composer.resolve.nodes.node import (
-    NodeNames,
     SystemContext,
     place_ports,
     place_transforms,
     resolve_node,
     state,
 )
+from composer.resolve.nodes.node_names import NodeNames
 from composer.resolve.nodes.node_options import read_introspection, read_supervision
+from composer.resolve.nodes.node_parameters import sections_of
 from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
@@ -43,7 +48,6 @@ from composer.resolve.tree_values import (
     is_opaque,
     key,
     plain_text,
-    text,
     text_or_opaque,
 )
 from composer.source import Located, SourceFile, Span
@@ -79,6 +83,7 @@ def resolve_system(
         system_supervision,
         tree.get("introspection"),
         files,
+        sections_of(files),
         clock,
         processes_of_nodes(processes),
         diagnostics,
@@ -126,8 +131,7 @@ def resolve_node_type(
     namespace = _system_namespace(Mapping((), span), overrides)
     given = overrides.by_node.get(name.value, {})
     own = with_use_sim_time(declared.parameters, given)
-    parameters, unknown = with_values(own, given, complete=True)
-    names = NodeNames(name.value, name.value, namespace.value)
+    names = NodeNames(name.value, namespace)
     alone = Node(
         name=name,
         namespace=namespace,
@@ -136,15 +140,17 @@ def resolve_node_type(
         behavior=declared.implementation.behavior,
         hosted_class=declared.implementation.hosted_class,
         executable=declared.implementation.executable,
-        only_declared=declared.only_declared,
-        parameters=parameters,
+        conflicting=declared.implementation.conflicting,
+        complete=not declared.implementation.conflicting,
+        gets_undeclared=declared.gets_undeclared,
+        parameters=with_values(own, given),
         ports=place_ports(declared.ports, names, (), {}),
         timers=declared.timers,
         transforms=place_transforms(declared.transforms, names, ()),
         state=declared.state,
         reactions=declared.reactions,
         introspection=read_introspection(declared.introspection),
-        unknown=unknown,
+        unknown=() if declared.gets_undeclared else unknown_parameters(own, given),
     )
     system = System(
         name=name,
@@ -170,9 +176,10 @@ def _name_span(tree: Mapping, kind: str) -> Span:
 
 def _system_namespace(tree: Mapping, overrides: Overrides) -> Located[str]:
     """Return the absolute namespace of the system. The command line overrides the file."""
-    written = overrides.namespace or text(tree.get("namespace"))
-    if written is None:
+    entry = tree.get("namespace")
+    if overrides.namespace is None and entry is None:
         return Located(ROOT, tree.span)
+    written = overrides.namespace or text_or_opaque(entry, tree.span)
     return written if is_opaque(written.value) else written.map(lambda name: join(ROOT, name))
 
 

@@ -96,4 +96,6 @@ def value_advice(key: str | int | None, value: object) -> str | None:
     items = value if isinstance(value, list) else [value]
     if key == "parameters" and any(isinstance(item, str) for item in items):
         return "list parameter files under 'parameter_files' of the system"
+    if key == "namespace" and isinstance(value, list) and value:
+        return f"write '{'/'.join(map(str, value))}'"
     return None

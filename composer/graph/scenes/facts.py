@@ -42,6 +42,7 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         "behavior": node.behavior.text.value if node.behavior is not None else None,
         "class": node.hosted_class.reference.text.value if node.hosted_class is not None else None,
         "executable": str(node.executable) if node.executable is not None else None,
+        "inner_nodes": [*node.inner_nodes],
         "external": node.external is not None or None,
         "executor": _executor(node),
         "process": node.process.value if node.process is not None else None,
@@ -57,7 +58,7 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         ],
         "parameters": {
             parameter.name.value: None if parameter.value is None else _json(parameter.value.value)
-            for parameter in node.parameters
+            for parameter in (*node.parameters, *node.undeclared_parameters)
         },
     }
     return _non_empty(facts)

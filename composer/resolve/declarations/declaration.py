@@ -40,6 +40,13 @@ class Declaration:
     only_declared: bool = False
     transforms: Transforms | None = None
 
+    @property
+    def gets_undeclared(self) -> bool:
+        """Whether parameters and remappings reach a node that does not declare them."""
+        implementation = self.implementation
+        is_foreign = implementation.hosted_class or implementation.executable
+        return is_foreign is not None and not self.only_declared
+
 
 def declare(
     tree: Mapping, folders: SourceFolders, qos: QosTable, diagnostics: list[Diagnostic]

@@ -26,20 +26,28 @@ from composer.resolve.tree_values import (
     word,
 )
 from composer.source import Located
-from composer.tree import Entry, Mapping, Scalar, Tree, plain
+from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
 
 
 @dataclass(frozen=True, slots=True)
 class Implementation:
-    """What a declaration says about its implementation; a rule reports more than one."""
+    """What a declaration says about its implementation.
+
+    If it has several, it is not clear which of them counts: they are only ``conflicting`` keys.
+    """
 
     behavior: BehaviorReference | None = None
     hosted_class: HostedClass | None = None
     executable: Executable | None = None
+    conflicting: tuple[Located[str], ...] = ()
 
 
 def read_implementation(tree: Mapping, folders: SourceFolders) -> Implementation:
     """Return the implementation of a node type or an inline node."""
+    written = (tree.entry("behavior"), tree.entry("class"), tree.entry("executable"))
+    several = [key(entry) for entry in written if entry is not None]
+    if len(several) > 1:
+        return Implementation(conflicting=tuple(several))
     behavior, hosted = text(tree.get("behavior")), text(tree.get("class"))
     arguments = tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("arguments")))
     executable = tree.entry("executable")
@@ -85,6 +93,7 @@ def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
         name=text(tree.get("name")),
         command=texts(tree.get("command")),
         arguments=_words(tree.get("arguments")),
+        nodes=texts(tree.get("nodes")) if isinstance(tree.get("nodes"), Sequence) else None,
         environment=environment(tree.get("environment")),
         working_directory=text(tree.get("working_directory")),
         kind=default.kind if kind is None else kind.value,

@@ -47,28 +47,43 @@ def with_use_sim_time(
     return (*parameters, own)
 
 
-def with_values(
-    parameters: Iterable[Parameter], given: Map[str, Entry], *, complete: bool
-) -> tuple[tuple[Parameter, ...], tuple[UnknownKey, ...]]:
-    """Return the parameters with the given values, and the unknown names.
-
-    If the node is not ``complete``, no name is reported as unknown.
-    """
-    declared = tuple(parameters)
-    if not given:
-        return declared, ()
-    valued = tuple(
+def with_values(parameters: Iterable[Parameter], given: Map[str, Entry]) -> tuple[Parameter, ...]:
+    """Return the parameters with the given values."""
+    return tuple(
         _with_value(item, given[item.name.value].value) if item.name.value in given else item
-        for item in declared
+        for item in parameters
     )
-    names = tuple(item.name.value for item in declared)
-    known = set(names)
-    unknown = tuple(
-        UnknownKey("parameters", key(entry), names)
-        for name, entry in given.items()
-        if name not in known
+
+
+def undeclared(parameters: Iterable[Parameter], given: Map[str, Entry]) -> list[Entry]:
+    """Return the given values of other parameters."""
+    known = {item.name.value for item in parameters}
+    return [entry for name, entry in given.items() if name not in known]
+
+
+def unknown_parameters(
+    parameters: Iterable[Parameter], given: Map[str, Entry]
+) -> tuple[UnknownKey, ...]:
+    """Return the given names that are none of the parameters."""
+    names = tuple(item.name.value for item in parameters)
+    return tuple(
+        UnknownKey("parameters", key(entry), names) for entry in undeclared(parameters, given)
     )
-    return valued, unknown if complete else ()
+
+
+def bare_parameter(entry: Entry) -> Parameter:
+    """Return the parameter that a value without a declaration declares."""
+    kind = _bare_type(plain(entry.value))
+    if entry.name == USE_SIM_TIME and kind != OPAQUE:
+        kind = ParameterType.BOOL
+    value = _value(entry.value, kind)
+    return Parameter(
+        name=key(entry),
+        type=Located(str(kind), entry.value.span),
+        value=value,
+        default=value,
+        span=entry.key.span,
+    )
 
 
 def inferred_type(value: Plain) -> str | None:
@@ -115,7 +130,7 @@ def _as_double(value: Plain) -> Plain:
 
 def _declaration(entry: Entry) -> Parameter:
     if not isinstance(entry.value, Mapping):
-        return _bare(entry)
+        return bare_parameter(entry)
     tree = entry.value
     kind = text_or_opaque(tree.get("type"), entry.key.span)
     default = _value(tree.get("default"), kind.value)
@@ -133,20 +148,6 @@ def _declaration(entry: Entry) -> Parameter:
         read_only=flag(tree.get("read_only"), default=False),
         unit=plain_text(tree.get("unit")),
         description=plain_text(tree.get("description")),
-    )
-
-
-def _bare(entry: Entry) -> Parameter:
-    kind = _bare_type(plain(entry.value))
-    if entry.name == USE_SIM_TIME and kind != OPAQUE:
-        kind = ParameterType.BOOL
-    value = _value(entry.value, kind)
-    return Parameter(
-        name=key(entry),
-        type=Located(str(kind), entry.value.span),
-        value=value,
-        default=value,
-        span=entry.key.span,
     )
 
 

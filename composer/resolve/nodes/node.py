@@ -15,6 +15,7 @@ from composer.model import (
     Dependency,
     LogLevel,
     Node,
+    ParameterSection,
     Port,
     PrimaryState,
     Remapping,
@@ -22,7 +23,7 @@ from composer.model import (
     Transforms,
     UnknownKey,
 )
-from composer.names import expand_name, join
+from composer.names import expand_name
 from composer.resolve.connections import PortConnection, PortConnections, connection_of
 from composer.resolve.declarations.declaration import (
     Declaration,
@@ -32,8 +33,12 @@ from composer.resolve.declarations.declaration import (
     unknown_keys,
 )
 from composer.resolve.declarations.implementation import Implementation, read_external
-from composer.resolve.declarations.parameters import with_use_sim_time, with_values
+from composer.resolve.nodes.node_names import NodeNames, node_names
 from composer.resolve.nodes.node_options import read_introspection, read_supervision
+from composer.resolve.nodes.node_parameters import (
+    GivenValues,
+    node_parameters,
+)
 from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import ParameterFiles
@@ -65,6 +70,7 @@ class SystemContext:
     supervision: Supervision
     introspection: Tree | None
     parameter_files: ParameterFiles
+    parameter_sections: tuple[ParameterSection, ...]  # all of the files
     use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
     processes: Map[str, Located[str]]  # by the nodes that they name
     diagnostics: list[Diagnostic]
@@ -91,35 +97,25 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     type_entry = tree.entry("type")
     made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
     declared = made.declaration
-    namespace = node_namespace(tree.get("namespace"), context.namespace)
-    own_name = text(tree.get("name"))
-    ros_name = entry.name if own_name is None else own_name.value
-    known = frozenset(parameter.name.value for parameter in declared.parameters)
-    has_use_sim_time = type_entry is None and USE_SIM_TIME in known
-    given = {} if has_use_sim_time else {item.name: item for item in context.use_sim_time}
-    full_name = join(namespace.value, ros_name)
-    given |= context.parameter_files.given(full_name, known)
-    own_values: dict[str, Entry] = {}
-    if type_entry is not None:
-        own_values = {item.name: item for item in entries(tree.get("parameters"))}
-    given |= own_values
-    given |= context.overrides.by_node.get(entry.name, {})
-    own = with_use_sim_time(declared.parameters, given)
-    parameters, unknown = with_values(own, given, complete=made.complete)
-    in_file = context.parameter_files.named(full_name)
-    overridden = {name: item for name, item in in_file.items() if name in own_values}
-    replaced, _ = with_values(
-        (item for item in own if item.name.value in overridden), overridden, complete=False
+    external = read_external(tree.entry("external"))
+    is_passed_on = external is not None and not declared.only_declared
+    gets_undeclared = declared.gets_undeclared or is_passed_on
+    names = node_names(entry, tree, declared.implementation.executable, context.namespace)
+    given = _given_values(entry.name, tree, declared, context)
+    parameters = node_parameters(
+        declared.parameters,
+        given,
+        names,
+        gets_undeclared=gets_undeclared,
+        is_program=declared.implementation.executable is not None and external is None,
     )
     remappings = _remappings(tree.get("remappings"))
-    names = NodeNames(entry.name, ros_name, namespace.value)
     lifecycle = tree.get("lifecycle")
-    external = read_external(tree.entry("external"))
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
     return Node(
         name=key(entry),
-        namespace=namespace,
-        own_name=own_name,
+        namespace=names.namespace,
+        own_name=names.own_name,
         span=entry.key.span,
         type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
         type_found=made.type_found,
@@ -129,10 +125,15 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         behavior=declared.implementation.behavior,
         hosted_class=declared.implementation.hosted_class,
         executable=declared.implementation.executable,
+        conflicting=declared.implementation.conflicting,
         external=external,
-        only_declared=declared.only_declared,
-        parameters=parameters,
-        overridden_parameters=replaced,
+        inner_nodes=names.inner,
+        keeps_names=names.are_kept,
+        gets_undeclared=gets_undeclared,
+        parameters=parameters.parameters,
+        overridden_parameters=parameters.overridden_parameters,
+        undeclared_parameters=parameters.undeclared_parameters,
+        parameter_sections=parameters.sections,
         ports=place_ports(declared.ports, names, remappings, context.port_connections),
         timers=declared.timers,
         transforms=place_transforms(declared.transforms, names, remappings),
@@ -150,27 +151,26 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         else read_introspection(
             declared.introspection, context.introspection, tree.get("introspection")
         ),
-        unknown=(*made.unknown, *unknown),
+        unknown=(*made.unknown, *(parameters.unknown if made.complete else ())),
         given=tuple(map(key, tree)),
-        complete=made.complete,
+        complete=made.complete and not declared.implementation.conflicting,
     )
 
 
-def node_namespace(tree: Tree | None, system: Located[str]) -> Located[str]:
-    """Return the absolute namespace of a node; a relative one is below the system's."""
-    own = text(tree)
-    if own is None:
-        return system
-    return own if is_opaque(own.value) else own.map(lambda name: join(system.value, name))
-
-
-@dataclass(frozen=True, slots=True)
-class NodeNames:
-    """The key of a node in its system, its name in ROS, and its absolute namespace."""
-
-    key: str
-    ros_name: str
-    namespace: str
+def _given_values(
+    name: str, tree: Mapping, declared: Declaration, context: SystemContext
+) -> GivenValues:
+    """Return the values for the parameters of the node with the key ``name``."""
+    is_inline = tree.entry("type") is None
+    declares_clock = any(item.name.value == USE_SIM_TIME for item in declared.parameters)
+    clock = () if is_inline and declares_clock else context.use_sim_time
+    return GivenValues(
+        {item.name: item for item in clock},
+        context.parameter_files,
+        context.parameter_sections,
+        {} if is_inline else {item.name: item for item in entries(tree.get("parameters"))},
+        context.overrides.by_node.get(name, {}),
+    )
 
 
 def place_ports(
@@ -189,7 +189,7 @@ def place_ports(
         return (
             ros_name
             if is_opaque(ros_name)
-            else expand_name(ros_name, names.ros_name, names.namespace)
+            else expand_name(ros_name, names.ros_name, names.namespace.value)
         )
 
     renamed: dict[str, str] = {}

@@ -51,24 +51,20 @@ class ParameterFiles:
             self._values[name][parameter] = (self._count, entry)
             self._count += 1
 
-    def given(self, full_name: str, declared: frozenset[str]) -> dict[str, Entry]:
+    def given(self, full_name: str, declared: frozenset[str] | None = None) -> dict[str, Entry]:
         """Return the values for the node ``full_name``, by parameter.
 
-        Sections with wildcards give values for declared parameters and ``use_sim_time`` only, since
-        others are for other nodes. Parameters of every ROS node are ignored unless declared.
+        If all of its parameters are ``declared``, sections with wildcards give values for these and
+        ``use_sim_time`` only, since others are for other nodes, and those of every ROS node are
+        ignored.
         """
-        found = {
-            parameter: value
-            for parameter, value in self._values.get(full_name, {}).items()
-            if parameter in declared or not _is_of_every_node(parameter)
-        }
-        for pattern in self._patterns.matching(full_name):
-            values = self._values[pattern]
-            for parameter in (*declared, USE_SIM_TIME):
-                if parameter in values:
-                    value = values[parameter]
-                    known = found.setdefault(parameter, value)
-                    found[parameter] = max(value, known, key=lambda item: item[0])
+        found: dict[str, tuple[int, Entry]] = {}
+        for name in self.names_for(full_name):
+            values = self._values[name]
+            for parameter in _wanted(name, values, declared):
+                value = values[parameter]
+                known = found.setdefault(parameter, value)
+                found[parameter] = max(value, known, key=lambda item: item[0])
         in_order = sorted(found.items(), key=lambda item: item[1][0])
         return {parameter: entry for parameter, (_, entry) in in_order}
 
@@ -76,19 +72,15 @@ class ParameterFiles:
         """Return the values in sections without wildcards for the node ``full_name``."""
         return {name: entry for name, (_, entry) in self._values.get(full_name, {}).items()}
 
-    def all_values(self, full_name: str) -> dict[str, Entry]:
-        """Return all values for a node whose parameters are not known, by parameter."""
-        found: dict[str, tuple[int, Entry]] = {}
-        for name in self.names_for(full_name):
-            for parameter, value in self._values[name].items():
-                known = found.setdefault(parameter, value)
-                found[parameter] = max(value, known, key=lambda item: item[0])
-        in_order = sorted(found.items(), key=lambda item: item[1][0])
-        return {parameter: entry for parameter, (_, entry) in in_order}
+    def joined(self) -> Iterator[tuple[str, list[Entry]]]:
+        """Yield all sections; those of one name are joined at the place of the first, as in rcl."""
+        for name, values in self._values.items():
+            yield name, [entry for _, entry in values.values()]
 
     def unmatched(self, nodes: Iterable[Node]) -> tuple[UnmatchedParameters, ...]:
         """Return the sections, and parameters of patterns, that are for none of the nodes."""
-        search = _Search(self, {node.full_name: node for node in nodes})
+        names = {name: node for node in nodes for name in (node.full_name, *node.inner_nodes)}
+        search = _Search(self, names)
         return tuple(found for section in self.sections for found in search.unmatched(section))
 
     def names_for(self, full_name: str) -> list[str]:
@@ -135,7 +127,9 @@ class _Search:
         if pattern not in self._declared:
             nodes = self._matching.get(pattern, [])
             names = [parameter.name.value for node in nodes for parameter in node.parameters]
-            are_known = bool(nodes) and all(node.complete for node in nodes)
+            are_known = bool(nodes) and all(
+                node.complete and not node.gets_undeclared for node in nodes
+            )
             known = dict.fromkeys([*names, USE_SIM_TIME]) if are_known else None
             self._declared[pattern] = known
         return self._declared[pattern]
@@ -153,6 +147,15 @@ def _name_without_prefix(node: Node) -> str | None:
     if not text or text == node.name.value or not node.name.value.endswith(text):
         return None
     return join(node.namespace.value, text)
+
+
+def _wanted(name: str, values: Map[str, object], declared: frozenset[str] | None) -> Iterable[str]:
+    """Return the parameters of the section ``name`` that are for a node it matches."""
+    if declared is None:
+        return values
+    if is_pattern(name):
+        return [item for item in dict.fromkeys((*declared, USE_SIM_TIME)) if item in values]
+    return [item for item in values if item in declared or not _is_of_every_node(item)]
 
 
 def _is_of_every_node(parameter: str) -> bool:

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
-from composer.model import Node
-from composer.source import Span
 
 RULE = register(
     Rule(
@@ -45,23 +43,12 @@ exec driver
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check that every node has at most one implementation."""
     for node in context.system.nodes:
-        first, *others = _implementations(node) or [("", node.span)]
-        for name, span in others:
+        for key in node.conflicting[1:]:
+            first = node.conflicting[0]
             yield Diagnostic(
                 RULE,
-                f"node '{node.name}' has '{name}' in addition to '{first[0]}'",
-                span,
-                related=(Label(first[1], f"'{first[0]}'"),),
+                f"node '{node.name}' has '{key}' in addition to '{first}'",
+                key.span,
+                related=(Label(first.span, f"'{first}'"),),
                 hint="keep one of them",
             )
-
-
-def _implementations(node: Node) -> list[tuple[str, Span]]:
-    found: list[tuple[str, Span]] = []
-    if node.behavior is not None:
-        found.append(("behavior", node.behavior.text.span))
-    if node.hosted_class is not None:
-        found.append(("class", node.hosted_class.reference.text.span))
-    if node.executable is not None:
-        found.append(("executable", node.executable.span))
-    return found

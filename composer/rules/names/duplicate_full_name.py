@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node
+from composer.source import Span
 
 RULE = register(
     Rule(
@@ -36,15 +37,21 @@ nodes:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the full names of all nodes."""
-    first: dict[str, Node] = {}
+    first: dict[str, tuple[Node, Span]] = {}
     for node in context.system.nodes:
-        known = first.setdefault(node.full_name, node)
-        if known is not node and not is_unresolved(node.full_name):
-            yield Diagnostic(
-                RULE,
-                f"nodes '{node.name}' and '{known.name}' both have the full name"
-                f" '{node.full_name}'",
-                node.ros_name.span,
-                (Label(known.ros_name.span, "the other node"),),
-                hint="set another 'name' or 'namespace'",
-            )
+        for name, span in _names(node):
+            other, place = first.setdefault(name, (node, span))
+            if other is not node and not is_unresolved(name):
+                yield Diagnostic(
+                    RULE,
+                    f"nodes '{node.name}' and '{other.name}' both have the full name '{name}'",
+                    span,
+                    (Label(place, "the other node"),),
+                    hint="set another 'name' or 'namespace'",
+                )
+
+
+def _names(node: Node) -> Iterator[tuple[str, Span]]:
+    yield node.full_name, node.ros_name.span
+    for name in node.inner_nodes:
+        yield name, node.name.span

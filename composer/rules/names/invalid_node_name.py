@@ -8,6 +8,7 @@ from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import free_name, safe_name
 from composer.diagnostics import Diagnostic, Rule, Severity, register
 from composer.names import node_name_problem
+from composer.source import Located
 
 RULE = register(
     Rule(
@@ -34,15 +35,24 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check the name of every node."""
+    """Check the name of every node, and those of inner nodes, which may be in a namespace."""
     names = {node.ros_name.value for node in context.system.nodes}
     for node in context.system.nodes:
-        name = node.ros_name
-        problem = node_name_problem(name.value)
-        if problem is not None and not is_unresolved(name.value):
-            yield Diagnostic(
-                RULE,
-                f"node name '{name}' {problem}",
-                name.span,
-                hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
-            )
+        yield from _check(node.ros_name, names)
+        listed = node.executable.nodes if node.executable is not None else None
+        for name in listed or ():
+            for part in (
+                name.value.removeprefix("/").split("/") if name is not node.own_name else ()
+            ):
+                yield from _check(Located(part, name.span), names)
+
+
+def _check(name: Located[str], names: set[str]) -> Iterator[Diagnostic]:
+    problem = node_name_problem(name.value)
+    if problem is not None and not is_unresolved(name.value):
+        yield Diagnostic(
+            RULE,
+            f"node name '{name}' {problem}",
+            name.span,
+            hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
+        )

@@ -36,8 +36,10 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check the name of every declared parameter."""
+    """Check the name of every declared parameter. rcl passes any name on to other nodes."""
     for node in context.system.nodes:
+        if node.gets_undeclared:
+            continue
         names = {parameter.name.value for parameter in node.parameters}
         for parameter in node.parameters:
             name = parameter.name

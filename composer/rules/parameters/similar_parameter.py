@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from difflib import SequenceMatcher
 from pathlib import PurePath
 
 from composer.analysis.context import Context
@@ -11,6 +10,7 @@ from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.python_nodes import behaviors
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
 from composer.model import Node, Parameter
+from composer.spelling import is_typo
 
 RULE = register(
     Rule(
@@ -46,13 +46,11 @@ on_activate: {log: "at {parameters.speed} m/s"}
 )
 
 
-#: Minimum similarity of the names, from 0 to 1.
-_ALIKE = 0.8
-
-
 def check(context: Context) -> Iterator[Diagnostic]:
     """Compare the unused parameters of derived types with those of their base types."""
-    derived = [node for node in context.system.nodes if len(_files(node)) > 1]
+    nodes = context.system.nodes
+    # What uses the parameters of a program is unknown.
+    derived = [node for node in nodes if len(_files(node)) > 1 and not node.gets_undeclared]
     if not derived:
         return
     used = {
@@ -86,7 +84,7 @@ def _compare(node: Node, parameter: Parameter) -> Iterator[Diagnostic]:
         meant = other.name.value
         if other.name.span.file.path == file or other.type.value != parameter.type.value:
             continue
-        if SequenceMatcher(None, name, meant).ratio() >= _ALIKE:
+        if is_typo(name, meant):
             yield Diagnostic(
                 RULE,
                 f"'{name}' is a new parameter that nothing uses",

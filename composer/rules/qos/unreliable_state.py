@@ -13,11 +13,12 @@ RULE = register(
     Rule(
         code="RC532",
         name="unreliable-state",
-        severity=Severity.WARNING,
+        severity=Severity.INFO,
         summary="A publisher or subscription is transient local, but best effort.",
         why=(
             "Messages from before a subscription existed are sent to it as lost ones are: again. "
-            "Best effort sends nothing again, so late joiners do not get the last message."
+            "Best effort sends nothing again, so late joiners do not get the last message. PX4 "
+            "uses both by convention, and a node that communicates with it may have to."
         ),
         bad="""\
 system: state
@@ -44,14 +45,16 @@ nodes:
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check the QoS of every publisher and subscription; a shared profile is reported once."""
+    """Check the QoS that nodes set; a shared profile is reported once."""
     for node in context.system.nodes:
+        if not node.implementation.declares_everything:
+            continue  # its QoS is only described
         for port in node.ports:
             qos = port.qos
             if port.kind.channel is ChannelKind.TOPIC and qos.known and _is_lost(qos.profile):
                 yield Diagnostic(
                     RULE,
-                    "'transient_local' has no effect with 'best_effort': late joiners get nothing",
+                    "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
                     qos.policy_span("reliability"),
                     hint="use 'reliable', or 'volatile'",
                 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
@@ -11,6 +12,7 @@ from composer.analysis.spans import part_of_path
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
 from composer.model import Node
 from composer.source import Span
+from composer.spelling import is_typo
 
 RULE = register(
     Rule(
@@ -20,7 +22,9 @@ RULE = register(
         summary="A parameter that is not declared is set, or read by an expression.",
         why=(
             "A misspelled parameter leaves the real one at its default, which goes unnoticed "
-            "until the robot moves at the wrong speed."
+            "until the robot moves at the wrong speed. A class, an executable or an external node "
+            "may have parameters that it does not declare: without 'only_declared', only a "
+            "probable misspelling is reported, as an info."
         ),
         bad="""\
 system: parameters
@@ -44,6 +48,7 @@ nodes:
 )
 
 
+_RULE_IF_PASSED_ON = replace(RULE, severity=Severity.INFO)
 _SEVERAL = 2
 _SHOWN = 3
 
@@ -58,6 +63,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         moved = _of_another_node(node, first)
         yield from _unknown(node) if moved is None else (moved,)
+        yield from _misspelled(node)
     errors = context.once(earlier_errors)
     known = {
         node.name.value: [parameter.name.value for parameter in node.parameters]
@@ -72,6 +78,18 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 span,
                 hint=suggestion(name, known[node_name]),
             )
+
+
+def _misspelled(node: Node) -> Iterator[Diagnostic]:
+    """Yield the parameters that are passed on, but named like one that is declared."""
+    for undeclared in node.undeclared_parameters:
+        name = undeclared.name
+        known = (parameter.name.value for parameter in node.parameters)
+        meant = next((other for other in known if is_typo(name.value, other)), None)
+        if meant is not None:
+            message = f"node '{node.name}' does not declare parameter '{name}'"
+            hint = f"did you mean '{meant}'?"
+            yield Diagnostic(_RULE_IF_PASSED_ON, message, name.span, hint=hint)
 
 
 def _of_another_node(node: Node, first: Mapping[str, Node]) -> Diagnostic | None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
-from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register, shown, suggestion
+from composer.analysis.context import Context, is_unresolved
+from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown, suggestion
 from composer.model import UnmatchedParameters
 from composer.names import namespace_problem
+from composer.source import Located
+from composer.spelling import is_typo
 
 RULE = register(
     Rule(
@@ -42,17 +45,21 @@ nodes:
 )
 
 
+#: A program may create a node with the name of the section, and gets its values.
+_RULE_FOR_PROGRAMS = replace(RULE, severity=Severity.INFO)
+_SHOWN = 3
+
+
 def check(context: Context) -> Iterator[Diagnostic]:
     """Check the names of nodes, and the parameters below names with wildcards."""
     # With an invalid namespace, no name matches; another rule reports it.
-    is_named = namespace_problem(context.system.namespace) is None
+    names = (context.system.namespace, *(node.full_name for node in context.system.nodes))
+    is_named = namespace_problem(names[0]) is None and not any(map(is_unresolved, names))
     is_known = is_named and not context.is_partial
+    has_programs = any(node.gets_undeclared and node.executable for node in context.system.nodes)
+    of_programs: dict[str, list[Located[str]]] = {}
     for unmatched in context.system.unmatched_parameters if is_known else ():
-        if unmatched.parameter is None:
-            yield Diagnostic(
-                RULE, _message(unmatched), unmatched.section.span, hint=_hint(unmatched)
-            )
-        else:
+        if unmatched.parameter is not None:
             name = unmatched.parameter.value
             yield Diagnostic(
                 RULE,
@@ -60,6 +67,27 @@ def check(context: Context) -> Iterator[Diagnostic]:
                 unmatched.parameter.span,
                 hint=suggestion(name, unmatched.known),
             )
+        elif has_programs and not _is_misspelled(unmatched):
+            section = unmatched.section
+            of_programs.setdefault(section.span.file.path, []).append(section)
+        else:
+            yield Diagnostic(
+                RULE, _message(unmatched), unmatched.section.span, hint=_hint(unmatched)
+            )
+    for first, *others in of_programs.values():
+        yield Diagnostic(
+            _RULE_FOR_PROGRAMS,
+            f"no node of this system is known to have the name '{shown(first.value)}'",
+            first.span,
+            tuple(Label(other.span, "nor this one") for other in others[:_SHOWN]),
+            "if a program creates it, list it under 'nodes' of its executable",
+        )
+
+
+def _is_misspelled(unmatched: UnmatchedParameters) -> bool:
+    """Return whether a section is most likely meant for a node of the system."""
+    name = unmatched.section.value
+    return unmatched.renamed is not None or any(is_typo(name, other) for other in unmatched.known)
 
 
 def _message(unmatched: UnmatchedParameters) -> str:

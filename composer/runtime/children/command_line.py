@@ -19,7 +19,14 @@ from composer.executables import (
     has_package,
     program_path,
 )
-from composer.model import ChannelKind, Executable, LogLevel, Node, ParameterType
+from composer.model import (
+    ChannelKind,
+    Executable,
+    LogLevel,
+    Node,
+    ParameterSection,
+    ParameterType,
+)
 from composer.names import expand_name
 from composer.runtime.children.child_processes import Command
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
@@ -46,7 +53,7 @@ def make_command(
         *_program(executable, {**environment, **own}),
         *(word.value for word in executable.arguments),
         "--ros-args",
-        *("-r", f"__node:={node.ros_name.value}", "-r", f"__ns:={node.namespace.value}"),
+        *_names(node),
         *(word for rule in remappings(node) for word in ("-r", rule)),
         *("--log-level", _LOG_LEVEL.get(log_level, log_level.value)),
     )
@@ -57,6 +64,14 @@ def make_command(
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
     return Command(words, changes | own, _folder(executable))
+
+
+def _names(node: Node) -> Iterator[str]:
+    """Yield the arguments for the name and the namespace that the program does not keep."""
+    if not node.keeps_names:
+        yield from ("-r", f"__node:={node.ros_name.value}")
+    if not node.keeps_names or node.namespace.value != "/":
+        yield from ("-r", f"__ns:={node.namespace.value}")
 
 
 def remappings(node: Node) -> Iterator[str]:
@@ -78,16 +93,20 @@ def remappings(node: Node) -> Iterator[str]:
 
 
 def parameter_file(node: Node) -> str:
-    """Return a ROS parameter file with the parameters of a node that have a value."""
-    lines = [f"{json.dumps(node.full_name)}:", "  ros__parameters:"]
+    """Return a ROS parameter file with what the program of a node gets; empty for nothing."""
+    return "".join(map(_section, node.parameter_sections))
+
+
+def _section(section: ParameterSection) -> str:
     values = [
-        f"    {json.dumps(parameter.name.value)}: {_yaml(parameter.value.value, kind)}"
-        for parameter in node.parameters
+        f"    {json.dumps(parameter.name.value)}: {_yaml(parameter.value.value, kind)}\n"
+        for parameter in section.parameters
         if parameter.value is not None
         and parameter.value.value != []  # rcl cannot read a list without a type
         for kind in (parameter.type.value,)
     ]
-    return "\n".join([*lines, *values, ""]) if values else ""
+    head = f"{json.dumps(section.name)}:\n  ros__parameters:\n"
+    return head + "".join(values) if values else ""
 
 
 def _program(executable: Executable, environment: Mapping[str, str]) -> tuple[str, ...]:

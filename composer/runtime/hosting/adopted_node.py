@@ -74,7 +74,8 @@ class AdoptedNode(Node):
         instance.node = self
         if options.get("automatically_declare_parameters_from_overrides"):
             for parameter in self._parameter_overrides.values():
-                self.declare_parameter(parameter.name, parameter.value)
+                if not self.has_parameter(parameter.name):
+                    self.declare_parameter(parameter.name, parameter.value)
         if options.get("enable_logger_service"):
             self._add_logger_service(lasting)
 

@@ -35,7 +35,7 @@ from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.node import WrongReturn
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.outcome import TransitionOutcome
-from composer.runtime.node.parameters import ros_value
+from composer.runtime.node.parameters import ros_parameters
 from composer.runtime.node.ros_node import make_ros_node
 
 _THREAD_ENDS_WITHIN_S = 0.2
@@ -67,11 +67,7 @@ class HostedNode(LocalNode):
         self._shared: SharedState | None = None
         #: Parameters that were set at run time. They keep their values, as those of other nodes do.
         self._kept: dict[str, RosParameter] = {}
-        self._overrides = {
-            parameter.name.value: RosParameter(parameter.name.value, value=ros_value(parameter))
-            for parameter in model.parameters
-            if parameter.value is not None
-        }
+        self._overrides = ros_parameters((*model.parameters, *model.undeclared_parameters))
         simulated = self._overrides.pop(USE_SIM_TIME, None)
         if simulated is not None:
             self._ros.set_parameters([simulated])

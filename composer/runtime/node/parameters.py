@@ -20,7 +20,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from composer.model import Parameter, ParameterType
 
-_ROS_TYPES = {
+_ROS_TYPES: Mapping[str, RosParameter.Type] = {
     ParameterType.BOOL: RosParameter.Type.BOOL,
     ParameterType.INTEGER: RosParameter.Type.INTEGER,
     ParameterType.DOUBLE: RosParameter.Type.DOUBLE,
@@ -157,6 +157,19 @@ def _declare_empty(node: Node, parameter: Parameter) -> None:
     node.declare_parameter(name, declared, _descriptor(replace(parameter, read_only=False)))
     node.set_parameters([RosParameter(name, declared, [])])
     node.describe_parameter(name).read_only = parameter.read_only
+
+
+def ros_parameters(parameters: Iterable[Parameter]) -> dict[str, RosParameter]:
+    """Return the values for a node that declares its parameters itself, by name.
+
+    Empty lists without a type are left out: rclpy could not declare them.
+    """
+    return {
+        name: RosParameter(name, _ROS_TYPES.get(parameter.type.value), ros_value(parameter))
+        for parameter in parameters
+        if parameter.value is not None and (parameter.value.value != [] or parameter.type.value)
+        for name in (parameter.name.value,)
+    }
 
 
 def ros_value(parameter: Parameter) -> Any:

@@ -15,7 +15,7 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
-from composer.model import Executable, ExecutableKind, LifecycleKind, Node
+from composer.model import Executable, ExecutableKind, LifecycleKind, LogLevel, Node
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
@@ -34,6 +34,8 @@ from composer.runtime.outside_nodes.remote_lifecycle import NotAnswered, RemoteL
 
 #: How long a killed process may take to disappear.
 _KILLED_WITHIN_S = 1.0
+#: How long after the first node of a program its other ones are in the graph, usually.
+_ALL_NODES_WITHIN_S = 1.0
 #: The longest share of the time that is left for the shutdown of the system.
 _END_SHARE = 0.5
 
@@ -102,6 +104,7 @@ class ExecutableNode(OutsideNode):
             reason = _ended(child) or f"{missing_text(missing)} after {_seconds(self._executable)}"
             await self._end_process()
             raise TransitionRefused(reason, INACTIVE)
+        self._check_names_later(child)
 
     async def _finish_task(self, child: Child, end_s: float) -> None:
         if not await self._until(child.ended.done, end_s):
@@ -142,6 +145,7 @@ class ExecutableNode(OutsideNode):
             return child.ended.done() or self._presence.has_service(service, self._earlier)
 
         if await self._until(has_services, end_s) and not child.ended.done():
+            self._check_names_later(child)
             return
         problem = f"no service {service} after {_seconds(self._executable)}"
         reason = _ended(child) or problem
@@ -213,6 +217,20 @@ class ExecutableNode(OutsideNode):
         path = self._children.prepare() / f"{self._logger}.yaml"
         path.write_text(text, encoding="utf-8")
         return replace(command, words=(*command.words, "--params-file", str(path)))
+
+    def _check_names_later(self, child: Child) -> None:
+        """Report several nodes in a program that all got the name of this one."""
+        self.loop.call_later(_ALL_NODES_WITHIN_S, partial(self._check_names, child))
+
+    def _check_names(self, child: Child) -> None:
+        count = self._presence.namesakes(self._earlier)
+        if child is self._child and not self.model.keeps_names and count > 1:
+            self._listener.write_log(
+                LogLevel.WARN,
+                self._logger,
+                f"its program creates {count} nodes, and all of them are named {self.full_name};"
+                " list the names that they have in the program under 'nodes' of the executable",
+            )
 
     async def _end_process(self) -> None:
         """End the process in order, and wait for that."""

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from rclpy.node import Node as RosNode
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.model import Node, Port, PortKind
+from composer.names import split_node_name
 from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.
-_COMMON_TOPICS = ("/rosout", "/parameter_events")
+_PARAMETER_EVENTS = "/parameter_events"  # each node has a publisher of its own
+_COMMON_TOPICS = ("/rosout", _PARAMETER_EVENTS)
 #: The service that every action server has.
 _SEND_GOAL = "/_action/send_goal"
 
@@ -26,7 +29,11 @@ class NodePresence:
     def __init__(self, manager: RosNode, model: Node) -> None:
         self._manager = manager
         self._model = model
-        self._name = (model.ros_name.value, model.namespace.value)
+        names = map(split_node_name, (model.full_name, *model.inner_nodes))
+        self._names = {(name, namespace) for namespace, name in names}
+        program = model.executable
+        #: False: any node may be one of its program.
+        self._are_known = not (model.keeps_names and program is not None and not program.nodes)
 
     def participants(self) -> frozenset[bytes]:
         """Return the prefixes of the participants with this node, as far as they are known."""
@@ -41,9 +48,15 @@ class NodePresence:
 
     def has_node(self, earlier: frozenset[bytes] = frozenset()) -> bool:
         """Return whether the node is in the graph, and not only as part of ``earlier``."""
-        if self.participants() - earlier:
+        if not self._are_known or self.participants() - earlier:
             return True
-        return not earlier and self._name in RosGraph(self._manager).nodes()
+        return not earlier and not self._names.isdisjoint(RosGraph(self._manager).nodes())
+
+    def namesakes(self, earlier: frozenset[bytes]) -> int:
+        """Return how many nodes one process has created with the name of the node."""
+        events = self._manager.get_publishers_info_by_topic(_PARAMETER_EVENTS)
+        found = Counter(map(participant, self._own(events)))
+        return max((found[item] for item in found.keys() - earlier), default=0)
 
     def missing(self, earlier: frozenset[bytes] = frozenset()) -> tuple[Port, ...]:
         """Return the declared ports that the node does not have yet."""
@@ -62,7 +75,8 @@ class NodePresence:
 
     def _own(self, endpoints: Iterable[TopicEndpointInfo]) -> Iterator[TopicEndpointInfo]:
         for endpoint in endpoints:
-            if (endpoint.node_name, endpoint.node_namespace) == self._name:
+            name = (endpoint.node_name, endpoint.node_namespace)
+            if not self._are_known or name in self._names:
                 yield endpoint
 
     def _endpoints(self, port: Port) -> list[TopicEndpointInfo]:

@@ -111,3 +111,23 @@ def test_a_class_has_the_names_and_parameters_of_ros2_run(tmp_path: Path, peer: 
     with running(SYSTEM, tmp_path) as system:
         assert system.node("robot_node").state == "active"
         assert described(peer) == expected
+
+
+def test_a_class_gets_what_it_does_not_declare_in_yaml(tmp_path: Path, peer: Peer) -> None:
+    """From parameter files, also by wildcards and with slashes in names."""
+    (tmp_path / "robot.yaml").write_text(
+        "/fleet/**: {ros__parameters: {gains: {p: 2}, start_type_description_service: true,"
+        " qos_overrides: {/all/scan: {publisher: {depth: 3}}}}}\n",
+        encoding="utf-8",
+    )
+    text = f"""
+system: one
+namespace: /fleet/one
+parameter_files: [robot.yaml]
+nodes:
+  robot_node: {{class: "{CLASSES}:Configured", remappings: {{scan: /all/scan}}}}
+"""
+    with running(text, tmp_path):
+        values = described(peer)["parameters"]
+    assert values["gains.p"] == 2
+    assert values["qos_overrides./all/scan.publisher.depth"] == 3

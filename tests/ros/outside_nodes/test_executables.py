@@ -325,3 +325,39 @@ def start_external(folder: Path) -> subprocess.Popen[Any]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
+
+
+TWO_NODES = f"""
+system: robot
+use_sim_time: true
+parameter_files: [robot.yaml]
+nodes:
+  robot:
+    executable: {{command: [{sys.executable}, {PROGRAMS / "two_nodes.py"}]}}
+    parameters: {{port: /dev/ttyACM0}}
+"""
+PARAMETERS = """
+base: {ros__parameters: {opencr: {id: 200}}}
+/drive/wheels: {ros__parameters: {radius: 0.5, port: other}}
+robot: {ros__parameters: {renamed: true}}
+"""
+
+
+def test_a_program_keeps_the_names_of_its_listed_nodes(tmp_path: Path, peer: Peer) -> None:
+    (tmp_path / "robot.yaml").write_text(PARAMETERS, encoding="utf-8")
+    text = TWO_NODES.replace(".py]", ".py], nodes: [base, drive/wheels]")
+    with running(text, tmp_path) as system:
+        port = '"port": "/dev/ttyACM0", '
+        system.wait_for_log(f'/base {{"opencr.id": 200, {port}"use_sim_time": true}}')
+        wheels = '{"port": "other", "radius": 0.5, "use_sim_time": true}'
+        system.wait_for_log(f"/drive/wheels {wheels}")
+        names = {("base", "/"), ("wheels", "/drive")}
+        wait_until(lambda: names <= set(peer.node.get_node_names_and_namespaces()), "both nodes")
+        assert system.states()[-1] == "/base active"
+
+
+def test_several_nodes_with_the_name_of_the_entry_are_reported(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(PARAMETERS, encoding="utf-8")
+    with running(TWO_NODES, tmp_path) as system:
+        system.wait_for_log('"port": "/dev/ttyACM0", "renamed": true, "use_sim_time": true}')
+        system.wait_for_log("its program creates 2 nodes, and all of them are named /robot")

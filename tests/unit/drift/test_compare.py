@@ -244,3 +244,28 @@ def test_transforms_are_published_by_their_node_and_received_by_the_manager() ->
     missing = compare(system, Snapshot((replace(mounts, endpoints=()), viewer)))
     subjects = [item.subject for item in missing if item.node == "/mounts"]
     assert subjects == ["publisher /tf_static"]
+
+
+def test_nodes_in_a_program_are_known() -> None:
+    system = system_of("""
+        system: robot
+        nodes:
+          base: {executable: {command: [base], nodes: [base, drive/wheels]}}
+    """)
+    base, wheels = (ObservedNode(name) for name in ("/base", "/drive/wheels"))
+    assert compare(system, Snapshot((base, wheels))) == ()
+    (missing,) = compare(system, Snapshot((base,)))
+    assert missing.message == "/drive/wheels: the node does not exist"
+
+
+def test_a_parameter_that_is_only_passed_on_may_be_missing() -> None:
+    system = system_of("""
+        system: robot
+        nodes:
+          arm: {executable: {command: [arm]}}
+    """)
+    passed_on = SYSTEM.nodes[0].parameters[:1]
+    system = replace(system, nodes=(replace(system.nodes[0], undeclared_parameters=passed_on),))
+    assert compare(system, Snapshot((ObservedNode("/arm"),))) == ()
+    (wrong,) = compare(system, Snapshot((ObservedNode("/arm", parameters={"speed": 2.0}),)))
+    assert wrong.message == "/arm: parameter speed is 2.0, declared 1.5"

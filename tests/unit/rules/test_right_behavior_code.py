@@ -47,6 +47,7 @@ RIGHT = [
     ("odometry", "self.statistics.extra = 1\nself.statistics.extra"),
     ("odometry", "Point(x=self.parameters.speed, y=float('1'))"),
     ("odometry", "message.__class__.__name__"),
+    ("odometry", "from collections import OrderedDict\nOrderedDict(a=1).popitem(False)"),
     ("odometry", "message.child_frame_id.upper()"),
     ("odometry", "Path().poses.append(PoseStamped())"),
     ("odometry", "items = [message]\nfor message in items:\n    message.anything"),

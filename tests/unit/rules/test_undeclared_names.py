@@ -12,9 +12,13 @@ PROGRAM = "executable: {command: [python3, -V]}"
 WORDS = "publishers: {words: {type: std_msgs/msg/String, qos: command, external: true}}"
 
 
-def reported(node: str, folder: Path) -> list[tuple[str, str]]:
-    found = diagnostics_in(f"system: robot\nnodes:\n  arm: {{{node}}}\n", folder)
-    return [(item.severity.value, item.rule.name) for item in found]
+PX4 = "{reliability: best_effort, durability: transient_local, depth: 1}"
+WHEEL = "parameters: {wheel_radius: 0.1}"
+
+
+def reported(node: str, folder: Path, above: str = "") -> list[tuple[str, str]]:
+    text = f"system: robot\n{above}nodes:\n  arm: {{{node}}}\n"
+    return [(item.severity.value, item.rule.name) for item in diagnostics_in(text, folder)]
 
 
 @pytest.mark.parametrize(
@@ -24,6 +28,7 @@ def reported(node: str, folder: Path) -> list[tuple[str, str]]:
         ("external: true, remappings: {joint_states: /arm/joint_states}", []),
         ("class: 'zzz:Arm', remappings: {chatter: news}", [("info", "class-not-installed")]),
         (f"{PROGRAM}, {WORDS}, remappings: {{chatter: news}}", []),
+        (f"{PROGRAM}, remappings: {{'lidar:scan': a, 'rostopic://~/b': b}}", []),
         (f"{PROGRAM}, {WORDS}, remappings: {{wods: news}}", [("info", "unknown-remapping")]),
         (
             f"{PROGRAM}, {WORDS}, only_declared: true, remappings: {{chatter: news}}",
@@ -33,4 +38,85 @@ def reported(node: str, folder: Path) -> list[tuple[str, str]]:
     ],
 )
 def test_remappings(node: str, expected: list[tuple[str, str]], tmp_path: Path) -> None:
+    assert reported(node, tmp_path) == expected
+
+
+@pytest.mark.parametrize(
+    ("node", "file", "expected"),
+    [
+        (PROGRAM, "arm: {ros__parameters: {a: 1, b: {c: [x]}, qos_overrides./x.y: 1}}", []),
+        (PROGRAM, "/**/arm: {ros__parameters: {a: 1, b: {c: [x]}}}", []),
+        ("external: true", "/**: {ros__parameters: {a: 1}}", []),
+        (f"{PROGRAM}, {WHEEL}", "arm: {ros__parameters: {odom0: a, odom1: b}}", []),
+        (
+            f"{PROGRAM}, {WHEEL}",
+            "arm: {ros__parameters: {wheel_radus: 0.2}}",
+            [("info", "unknown-parameter")],
+        ),
+        (
+            f"{PROGRAM}, {WHEEL}",
+            "arm: {ros__parameters: {wheel_radius: fast}}",
+            [("error", "parameter-type")],
+        ),
+        (
+            f"{PROGRAM}, {WHEEL}, only_declared: true",
+            "arm: {ros__parameters: {a: 1}}",
+            [("error", "unknown-parameter")],
+        ),
+        (
+            f"{PROGRAM}, {WHEEL}, only_declared: true",
+            "/**: {ros__parameters: {a: 1}}",
+            [("warning", "unmatched-parameters")],
+        ),
+        (WHEEL, "arm: {ros__parameters: {a: 1}}", [("error", "unknown-parameter")]),
+        # Nodes in a program, known and unknown; a name that is most likely misspelled.
+        (PROGRAM, "base: {ros__parameters: {a: 1}}", [("info", "unmatched-parameters")]),
+        (
+            "executable: {command: [python3, -V], nodes: [base, drive/wheels]}",
+            "base: {ros__parameters: {a: 1}}\ndrive/wheels: {ros__parameters: {a: 1}}",
+            [],
+        ),
+        (
+            f"{PROGRAM}, name: planner",
+            "planer: {ros__parameters: {a: 1}}",
+            [("warning", "unmatched-parameters")],
+        ),
+        (
+            f"{PROGRAM}, namespace: [a, b]",
+            "/a/b/arm: {ros__parameters: {a: 1}}",
+            [("error", "wrong-type")],
+        ),
+        (
+            f"{WHEEL}, namespace: [a, b]",
+            "/a/b/arm: {ros__parameters: {a: 1}}",
+            [("error", "wrong-type")],
+        ),
+    ],
+)
+def test_parameter_files(
+    node: str, file: str, expected: list[tuple[str, str]], tmp_path: Path
+) -> None:
+    (tmp_path / "robot.yaml").write_text(file, encoding="utf-8")
+    assert reported(node, tmp_path, "parameter_files: [robot.yaml]\n") == expected
+
+
+@pytest.mark.parametrize(
+    ("node", "expected"),
+    [
+        (f"{PROGRAM}, parameters: {{'qos_overrides./words.publisher.depth': 3, 'a b': 1}}", []),
+        (
+            f"{WORDS}, parameters: {{'qos_overrides./words.publisher.depth': 3}}",
+            [("error", "invalid-parameter-name")],
+        ),
+        ("executable: {command: [python3, -V], nodes: [base, base]}", []),
+        (
+            "executable: {command: [python3, -V], nodes: [base, front-left/wheel]}",
+            [("error", "invalid-node-name")],
+        ),
+        # PX4's QoS: described for a program, chosen for a node of the system.
+        (f"{PROGRAM}, {WORDS.replace('command', PX4)}", []),
+        (WORDS.replace("command", PX4), [("info", "unreliable-state")]),
+    ],
+)
+def test_names_and_qos(node: str, expected: list[tuple[str, str]], tmp_path: Path) -> None:
     assert reported(node, tmp_path) == expected
