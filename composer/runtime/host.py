@@ -367,7 +367,7 @@ class Host:
             end_s = min(end_s, time.monotonic() + _URGENT_S)
         self._node_set.stop_loops(end_s)
         self._is_left_to_exit = not self._node_set.destroy(end_s)
-        self._failed = self._failed or bool(self._node_set.hung)
+        self._failed = self._failed or self._node_set.has_unfinished()
         manager.retire(linger=bool(self._shutdown_commands))
         # A hung thread may run again and use what the fast exit has destroyed.
         if self._is_left_to_exit and self._options.ends_process and not self._node_set.hung:

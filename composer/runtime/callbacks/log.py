@@ -19,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import LogLevel
 from composer.runtime.executors.exceptions import describe, printable, report_of
+from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
@@ -172,7 +173,9 @@ class ErrorLog:
         self._repeats = RepeatLimit(_ERROR_PERIOD_S)
 
     def exception(self, callback: str, error: BaseException) -> None:
-        """Log an exception of ``callback``."""
+        """Log an exception of ``callback``, unless it was canceled."""
+        if issubclass(type(error), Cancelled):
+            return
         self._add(callback, partial(describe, error), partial(report_of, error))
 
     def error(self, callback: str, text: str) -> None:

@@ -32,6 +32,7 @@ class BaseLoop(ABC):
         self._name = name
         self._on_exception = on_exception
         self._tasks: set[Task[Any]] = set()
+        self._waits: set[threading.Event] = set()
         self._stopping = False
         self._stopped = False
 
@@ -92,10 +93,29 @@ class BaseLoop(ABC):
         return call.wait(timeout_s, self.current_stack)
 
     def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
-        """Block until ``future`` is done; return false if that takes longer."""
+        """Block until ``future`` is done; return false if that takes longer, or the loop stops."""
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
-        return future.done() or done.wait(timeout_s) or future.done()
+        self._waits.add(done)
+        if not (future.done() or self._stopping):
+            done.wait(timeout_s)
+        self._waits.discard(done)
+        return future.done()
+
+    def _end_waits(self) -> None:
+        """Let all waits return; the loop is stopping."""
+        for done in tuple(self._waits):
+            done.set()
+
+    def begin_blocking(self) -> object:
+        """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
+        return None
+
+    def end_blocking(self, began: Any) -> None:  # noqa: B027  nothing to do is the default
+        """End a call of code that may block."""
+
+    def hand_over_blocked(self) -> None:  # noqa: B027  nothing to do is the default
+        """Let another thread serve the loop if a call that began to block has not ended."""
 
     def current_stack(self) -> str:
         """Return the Python stacks of the callbacks that run now; empty if none does."""

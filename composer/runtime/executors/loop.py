@@ -131,10 +131,22 @@ class Loop(Protocol):
         """Return whether the calling thread is in a callback of the loop."""
 
     def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
-        """Block until ``future`` is done; return false if that takes longer.
+        """Block until ``future`` is done; return false if that takes longer, or the loop stops.
 
-        On the thread of an event loop, the loop serves everything else meanwhile. A thread of
-        another loop only blocks, so that its other threads have to complete the future.
+        An event loop gives itself another thread meanwhile. A thread of another loop only blocks,
+        so that its other threads have to complete the future.
+        """
+
+    def begin_blocking(self) -> object:
+        """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
+
+    def end_blocking(self, began: Any) -> None:
+        """End a call of code that may block."""
+
+    def hand_over_blocked(self) -> None:
+        """Let another thread serve an event loop if a call that began to block has not ended.
+
+        It is called periodically: a call that has begun before the last time blocks.
         """
 
     def start(self) -> None:

@@ -1,16 +1,23 @@
-"""The composer's own scheduler: one thread, no wait set, constant cost per event.
+"""The composer's own scheduler: one thread at a time, no wait set, constant cost per event.
 
 rcl signals what is ready (``readiness``). The scheduler serves the ready groups round robin, one
 item each, and a due timer never waits for more than one callback.
+
+If a callback of a class blocks, another thread serves the loop meanwhile: the thread of the
+callback loses its *turn*. It must not touch the loop after that, so each function that calls
+callbacks returns as soon as ``_turn`` is another one.
 """
 
 from __future__ import annotations
 
+import os
+import queue
 import threading
 from collections import deque
 from collections.abc import Callable
 from functools import partial
 from math import inf
+from threading import get_ident
 from time import monotonic, sleep
 
 from composer.runtime.executors.base_loop import (
@@ -30,6 +37,15 @@ _ROUND_S = 5e-4
 _MAX_FINAL_ROUNDS = 64  # of calls that other calls cause at shutdown
 
 
+class _Turn:
+    """The time in which one thread serves the loop. ``thread`` is its identifier."""
+
+    __slots__ = ("thread",)
+
+    def __init__(self, thread: int = 0) -> None:
+        self.thread = thread
+
+
 class Scheduler(BaseLoop):
     """Runs calls, timers, tasks and groups of sources. It runs once: start, then stop."""
 
@@ -41,9 +57,19 @@ class Scheduler(BaseLoop):
         self._ready: deque[SourceGroup] = deque()  # with something to take
         self._groups: dict[int, SourceGroup] = {}  # by the file descriptor of their signal
         self._running: object = None  # the source or callback that is being called
+        self._timer: ScheduledCall | None = None  # whose callback is being called
         self._sleeping = False
-        self._leaving = False  # the innermost call of _serve_until_left returns
-        self._thread = threading.Thread(target=self._spin, name=f"executor {name}", daemon=True)
+        self._turn = _Turn()
+        #: Callbacks whose threads have lost their turn, by the identifiers of the threads.
+        self._blocked: dict[int, object] = {}
+        #: Holds one item while the code of a class has the turn; removing it takes the turn away.
+        self._may_block: list[bool] = []
+        self._checked: list[bool] = []  # ``_may_block`` at the last check
+        self._handing_over = threading.Lock()
+        self._turns: queue.SimpleQueue[_Turn | None] = queue.SimpleQueue()  # for idle threads
+        self._idle: list[threading.Thread] = []
+        self._threads: list[threading.Thread] = []
+        self._add_thread(self._turn)
 
     def call_soon(self, callback: Callable[[], object]) -> None:
         """Call ``callback`` on the loop as soon as it is free."""
@@ -53,73 +79,139 @@ class Scheduler(BaseLoop):
 
     def start(self) -> None:
         """Start the thread of the loop."""
-        self._thread.start()
+        self._threads[0].start()
 
     def native_thread_ids(self) -> tuple[int, ...]:
         """Return Linux's ids of all threads of the loop, once it was started."""
-        return (self._thread.native_id or 0,)
+        return tuple(thread.native_id or 0 for thread in self._threads)
 
     def stop(self, timeout_s: float) -> bool:
-        """Stop the thread; return false if a callback did not return in time.
+        """Stop the threads; return false if a callback did not return in time.
 
         Tasks are canceled and get a moment to clean up. On the loop itself, this requests the stop
         and returns false.
         """
+        until_s = monotonic() + timeout_s
         self._stopping = True
-        self._leaving = True
+        self._end_waits()
         if self.is_current():
             return False
-        if self._thread.ident is None:  # never started
+        if self._threads[0].ident is None:  # never started
             self._shut_down()
             return True
         self._poller.wake()
-        self._thread.join(timeout_s)
-        if not self._thread.is_alive():
+        for thread in tuple(self._threads):
+            thread.join(max(0.0, until_s - monotonic()))
+        if not any(thread.is_alive() for thread in self._threads):
             return True
         for task in tuple(self._tasks):
             task.abandon()
         return False
 
-    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
-        """Block until ``future`` is done; return false if that takes longer.
-
-        On the thread of the loop, in a callback, everything else is served meanwhile, except the
-        group of the callback itself.
-        """
-        if not self.is_current():
-            return super().wait_for(future, timeout_s)
-        end_s = inf if timeout_s is None else monotonic() + timeout_s
-        timer = None if timeout_s is None else self.call_later(timeout_s, self._leave)
-        future.add_done_callback(self._leave)
-        self._timers.next_due_s()  # without the timer that is calling now, if any
-        running = self._running
-        try:
-            while True:
-                self._leaving = False  # first: the future may be done before the next check
-                if future.done() or self._stopping or monotonic() >= end_s:
-                    break
-                self._serve_until_left()
-        finally:
-            self._running = running
-            self._leaving = True  # a call further out checks its own future
-            if timer is not None:
-                timer.cancel()
-        return future.done()
-
-    def _leave(self, _: object = None) -> None:
-        """Let the innermost call of ``_serve_until_left`` return. From any thread."""
-        self._leaving = True
-        if self._sleeping:
-            self._poller.wake()
-
     def busy_threads(self) -> tuple[int, ...]:
         """Return the identifiers of the threads that are in a callback now."""
-        ident = self._thread.ident
-        return () if ident is None or self._running is None else (ident,)
+        serving = () if self._running is None else (self._turn.thread,)
+        return (*serving, *self._blocked)
 
     def is_current(self) -> bool:
         """Return whether the calling thread belongs to the loop."""
-        return threading.current_thread() is self._thread
+        return self._has_turn() or get_ident() in self._blocked
+
+    # --- callbacks that block
+
+    def begin_blocking(self) -> list[bool] | None:
+        """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
+        if self._may_block or not self._has_turn():
+            return None
+        self._may_block = turn = [True]
+        return turn
+
+    def end_blocking(self, began: list[bool] | None) -> None:
+        """End a call of code that may block."""
+        if began is None:
+            return
+        try:
+            began.pop()
+        except IndexError:
+            with self._handing_over:
+                pass  # until another thread has the turn
+
+    def hand_over_blocked(self) -> None:
+        """Take the turn away from a callback that had it at the last call of this method too."""
+        running = self._may_block
+        if running and running is self._checked:
+            with self._handing_over:
+                if running:
+                    self._hand_over()
+        self._checked = running
+
+    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
+        """Block until ``future`` is done; return false if that takes longer, or the loop stops.
+
+        In a callback, another thread serves the loop meanwhile. The callback continues with its
+        turn, so that it overlaps with no other callback of the loop.
+        """
+        may_block = self._may_block
+        is_watched = bool(may_block)
+        with self._handing_over:
+            had_turn = self._has_turn() and not future.done()
+            if had_turn:
+                self._hand_over()
+        try:
+            return super().wait_for(future, timeout_s)
+        finally:
+            if had_turn:
+                self._resume(may_block if is_watched else None)
+
+    def _has_turn(self) -> bool:
+        return self._turn.thread == get_ident()
+
+    def _hand_over(self) -> None:
+        """Let another thread serve the loop from now on; its thread is in a callback."""
+        self._may_block.clear()
+        ident, running, timer = self._turn.thread, self._running, self._timer
+        self._blocked[ident] = running
+        self._running = self._timer = None
+        if timer is not None:
+            self._timers.reschedule(timer)
+        for group in list(self._groups.values()):
+            if running in group.sources:
+                group.due = max(0, group.due - 1)  # the item that was taken
+                if group.due:
+                    self._ready.append(group)
+        self._turn = turn = _Turn()
+        if self._idle:
+            self._idle.pop()
+            self._turns.put(turn)
+        else:
+            self._add_thread(turn).start()
+
+    def _resume(self, may_block: list[bool] | None) -> None:
+        """Get the turn back from the thread that has it now, unless the loop stops."""
+        has_turn = threading.Event()
+        ident = get_ident()
+
+        def resume() -> None:
+            self._running = self._blocked.pop(ident)
+            if may_block is not None:
+                may_block.append(True)
+                self._may_block = may_block
+            self._turn = _Turn(ident)
+            has_turn.set()
+
+        self._waits.add(has_turn)
+        self.call_soon(resume)
+        if not self._stopping:
+            has_turn.wait()
+        self._waits.discard(has_turn)
+
+    def _add_thread(self, turn: _Turn) -> threading.Thread:
+        number = f" {len(self._threads) + 1}" if self._threads else ""
+        thread = threading.Thread(
+            target=self._spin, args=(turn,), name=f"executor {self._name}{number}", daemon=True
+        )
+        self._threads.append(thread)
+        return thread
 
     # --- groups of sources
 
@@ -144,31 +236,51 @@ class Scheduler(BaseLoop):
 
     # --- the thread
 
-    def _spin(self) -> None:
+    def _spin(self, turn: _Turn | None) -> None:
         use_precise_wakeups()
-        while not self._stopping:
-            try:
-                self._leaving = False
-                if not self._stopping:  # a stop sets it before it sets ``_leaving``
-                    self._serve_until_left()
-            except BaseException as error:  # between callbacks: an asynchronous one, or a bug
-                self.report(f"executor '{self._name}'", error)
-                sleep(PAUSE_AFTER_FAULT_S)
-                self._ready.clear()  # one group may have been in neither list
-                self._ready.extend(group for group in list(self._groups.values()) if group.due)
-        self._shut_down()
+        first = self._threads[0]
+        if threading.current_thread() is not first:
+            _place_like(first.native_id or 0)
+        while turn is not None:
+            turn.thread = get_ident()
+            self._running = None
+            while self._turn is turn and not self._stopping:
+                try:
+                    self._run_turn(turn)
+                except BaseException as error:  # between callbacks: an asynchronous one, or a bug
+                    self.report(f"executor '{self._name}'", error)
+                    sleep(PAUSE_AFTER_FAULT_S)
+                    if self._turn is turn:  # one group may have been in neither list
+                        self._ready.clear()
+                        self._ready.extend(
+                            group for group in list(self._groups.values()) if group.due
+                        )
+            if self._turn is turn:
+                self._shut_down()
+                return
+            turn = self._next_turn()
 
-    def _serve_until_left(self) -> None:
-        """Serve calls, timers and groups until ``_leaving`` is set."""
+    def _next_turn(self) -> _Turn | None:
+        """Return the turn of this thread, which has lost its last one; None if the loop stops."""
+        self._blocked.pop(get_ident(), None)
+        if self._has_turn():
+            return self._turn
+        self._idle.append(threading.current_thread())
+        return self._turns.get()
+
+    def _run_turn(self, turn: _Turn) -> None:  # noqa: C901  a function for each part is slower
+        """Serve calls, timers and groups until another thread has the turn or the loop stops."""
         timers, calls, poller = self._timers, self._calls, self._poller
         groups, ready = self._groups, self._ready
         yield_at_s = inf  # not known yet
-        while not self._leaving:
+        while not self._stopping:
             now_s = monotonic()
             if now_s >= timers.next_s:
-                self._run_timers(now_s)
+                self._run_timers(turn, now_s)
             if calls:
-                self._run_calls()
+                self._run_calls(turn)
+            if self._turn is not turn:
+                return
             if calls or ready:
                 yield_at_s = _yield_if_due(yield_at_s, now_s)
                 signaled = poller.poll()
@@ -176,7 +288,7 @@ class Scheduler(BaseLoop):
                 yield_at_s = inf
                 self._sleeping = True
                 # Check again: a call may have been added before ``_sleeping`` was set.
-                is_idle = not (calls or self._leaving)
+                is_idle = not (calls or self._stopping)
                 signaled = poller.wait(timers.next_due_s()) if is_idle else poller.poll()
                 self._sleeping = False
             for fd, _ in signaled:
@@ -191,20 +303,24 @@ class Scheduler(BaseLoop):
                     ready.append(group)
                 group.due += count
             if ready:
-                self._serve_round()
+                self._serve_round(turn)
 
-    def _run_timers(self, now_s: float) -> None:
+    def _run_timers(self, turn: _Turn, now_s: float) -> None:
         timers = self._timers
         while timers.next_s <= now_s:
-            call = timers.pop()
+            self._timer = call = timers.pop()
             try:
                 if not call.cancelled:
                     self._calls.appendleft(call.callback)
-                    self._run_calls()  # calls that it causes run before it is rescheduled
+                    self._run_calls(turn)  # calls that it causes run before it is rescheduled
             finally:
-                timers.reschedule(call)
+                if self._turn is turn:
+                    self._timer = None
+                    timers.reschedule(call)
+            if self._turn is not turn:
+                return
 
-    def _run_calls(self) -> None:
+    def _run_calls(self, turn: _Turn) -> None:
         calls, timers = self._calls, self._timers
         until_s = monotonic() + _ROUND_S
         while True:  # including calls that calls add
@@ -213,11 +329,13 @@ class Scheduler(BaseLoop):
                 callback()
             except BaseException as error:
                 self.report(name_of(callback), error)
+            if self._turn is not turn:
+                return
             if not calls or (now_s := monotonic()) >= timers.next_s or now_s >= until_s:
                 break
         self._running = None
 
-    def _serve_round(self) -> None:
+    def _serve_round(self, turn: _Turn) -> None:  # noqa: C901  a function for each part is slower
         # Inlined from here to the handler: after a sleep, each further function is a cache miss.
         ready, timers = self._ready, self._timers
         until_s = monotonic() + _ROUND_S
@@ -240,6 +358,8 @@ class Scheduler(BaseLoop):
                     source.call(taken)
                 except BaseException as error:
                     self.report(source.name, error)
+                if self._turn is not turn:
+                    return
             self._running = None
             if taken_count == group.due:  # the usual case
                 group.due = 0
@@ -251,13 +371,16 @@ class Scheduler(BaseLoop):
                 break
 
     def _schedule(self, call: ScheduledCall) -> ScheduledCall:
-        if self.is_current():
+        if self._has_turn() and not self._may_block:
             self._timers.add(call)
         else:
             self.call_soon(partial(self._timers.add, call))
         return call
 
     def _shut_down(self) -> None:
+        """End the loop on the thread that has the turn; those that wait for a turn end."""
+        for _ in range(len(self._threads)):
+            self._turns.put(None)
         for task in list(self._tasks):
             task.future.cancel()
         self._stopped = True
@@ -277,6 +400,12 @@ class Scheduler(BaseLoop):
         except BaseException as error:
             self.report(name_of(callback), error)
         self._running = None
+
+
+def _place_like(thread: int) -> None:
+    """Give the calling thread the CPUs and the priority of another one, by its Linux id."""
+    os.sched_setaffinity(0, os.sched_getaffinity(thread))
+    os.sched_setscheduler(0, os.sched_getscheduler(thread), os.sched_getparam(thread))
 
 
 def _yield_if_due(yield_at_s: float, now_s: float) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import sysconfig
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -22,6 +23,8 @@ _COMPOSER = f"{Path(__file__).parents[2]}{os.sep}"
 #: The example nodes of an installed composer are user code.
 _SHARE = f"{_COMPOSER}share{os.sep}"
 _IMPORT_SYSTEM = "<frozen importlib"
+#: Where Python's own modules are, and packages that were installed.
+_LIBRARIES = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")})
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -102,6 +105,18 @@ def user_frames(stack: Sequence[FrameType]) -> Sequence[FrameType]:
     return [
         frame for frame, skip in zip(stack[:depth], internal, strict=False) if not skip
     ] or stack
+
+
+def location_of(stack: Iterable[FrameType]) -> str:
+    """Return ``file:line`` of the innermost frame of the user's own code; empty if there is none.
+
+    Code of libraries counts only if there is no other.
+    """
+    outside = [frame for frame in stack if not is_internal(frame.f_code.co_filename)]
+    own = [frame for frame in outside if not frame.f_code.co_filename.startswith(_LIBRARIES)]
+    for frame in own or outside:
+        return f"{frame.f_code.co_filename}:{frame.f_lineno}"
+    return ""
 
 
 def is_internal(path: str) -> bool:

@@ -10,9 +10,11 @@ import threading
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator
 from functools import partial
+from types import FrameType
 from typing import Any, Protocol, TypeVar
 
 from composer.runtime.executors.futures import Future, awaited_rclpy_future, wrap_future
+from composer.runtime.executors.stacks import calls_user_code
 
 T = TypeVar("T")
 
@@ -158,6 +160,7 @@ class _Scoped(Coroutine[Any, Any, T]):
         self._inner.close()
 
 
+@calls_user_code
 def _steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
     raised: BaseException | None = None
     try:
@@ -192,6 +195,11 @@ def _enter(scope: StepScope) -> Generator[Any, Any, None]:
         if not entered.cancel():  # it was entered already
             scope.leave()
         raise
+
+
+def scope_of(frame: FrameType) -> object:
+    """Return the scope of the step that a frame of a stack runs, or None if it runs none."""
+    return frame.f_locals["scope"] if frame.f_code is _steps.__code__ else None
 
 
 class _NoScope:

@@ -43,6 +43,7 @@ class NodeOfBehavior:
                 finish=lambda reason: context.error_log.error("node", reason),
                 request=lambda transition: context.error_log.error("node", transition),
                 current_state=lambda: (0, owner.state),
+                may_block=False,
             ),
         )
         node: Any = AdoptedNode.__new__(AdoptedNode)

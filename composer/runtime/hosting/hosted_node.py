@@ -27,7 +27,7 @@ from composer.runtime.hosting.instance import HostedEntities, Instance, Instance
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.names import action_names, remapping_arguments
 from composer.runtime.hosting.shared_state import SharedState
-from composer.runtime.hosting.user_code import ThreadedCall
+from composer.runtime.hosting.user_code import ThreadedCall, interrupt_callbacks
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class
 from composer.runtime.node.local_node import LocalNode
@@ -39,6 +39,8 @@ from composer.runtime.node.parameters import ros_parameters
 from composer.runtime.node.ros_node import make_ros_node
 
 _THREAD_ENDS_WITHIN_S = 0.2
+#: A constructor or a handler of a transition is reported once it has run for so long.
+_BLOCKS_AFTER_S = 5.0
 
 
 class HostedNode(LocalNode):
@@ -116,6 +118,7 @@ class HostedNode(LocalNode):
         if transition == "configure":
             self._report_missing(instance.ports)
         if transition in ("cleanup", "shutdown"):
+            interrupt_callbacks(instance)
             await self._in_thread(instance, instance.node.destroy_node, "destroy_node")
 
     async def _call_user_on_error(self, _cause: BaseException) -> None:
@@ -179,12 +182,14 @@ class HostedNode(LocalNode):
                 finish=self._finish,
                 request=self._request,
                 current_state=lambda: (_STATE_IDS.get(self.state, 0), self.state),
+                may_block=True,
             ),
         )
 
     async def _in_thread(self, instance: Instance, function: Callable[[], Any], name: str) -> None:
         """Call code of the class on a thread of its own, which may block within the time limit."""
         call = ThreadedCall(instance, function, f"{self.full_name} {name}")
+        slow = self.loop.call_later(_BLOCKS_AFTER_S, partial(self._report_slow, call, name))
         instance.in_transition, instance.transition_thread = True, call.thread
         try:
             await call.result()
@@ -193,7 +198,12 @@ class HostedNode(LocalNode):
             self._context.log.error(f"{name} has not returned" + (f"; it is at {at}" if at else ""))
             raise
         finally:
+            slow.cancel()
             instance.in_transition, instance.transition_thread = False, None
+
+    def _report_slow(self, call: ThreadedCall, name: str) -> None:
+        at = call.find_location()
+        self._context.log.warn(f"{name} has not returned for {_BLOCKS_AFTER_S:g} s; it is at {at}")
 
     def _finish(self, reason: str) -> None:
         """Deactivate the node: in a process of its own, the class would have ended it."""

@@ -78,7 +78,8 @@ class InstanceSettings:
     ``overrides`` are the initial values of parameters, by name. ``action_names`` are the full names
     of actions by kind and expanded name. ``finish(reason)`` deactivates the node: the class says
     that it has finished. ``request(transition)`` requests a transition. ``current_state()`` returns
-    the id and the label of the state.
+    the id and the label of the state. With ``may_block``, others run while a callback blocks: those
+    of its group wait on a strand.
     """
 
     overrides: Mapping[str, Parameter]
@@ -87,6 +88,7 @@ class InstanceSettings:
     finish: Callable[[str], None]
     request: Callable[[str], None]
     current_state: Callable[[], tuple[int, str]]
+    may_block: bool
 
 
 def is_reentrant(context: NodeContext) -> bool:
@@ -116,6 +118,10 @@ class Instance:
         self.finish = settings.finish
         self.request = settings.request
         self.current_state = settings.current_state
+        loop = self.context.loop
+        #: Begin and end a call of a callback.
+        self.begin_blocking = loop.begin_blocking if settings.may_block else _ignore
+        self.end_blocking = loop.end_blocking
         self.entities = HostedEntities()
         #: The instance, once ``Node.__init__`` was called.
         self.node: Any = None
@@ -127,6 +133,8 @@ class Instance:
         self.ended = threading.Event()
         #: The executors of the class's own that the node was added to.
         self.executors: list[Executor] = []
+        #: The callbacks that were interrupted, with the identifiers of their threads.
+        self.interrupted: set[tuple[int, str]] = set()
         #: The threads that the class has started.
         self.threads: list[threading.Thread] = []
         #: Services of the ROS node that exist as long as the instance.
@@ -205,3 +213,7 @@ class Instance:
         """
         limit_s = None if timeout_s is None or timeout_s < 0 else timeout_s
         return self.context.loop.wait_for(future, limit_s)
+
+
+def _ignore() -> None:
+    """Do not watch a call."""

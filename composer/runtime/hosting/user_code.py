@@ -5,13 +5,21 @@ from __future__ import annotations
 import ctypes
 import inspect
 import threading
+import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from types import FrameType
+from typing import TYPE_CHECKING, Any, cast
 
 from composer.behavior import CallCancelled
 from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.stacks import calls_user_code, is_internal, stacks_of
-from composer.runtime.executors.strand import in_steps
+from composer.runtime.executors.stacks import (
+    calls_user_code,
+    gc_paused,
+    is_internal,
+    location_of,
+    stacks_of,
+)
+from composer.runtime.executors.strand import in_steps, scope_of
 
 if TYPE_CHECKING:
     from composer.runtime.callbacks.context import NodeContext
@@ -60,6 +68,7 @@ class UserFunction:
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function. Raises what it raises."""
         before, _CURRENT.instance = _CURRENT.instance, self._instance
+        began = self._instance.begin_blocking()
         try:
             result = self._function(*arguments, **options)
         except SystemExit:
@@ -71,8 +80,13 @@ class UserFunction:
             self._context.log.debug(f"{self.__name__}: {error}")
             return None
         finally:
+            self._instance.end_blocking(began)
             _CURRENT.instance = before
-        return in_steps(_Steps(self._instance), result) if inspect.iscoroutine(result) else result
+        return in_steps(_Steps(self), result) if inspect.iscoroutine(result) else result
+
+    def is_one(self, instance: Instance, function: UserFunction | None) -> bool:
+        """Return whether this is ``function``; without it, any one of ``instance``."""
+        return self._instance is instance and function in (None, self)
 
 
 def call_in_group(context: NodeContext, function: Callable[..., Any], *arguments: Any) -> None:
@@ -90,23 +104,70 @@ def call_in_group(context: NodeContext, function: Callable[..., Any], *arguments
 class _Steps:
     """Sets the instance whose code runs for each step of a coroutine."""
 
-    __slots__ = ("_before", "_instance")
+    __slots__ = ("_before", "_began", "_instance", "function")
 
-    def __init__(self, instance: Instance) -> None:
-        self._instance = instance
+    def __init__(self, function: UserFunction) -> None:
+        self.function = function
+        self._instance = function._instance
         self._before: Instance | None = None
+        self._began: object = None
 
     def enter(self) -> None:
         """Begin a step, at once."""
         self._before, _CURRENT.instance = _CURRENT.instance, self._instance
+        self._began = self._instance.begin_blocking()
 
     def leave(self) -> None:
         """End a step."""
+        self._instance.end_blocking(self._began)
         _CURRENT.instance = self._before
 
 
-class CallAbandoned(BaseException):
-    """Raised in a constructor or transition handler that has exceeded its time limit."""
+class CallAbandoned(Cancelled):
+    """Raised in code of a class whose time is over. It is no error of the class."""
+
+
+def interrupt(ident: int) -> str:
+    """Raise CallAbandoned in a thread as soon as it runs code of the user; return where it is.
+
+    In a function of C, such as ``time.sleep``, it is raised once that returns.
+    """
+    for _ in range(_ATTEMPTS):
+        stack = stacks_of((ident,)).get(ident)
+        if stack is None:
+            return ""
+        if not is_internal(stack[0].f_code.co_filename):
+            exception = ctypes.py_object(CallAbandoned)
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), exception)
+            return location_of(stack)
+        del stack
+        time.sleep(_PERIOD_S)
+    return ""
+
+
+def interrupt_callbacks(instance: Instance, function: UserFunction | None = None) -> None:
+    """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
+    current = threading.get_ident()
+    busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
+    for ident, stack in busy.items():
+        with gc_paused():
+            called = [item for item in map(_function_of, stack) if item is not None]
+        name = next((item.__name__ for item in called if item.is_one(instance, function)), None)
+        if name is None:
+            continue
+        at = interrupt(ident)
+        if (ident, name) not in instance.interrupted:
+            instance.interrupted.add((ident, name))
+            where = f"; it is at {at}" if at else ""
+            instance.context.log.warn(f"{name} is interrupted{where}")
+
+
+def _function_of(frame: FrameType) -> UserFunction | None:
+    """Return the function of a class that a frame calls, or a coroutine of which it runs."""
+    if frame.f_code is UserFunction.__call__.__code__:
+        return cast(UserFunction, frame.f_locals["self"])
+    scope = scope_of(frame)
+    return scope.function if isinstance(scope, _Steps) else None
 
 
 class ThreadedCall:
@@ -130,15 +191,14 @@ class ThreadedCall:
         try:
             return await self._done
         except Cancelled:
-            self.location = self._find_location()
-            threading.Thread(target=self._abandon, daemon=True).start()
+            self.location = self.find_location()
+            threading.Thread(target=interrupt, args=(self.thread.ident or 0,), daemon=True).start()
             raise
 
-    def _find_location(self) -> str:
-        for frame in stacks_of((self.thread.ident or 0,)).get(self.thread.ident or 0, ()):
-            if not is_internal(frame.f_code.co_filename):
-                return f"{frame.f_code.co_filename}:{frame.f_lineno}"
-        return ""
+    def find_location(self) -> str:
+        """Return the ``file:line`` where it is now, in code of the user."""
+        ident = self.thread.ident or 0
+        return location_of(stacks_of((ident,)).get(ident, ()))
 
     @calls_user_code
     def _run(self) -> None:
@@ -147,18 +207,6 @@ class ThreadedCall:
             self._done.set_result(self._function())
         except BaseException as error:
             self._done.set_exception(error)
-
-    def _abandon(self) -> None:
-        for _ in range(_ATTEMPTS):
-            stack = stacks_of((self.thread.ident or 0,)).get(self.thread.ident or 0)
-            if stack is None:
-                return
-            if not is_internal(stack[0].f_code.co_filename):
-                thread = ctypes.c_ulong(self.thread.ident or 0)
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, ctypes.py_object(CallAbandoned))
-                return
-            del stack
-            self.thread.join(_PERIOD_S)
 
 
 _ATTEMPTS = 50

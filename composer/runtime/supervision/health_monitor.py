@@ -13,7 +13,12 @@ from composer.model import PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
-from composer.runtime.supervision.main_queue import CallbackHanging, LoopRecovered, NodeEvent
+from composer.runtime.supervision.main_queue import (
+    CallbackBlocks,
+    CallbackHanging,
+    LoopRecovered,
+    NodeEvent,
+)
 from composer.runtime.supervision.node_set import NodeSet
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 
@@ -22,6 +27,8 @@ _LONGEST_PERIOD_S = 1.0
 _CHECKS_PER_LIMIT = 5
 #: Handlers of transitions have a limit of their own, which ends asynchronous ones.
 _TRANSITION_MARGIN_S = 2.0
+#: A callback without a limit is reported once it has run for so long.
+BLOCKS_AFTER_S = 5.0
 #: How long an interrupted callback may take to return before its loop is abandoned.
 _RETURNS_WITHIN_S = 1.0
 #: A hung loop has recovered once all its callbacks are younger than this.
@@ -53,6 +60,7 @@ class HealthMonitor:
         self._report = report
         self._end = threading.Event()
         self._callbacks: dict[FrameType, _ObservedCallback] = {}  # by their calls
+        self._reported: set[tuple[str, str]] = set()  # nodes and their callbacks that block
         # What nodes of other processes send is not known here; those of the system check it there.
         own = [name for name, node in node_set.nodes.items() if node.model.in_process]
         silences = {name: _NodeSilence(name, node_set) for name in own}
@@ -153,9 +161,13 @@ class HealthMonitor:
         return math.inf if limit is None else limit.value / 1000.0
 
     def _check_limit(self, observed: _ObservedCallback, node: str, now_s: float) -> None:
-        if now_s - observed.since_s < observed.limit_s:
-            return
         callback = observed.callback
+        lasts_s = now_s - observed.since_s
+        if lasts_s < observed.limit_s:
+            if lasts_s >= BLOCKS_AFTER_S and (node, callback.name) not in self._reported:
+                self._reported.add((node, callback.name))
+                self._report(CallbackBlocks(node, callback.name, lasts_s, callback.location()))
+            return
         if observed.interrupted_s is None:
             observed.interrupted_s = now_s
             stack = callback.stack()

@@ -22,6 +22,7 @@ from composer.runtime.executors.stacks import (
     USER_CODE_CALLERS,
     format_stack,
     gc_paused,
+    location_of,
     stacks_of,
 )
 from composer.runtime.node.managed_node import ManagedNode
@@ -80,6 +81,11 @@ class RunningCallback:
         """Return the Python stack of the callback; empty if it has returned."""
         stack = stacks_of((self.thread,)).get(self.thread, [])
         return format_stack(stack[: stack.index(self.call)]) if self.call in stack else ""
+
+    def location(self) -> str:
+        """Return the ``file:line`` that it has reached; empty if it has returned."""
+        stack = stacks_of((self.thread,)).get(self.thread, [])
+        return location_of(stack[: stack.index(self.call)]) if self.call in stack else ""
 
     def interrupt(self) -> None:
         """Raise CallbackInterrupted in it, as soon as it runs Python code of the user.

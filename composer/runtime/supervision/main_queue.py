@@ -40,6 +40,16 @@ class CallbackHanging:
 
 
 @dataclass(frozen=True, slots=True)
+class CallbackBlocks:
+    """A callback has not returned for a while, which may be right. ``location`` is where it is."""
+
+    node: str
+    callback: str
+    for_s: float
+    location: str
+
+
+@dataclass(frozen=True, slots=True)
 class LoopRecovered:
     """A callback whose loop was abandoned has returned after all. ``loop`` is its name."""
 
@@ -65,7 +75,9 @@ class Command:
     nodes: tuple[str, ...] = ()
 
 
-NodeEvent: TypeAlias = Fault | NodeMoved | CallbackHanging | LoopRecovered | NodeReturned
+NodeEvent: TypeAlias = (
+    Fault | NodeMoved | CallbackHanging | CallbackBlocks | LoopRecovered | NodeReturned
+)
 Item: TypeAlias = NodeEvent | Command
 
 

@@ -26,6 +26,7 @@ from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.factory import log_exception, make_loop, place_threads
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.turn_watch import TurnWatch
 from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode
 from composer.runtime.intra_process.eligibility import shared_channels
@@ -102,6 +103,7 @@ class NodeSet:
         self._process: ProcessContext  # set by create()
         self.nodes: dict[str, ManagedNode] = {}
         self.loops: dict[str, Loop] = {}
+        self._turn_watch = TurnWatch(self.loops.values)
         #: The loops with a callback that does not return; their nodes cannot do anything.
         self.hung: set[str] = set()
         self._keeps_entities = False
@@ -143,6 +145,8 @@ class NodeSet:
             loop.start()
             if name in self._executors:
                 self.warnings += place_threads(self._executors[name], loop.native_thread_ids())
+        if any(node.model.in_process and node.model.hosted_class for node in self.nodes.values()):
+            self._turn_watch.start()
 
     def timeout_s(self, name: str) -> float:
         """Return the time limit of a node's transitions."""
@@ -207,6 +211,12 @@ class NodeSet:
         """Return whether the node's loop hangs, so that the node cannot do anything."""
         return self.nodes[name].loop.name in self.hung
 
+    def has_unfinished(self) -> bool:
+        """Return whether a node that is not finalized has a loop that hangs."""
+        return any(
+            self.is_lost(name) and self.nodes[name].state != FINALIZED for name in self.nodes
+        )
+
     def is_absent(self, name: str) -> bool:
         """Return whether the node belongs to a process that is awaited, not started."""
         node = self.nodes[name]
@@ -269,6 +279,7 @@ class NodeSet:
         hang.
         """
         minimum_s = _LOOP_ENDS_WITHIN_S + _NODE_REMOVED_WITHIN_S * len(self.nodes)
+        self._turn_watch.stop()
         for name, loop in self.loops.items():
             left_s = 0.0 if name in self.hung else end_s - time.monotonic()
             if not loop.stop(max(minimum_s, left_s)):

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.model import OnFailure, PrimaryState, System
+from composer.model import LogLevel, OnFailure, PrimaryState, System
 from composer.plan import (
     Decision,
     DesiredState,
@@ -39,6 +39,7 @@ from composer.runtime.supervision.events import (
     Stuck,
 )
 from composer.runtime.supervision.main_queue import (
+    CallbackBlocks,
     CallbackHanging,
     Command,
     Item,
@@ -236,6 +237,8 @@ class Supervisor:
                 self._on_fault(fault)
             case NodeMoved() as moved:
                 self._on_moved([moved])
+            case CallbackBlocks() as blocks:
+                self._on_callback_blocks(blocks)
             case CallbackHanging() as hanging:
                 self._on_callback_hanging(hanging)
             case LoopRecovered() as recovered:
@@ -299,6 +302,12 @@ class Supervisor:
             due_s = time.monotonic() + decision.wait_s
             restart = Restart(name, decision.attempt, due_s)
             self.shared.update(lambda now: now.schedule(restart))
+
+    def _on_callback_blocks(self, blocks: CallbackBlocks) -> None:
+        """Say once that a callback takes long: it may be meant to, or it may hang."""
+        logger = self._node_set.nodes[blocks.node].full_name.strip("/").replace("/", ".")
+        text = f"{blocks.callback} has not returned for {blocks.for_s:.0f} s; it is at"
+        self._reporter.log(LogLevel.WARN, logger, f"{text} {blocks.location}")
 
     def _on_callback_hanging(self, hanging: CallbackHanging) -> None:
         """Report a callback that takes too long; the health monitor interrupts it."""

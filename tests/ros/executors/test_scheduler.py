@@ -7,6 +7,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import pytest
@@ -322,22 +323,54 @@ def test_a_callback_that_waits_for_a_future_keeps_nothing_else_waiting(on: Bench
     assert on.errors() == []
 
 
-def test_waits_within_waits_end_inside_out(on: Bench) -> None:
+def test_each_wait_ends_as_soon_as_its_future_is_done(on: Bench) -> None:
     outer: Future[None] = Future()
     inner: Future[None] = Future()
     order: list[str] = []
 
     def wait(name: str, future: Future[None]) -> None:
         on.loop.wait_for(future)
+        assert on.loop.is_current()
         order.append(name)
 
     on.loop.call_soon(lambda: wait("outer", outer))
     on.loop.call_soon(lambda: wait("inner", inner))
-    on.loop.call_soon(lambda: outer.set_result(None))
     on.loop.run(lambda: order.append("served"), 5.0)
+    on.loop.call_soon(lambda: outer.set_result(None))
+    wait_until(lambda: len(order) == 2)
     inner.set_result(None)  # from another thread
     wait_until(lambda: len(order) == 3)
-    assert order == ["served", "inner", "outer"]
+    assert order == ["served", "outer", "inner"]
+    assert on.errors() == []
+
+
+def test_another_thread_serves_the_loop_while_a_watched_call_blocks(on: Bench) -> None:
+    released = threading.Event()
+    ended: list[bool] = []
+    threads: set[int] = set()
+
+    def block() -> None:
+        began = on.loop.begin_blocking()
+        ended.append(released.wait(5.0))
+        on.loop.end_blocking(began)
+
+    def serves(number: int) -> bool:
+        on.loop.hand_over_blocked()
+        return len(threads) == number
+
+    timer = on.loop.call_every(0.001, lambda: threads.add(threading.get_ident()))
+    wait_until(lambda: serves(1))
+    for number in (2, 3):
+        on.loop.call_soon(block)
+        wait_until(partial(serves, number))
+    assert ended == []
+    released.set()
+    wait_until(lambda: len(ended) == 2)
+    timer.cancel()
+    wait_until(lambda: not on.loop.busy_threads())
+    assert on.loop.run(lambda: "served", 5.0) == "served"
+    assert len(threads) == 3
+    assert on.errors() == []
 
 
 def test_a_timer_that_waits_longer_than_its_period_is_called_again_after_it(on: Bench) -> None:

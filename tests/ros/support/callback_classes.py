@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import rclpy
+from composer_interfaces.action import Navigate
+from rclpy.action import ActionServer
 from rclpy.callback_groups import (
     CallbackGroup,
     MutuallyExclusiveCallbackGroup,
@@ -134,3 +137,51 @@ class AsyncTimers(Node):
         await self.client.call_async(Trigger.Request())
         self.busy = False
         self.rounds += 1
+
+
+class Sleeper(Node):
+    """Sleeps in callbacks: at a rate, and until a message of its own subscription has arrived."""
+
+    def __init__(self) -> None:
+        super().__init__("sleeper")
+        self.rounds = 0
+        self.number = 0
+        group = ReentrantCallbackGroup()
+        self.create_subscription(Int64, "numbers", self.on_number, 10, callback_group=group)
+        self.create_service(Trigger, "wait", self.on_wait, callback_group=group)
+        self.create_timer(0.05, self.on_timer)
+
+    def on_timer(self) -> None:
+        rate = self.create_rate(100)
+        for _ in range(2):
+            rate.sleep()
+        self.destroy_rate(rate)
+        self.rounds += 1
+
+    def on_number(self, message: Int64) -> None:
+        self.number = message.data
+
+    def on_wait(self, _: Any, response: Any) -> Any:
+        while not self.number:
+            time.sleep(0.01)
+        response.success = True
+        return response
+
+
+class SleepingServer(Node):
+    """Sleeps in the callback of a goal; the callback is ``async`` or not."""
+
+    def __init__(self, is_async: bool = False, seconds: float = 0.01) -> None:
+        super().__init__("server")
+        self.seconds = seconds
+        self.goals = 0
+        execute = self.execute_async if is_async else self.execute
+        ActionServer(self, Navigate, "navigate", execute)
+
+    def execute(self, _: Any) -> Any:
+        self.goals += 1
+        while True:
+            time.sleep(self.seconds)
+
+    async def execute_async(self, goal: Any) -> Any:
+        return self.execute(goal)

@@ -104,6 +104,7 @@ class WaitSetLoop(EntityLoop):
         if self._thread.ident is not None and not is_current:
             self._wait_for_tasks(min(until_s, monotonic() + _CLEAN_UP_S))
         self._stopping = True
+        self._end_waits()
         self._executor.end()
         if is_current:
             return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
@@ -18,7 +17,11 @@ from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.executors.tasks import within
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.services import hosted_future
-from composer.runtime.hosting.user_code import UserFunction, call_in_group
+from composer.runtime.hosting.user_code import (
+    UserFunction,
+    call_in_group,
+    interrupt_callbacks,
+)
 from composer.runtime.ports.action_server import CANCEL_LIMIT_S
 
 
@@ -36,15 +39,15 @@ class HostedActionServer:
         self.name = self.port.name.value
         self._context = instance.context_for(server.callback_group, server)
         self._statistics = instance.context.statistics.callback(self.port.kind.value, self.name)
-        server.register_goal_callback(self._in_group(server._goal_callback, self._accepts))
-        server.register_cancel_callback(
-            self._in_group(server._cancel_callback, _returns(CancelResponse.REJECT))
-        )
-        server.register_handle_accepted_callback(
-            self._in_group(server._handle_accepted_callback, self._abort_accepted)
-        )
+        goal = UserFunction(instance, server._goal_callback)
+        server.register_goal_callback(self._in_group(goal, self._accepts))
+        cancel = UserFunction(instance, server._cancel_callback)
+        server.register_cancel_callback(self._in_group(cancel, _returns(CancelResponse.REJECT)))
+        accepted = UserFunction(instance, server._handle_accepted_callback)
+        server.register_handle_accepted_callback(self._in_group(accepted, self._abort_accepted))
         # As in rclpy, the execution of a goal belongs to no callback group.
-        server.register_execute_callback(self._wrapped(server._execute_callback, self._abort))
+        self._execution = UserFunction(instance, server._execute_callback)
+        server.register_execute_callback(self._wrapped(self._execution, self._abort))
         instance.context.loop.add_action_server(server)
 
     def activate(self) -> None:
@@ -73,6 +76,7 @@ class HostedActionServer:
                 self._context.log.warn(
                     f"action server '{self.name}': a goal did not end within {CANCEL_LIMIT_S:g} s"
                 )
+                interrupt_callbacks(self._instance, self._execution)
 
     def destroy(self) -> None:
         """Abort the goals that have not ended, and destroy the server."""
@@ -91,8 +95,8 @@ class HostedActionServer:
 
     # --- callbacks
 
-    def _in_group(self, callback: Callable[[Any], Any], fallback: Callable[[Any], Any]) -> Any:
-        wrapped = self._wrapped(callback, fallback)
+    def _in_group(self, function: UserFunction, fallback: Callable[[Any], Any]) -> Any:
+        wrapped = self._wrapped(function, fallback)
         strand = self._context.strand
         if isinstance(strand, InlineStrand):
             return wrapped
@@ -106,9 +110,8 @@ class HostedActionServer:
 
         return call_in_group
 
-    def _wrapped(self, callback: Callable[[Any], Any], fallback: Callable[[Any], Any]) -> Any:
+    def _wrapped(self, function: UserFunction, fallback: Callable[[Any], Any]) -> Any:
         """Return a callback whose exceptions are errors of the node, answered by ``fallback``."""
-        function = UserFunction(self._instance, callback)
         is_goal = fallback == self._accepts
 
         def call(argument: Any) -> Any:
@@ -130,7 +133,7 @@ class HostedActionServer:
                     raise
                 return self._fail(function, error, fallback, argument)
 
-        return call_and_await if inspect.iscoroutinefunction(callback) else call
+        return call_and_await if function.is_async else call
 
     def _fail(
         self,

@@ -65,12 +65,16 @@ class HostedTimer(Timer):
 
 
 class HostedTimerPort(TimerPort):
-    """Calls the callback of a timer while the node is active and the timer is not canceled."""
+    """Calls the callback of a timer while the node is active and the timer is not canceled.
+
+    The timer of a rate runs in every state, since it wakes those who sleep at the rate.
+    """
 
     def __init__(self, instance: Instance, timer: Any) -> None:
         self._instance = instance
         self._timer = timer
-        self._is_active = False
+        self._is_rate = timer.callback_group is instance.node._rate_group
+        self._is_active = self._is_rate
         is_canceled = Timer.is_canceled(timer)  # created without autostart
         timer.__class__ = HostedTimer
         timer._port, timer._is_canceled = self, is_canceled
@@ -78,6 +82,8 @@ class HostedTimerPort(TimerPort):
         self._function = UserFunction(instance, self._call_back)
         super().__init__(context, self._model(context), None, self._function)
         self._name = getattr(timer.callback, "__name__", self._name)
+        if self._is_rate:
+            self.follow()
 
     def activate(self) -> None:
         """Start the timer unless the class has canceled it."""
@@ -86,12 +92,15 @@ class HostedTimerPort(TimerPort):
 
     def deactivate(self) -> None:
         """Stop the timer."""
-        self._is_active = False
-        super().deactivate()
+        self._is_active = self._is_rate
+        self.follow()
 
     def destroy(self) -> None:
         """Stop and destroy the timer."""
-        self.deactivate()
+        self._is_active = False
+        self.follow()
+        if self._is_rate:
+            self._tick()
         Node.destroy_timer(self._instance.node, self._timer)
 
     def follow(self) -> None:
@@ -115,6 +124,12 @@ class HostedTimerPort(TimerPort):
 
     def _restart(self) -> None:
         self.restart()
+
+    def _tick(self) -> None:
+        if not self._is_rate:
+            super()._tick()
+        elif self._timer.callback is not None:
+            self._timer.callback()
 
     def _call_back(self) -> Any:
         if not self._context.gate.incoming:

@@ -1,0 +1,75 @@
+"""Callbacks of hosted classes that block: others run meanwhile, and the system ends."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from composer_interfaces.action import Navigate
+from std_msgs.msg import Int64
+from std_srvs.srv import Trigger
+
+from composer.runtime.host_options import HostOptions
+from composer.runtime.supervision import health_monitor
+from tests.ros.support.in_process import Peer, end_limit_s, finished, running, wait_until
+
+CLASSES = "tests.ros.support.callback_classes"
+
+
+@pytest.mark.parametrize("executor", [None, "multi_threaded"])
+def test_callbacks_sleep_at_a_rate_and_wait_for_their_own_subscription(
+    tmp_path: Path, peer: Peer, executor: str | None
+) -> None:
+    kind = "" if executor is None else f"executors: {{own: {{kind: {executor}, threads: 4}}}}"
+    chosen = "" if executor is None else ", executor: own"
+    text = f"""
+    system: sleeping
+    {kind}
+    nodes: {{sleeper: {{class: "{CLASSES}:Sleeper"{chosen}}}}}
+    """
+    with running(text, tmp_path) as system:
+        sleeper = system.node("sleeper").instance
+        wait_until(lambda: sleeper.rounds >= 2)
+        call = peer.begin(Trigger, "/wait")
+        wait_until(lambda: sleeper.rounds >= 4)
+        assert not call.done()
+        peer.publisher(Int64, "/numbers").publish(Int64(data=1))
+        assert finished(call).success
+        counted = system.summary("/sleeper")
+    assert counted.errors == 0
+
+
+@pytest.mark.parametrize("arguments", ["is_async: false", "is_async: true", "seconds: 600"])
+def test_a_goal_that_sleeps_does_not_keep_the_system_from_ending(
+    tmp_path: Path, peer: Peer, arguments: str
+) -> None:
+    text = f"""
+    system: sleeping
+    nodes: {{server: {{class: "{CLASSES}:SleepingServer", arguments: {{{arguments}}}}}}}
+    """
+    with running(text, tmp_path, options=HostOptions(stop_within_s=2.0)) as system:
+        client = peer.action_client(Navigate, "/navigate")
+        peer.run(lambda: client.send_goal_async(Navigate.Goal()))
+        wait_until(lambda: system.node("server").instance.goals)
+        began_s = time.monotonic()
+        outcome = system.stop()
+        assert time.monotonic() - began_s < end_limit_s() + 2.0
+    assert outcome.exit_code == 0
+    assert [(node.state, node.errors) for node in outcome.nodes] == [("finalized", 0)]
+    assert "is interrupted; it is at" in system.log_text()
+    assert "callback_classes.py:" in system.log_text()
+
+
+def test_a_callback_that_blocks_is_logged_once_with_its_place(
+    tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(health_monitor, "BLOCKS_AFTER_S", 0.1)
+    text = f'system: sleeping\nnodes: {{sleeper: {{class: "{CLASSES}:Sleeper"}}}}'
+    with running(text, tmp_path) as system:
+        call = peer.begin(Trigger, "/wait")
+        line = system.wait_for_log("on_wait has not returned")
+        peer.publisher(Int64, "/numbers").publish(Int64(data=1))
+        assert finished(call).success
+        assert "callback_classes.py:" in line
+        assert system.log_text().count("on_wait has not returned") == 1
