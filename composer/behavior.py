@@ -55,7 +55,7 @@ class CallError(BehaviorError):
 
 
 class ServerUnavailable(CallError):
-    """No server was available within the timeout."""
+    """No server was available within the timeout, or its node is not active."""
 
 
 class CallTimeout(CallError):

@@ -34,7 +34,16 @@ class Awaited(Protocol):
         """Call ``callback`` once it is done."""
 
 
-Reply = Callable[[Any], None]
+class Reply(Protocol):
+    """Ends one request, once."""
+
+    def __call__(self, response: Any, /) -> None:
+        """Send the response."""
+
+    def refuse(self, error: BaseException) -> None:
+        """Send no response; a caller in this process gets the error."""
+
+
 #: A message and the middleware's information about it.
 Taken = tuple[Any, Any]
 

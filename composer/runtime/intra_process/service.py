@@ -12,8 +12,7 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.intra_process.copying import copy_of
 
 CallSoon = Callable[[Callable[[], object]], None]
-Reply = Callable[[Any], None]
-Receive = Callable[[Any, Reply], None]
+Receive = Callable[[Any, Any], None]
 
 
 class LocalService:
@@ -33,18 +32,40 @@ class LocalService:
         the service refers to it weakly.
         """
         content = copy_of(request) if self._isolated else request
-        self._call_soon(partial(self._serve, content, partial(self._reply, ref(response))))
+        self._call_soon(partial(self._serve, content, _LocalReply(self, ref(response))))
 
-    def _serve(self, request: Any, reply: Reply) -> None:
+    def _serve(self, request: Any, reply: _LocalReply) -> None:
         try:
             self._receive(request, reply)
         except BaseException:
             reply(self._response_type())
             raise
 
-    def _reply(self, waiting: ref[Future[Any]], response: Any) -> None:
+    def checked(self, response: Any) -> Any:
+        """Return a response as the caller gets it. Raises TypeError."""
         if not isinstance(response, self._response_type):
             raise TypeError(f"service '{self._name}': {type(response).__name__} is not a response")
-        future = waiting()
+        return copy_of(response) if self._isolated else response
+
+
+class _LocalReply:
+    """Ends one request of this process."""
+
+    __slots__ = ("_service", "_waiting")
+
+    def __init__(self, service: LocalService, waiting: ref[Future[Any]]) -> None:
+        self._service = service
+        self._waiting = waiting
+
+    def __call__(self, response: Any) -> None:
+        """Set the result of the caller's future. Raises TypeError."""
+        checked = self._service.checked(response)
+        future = self._waiting()
         if future is not None:
-            future.set_result(copy_of(response) if self._isolated else response)
+            future.set_result(checked)
+
+    def refuse(self, error: BaseException) -> None:
+        """Fail the caller's future."""
+        future = self._waiting()
+        if future is not None:
+            future.set_exception(error)

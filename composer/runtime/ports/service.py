@@ -7,6 +7,7 @@ from typing import Any
 
 from rclpy.service import Service
 
+from composer.behavior import CallError, ServerUnavailable
 from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
@@ -44,14 +45,20 @@ class PendingRequest:
                 self._pending.add(self)
                 raise
 
+    def refuse(self, error: CallError) -> None:
+        """Send no response, unless there was one already."""
+        if self in self._pending:
+            self._pending.discard(self)
+            self._reply.refuse(error)
+
 
 class ServicePort:
-    """Responds to every request, so that no client waits in vain.
+    """Responds to requests by its reaction and handler while the node is active.
 
-    While the node is active, the port's reaction and handler respond; otherwise the request is
-    refused. If a request is refused or its handler fails, the response has ``success`` false and
-    the reason in ``message``, if it has such fields. Otherwise its fields keep their defaults, and
-    only the log has the reason.
+    Otherwise a request is refused. If a request is refused or its handler fails, the response has
+    ``success`` false and the reason in ``message``, if it has such fields. A response without
+    ``success`` would look like a result: there is none, a client in this process gets the error,
+    and any other one waits until its time is over. See docs/decisions/0075-refused-requests.md.
     """
 
     def __init__(
@@ -63,9 +70,12 @@ class ServicePort:
     ) -> None:
         self._context = context
         self._name = port.name.value
+        self._full_name = port.full_name
         self._type = self._interface(port)
         self._response_type: Any = self._type.Response
-        self._has_reason = _has_reason(self._response_type)
+        fields = self._response_type.get_fields_and_field_types()
+        self._can_fail = fields.get("success") == "boolean"
+        self._has_reason = fields.get("message") == "string"
         self._reaction = reaction
         self._handler = handler
         self._pending: set[PendingRequest] = set()
@@ -125,15 +135,20 @@ class ServicePort:
 
     def _refuse(self, request: PendingRequest) -> None:
         reason = self._context.gate.refusal
-        if not self._has_reason:
+        if not (self._can_fail and self._has_reason):
             self._context.log.warn(f"service '{self._name}' refuses a request: {reason}")
-        request.respond(self._failure(reason))
+        self._respond_with_failure(request, reason, ServerUnavailable)
 
-    def _failure(self, reason: str) -> Any:
+    def _respond_with_failure(
+        self, request: PendingRequest, reason: str, kind: type[CallError] = CallError
+    ) -> None:
+        if not self._can_fail:
+            request.refuse(kind(f"service '{self._full_name}': {reason}"))
+            return
         response = self._response_type()
         if self._has_reason:
             response.message = reason
-        return response
+        request.respond(response)
 
     @calls_user_code
     def _handle(self, request: PendingRequest) -> Coroutine[Any, Any, None] | None:
@@ -173,7 +188,7 @@ class ServicePort:
             if is_closing(error):
                 self._refuse(request)
                 raise
-            request.respond(self._failure(f"{self._callback}: {describe(error)}"))
+            self._respond_with_failure(request, f"{self._callback}: {describe(error)}")
             self._context.on_exception(self._callback, error)
 
     def _respond(self, request: PendingRequest, result: Any) -> None:
@@ -182,14 +197,8 @@ class ServicePort:
             return
         text = f"returned {shown(result)}, not a {self._type.__name__}.Response"
         self._context.error_log.error(self._callback, text)
-        request.respond(self._failure(f"{self._callback} {text}"))
+        self._respond_with_failure(request, f"{self._callback} {text}")
 
     def _fail(self, request: PendingRequest, callback: str, error: BaseException) -> None:
         self._context.error_log.exception(callback, error)
-        request.respond(self._failure(f"{callback}: {describe(error)}"))
-
-
-def _has_reason(response_type: Any) -> bool:
-    """Return whether the response has the usual fields for failures and their reasons."""
-    fields = response_type.get_fields_and_field_types()
-    return bool(fields.get("success") == "boolean" and fields.get("message") == "string")
+        self._respond_with_failure(request, f"{callback}: {describe(error)}")

@@ -1,4 +1,4 @@
-"""Services of a running node respond to every request."""
+"""Services of a running node respond to requests, or fail them."""
 
 from __future__ import annotations
 
@@ -41,11 +41,53 @@ def test_a_node_that_is_not_active_refuses_with_a_reason(tmp_path: Path, peer: P
     with running(STUB, tmp_path) as system:
         assert peer.change("/stub", "deactivate")
         refusal = peer.call(Trigger, "/trigger")
-        assert peer.call(Empty, "/empty") == Empty.Response()
+        unanswered = peer.client(Empty, "/empty").call_async(Empty.Request())
         system.wait_for_log("service 'empty' refuses a request: /stub is inactive, not active")
         assert peer.change("/stub", "activate")
         assert peer.call(Trigger, "/trigger").success
+        assert peer.call(Empty, "/empty") == Empty.Response()
+        assert not unanswered.done()  # a response would look like a result
     assert (refusal.success, refusal.message) == (False, "/stub is inactive, not active")
+
+
+@pytest.mark.parametrize(
+    ("state", "error"),
+    [
+        ("inactive", "ServerUnavailable: service '/adder': /adder is inactive, not active"),
+        ("active", "CallError: service '/adder': on_adder: KeyError: 'two'"),
+    ],
+)
+def test_a_caller_of_the_process_gets_an_error_where_a_response_would_look_like_a_result(
+    tmp_path: Path, state: str, error: str
+) -> None:
+    text = f"""
+    system: adding
+    nodes:
+      adder:
+        behavior: adding:Adder
+        services: {{adder: {{type: rcl_interfaces/srv/GetParameters}}}}
+        lifecycle: {{autostart: {state}}}
+      caller:
+        behavior: adding:Caller
+        clients: {{adder: {{type: rcl_interfaces/srv/GetParameters}}}}
+        timers: {{tick: {{period_ms: 10}}}}
+    """
+    module = """
+    from composer.behavior import Behavior, CallError
+
+    class Adder(Behavior):
+        def on_adder(self, request, response):
+            raise KeyError("two")
+
+    class Caller(Behavior):
+        async def on_tick(self):
+            try:
+                await self.clients.adder.call(self.clients.adder.service_type.Request())
+            except CallError as error:
+                self.log.info(f"{type(error).__name__}: {error}")
+    """
+    with running(text, tmp_path, adding=module) as system:
+        system.wait_for_log(error)
 
 
 HANDLED = """

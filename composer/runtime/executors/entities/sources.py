@@ -114,6 +114,10 @@ class SingleReply:
         self._service.send_response(response, self._header)
         self._header = None
 
+    def refuse(self, _: BaseException) -> None:
+        """Send no response: by DDS, there is no other way to say that there is no result."""
+        self._header = None
+
     def send_empty(self) -> None:
         """Send an empty response, unless there was one."""
         if self._header is not None:
