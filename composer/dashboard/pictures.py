@@ -116,7 +116,8 @@ def _facts(thing: Cluster | Vertex | Edge) -> dict[str, Any]:
     nodes = [end.removeprefix(_NODE) for end in ends if end.startswith(_NODE)]
     return {
         "details": details,
-        "wrong": thing.wrong or None,
+        "problem": None if thing.problem is None else thing.problem.text,
+        "mark": None if thing.problem is None else thing.problem.mark.value,
         "node": nodes[0] if nodes else None,
         "channel": details.get("name"),
     }

@@ -31,7 +31,7 @@ _VIEWS: dict[View, Callable[[Scene], Graph]] = {
 
 
 def scene_of(systems: Sequence[System], diagnostics: Iterable[Diagnostic] = ()) -> Scene:
-    """Return the scene of systems; entities with diagnostics are marked as wrong."""
+    """Return the scene of systems; entities with diagnostics are marked."""
     return declared.scene_of(systems, DiagnosticIndex(diagnostics))
 
 

@@ -6,6 +6,7 @@ Every view (``views/``) turns a system into a :class:`Graph`; every renderer (``
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import StrEnum
 
 from composer.fast_dataclass import dataclass
@@ -46,12 +47,33 @@ class Direction(StrEnum):
     DOWN = "TB"
 
 
+class Mark(StrEnum):
+    """How a part with a problem is drawn."""
+
+    WRONG = "wrong"
+    DOUBTFUL = "doubtful"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A diagnostic that marks a part of a diagram; a warning makes it doubtful."""
+
+    text: str
+    mark: Mark = Mark.WRONG
+
+
+def worst(problems: Iterable[Problem | None]) -> Problem | None:
+    """Return the first problem that makes a part wrong, else the first one, if there is any."""
+    some = [problem for problem in problems if problem is not None]
+    return min(some, key=lambda problem: problem.mark is not Mark.WRONG, default=None)
+
+
 @dataclass(frozen=True, slots=True)
 class Vertex:
     """A shape with a label. ``key`` is unique in its graph; ``lines`` are the lines of the label.
 
     ``cluster`` is the key of its cluster, or empty; ``namespace`` is the namespace of its name.
-    ``wrong`` is the diagnostic that marks it, or empty.
+    ``problem`` marks it.
     """
 
     key: str
@@ -60,7 +82,7 @@ class Vertex:
     cluster: str = ""
     namespace: str = "/"
     details: Details = ()
-    wrong: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +95,7 @@ class Edge:
     kind: EdgeKind
     lines: tuple[str, ...] = ()
     details: Details = ()
-    wrong: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +111,7 @@ class Cluster:
     details: Details = ()
     block: bool = False
     namespace: str = "/"
-    wrong: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.characters import escape_line, escape_lines
-from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.diagram import (
+    Cluster,
+    Edge,
+    EdgeKind,
+    Graph,
+    Problem,
+    Vertex,
+    VertexKind,
+)
+from composer.graph.formats.theme import MARK_COLORS
 
 _VERTICES = {
     VertexKind.NODE: 'shape=box, style="filled,rounded", fillcolor="#dbeafe", color="#1d4ed8"',
@@ -29,7 +38,7 @@ _EDGES = {
     EdgeKind.TRANSFORM: 'color="#a16207"',
 }
 
-_WRONG = 'color="#dc2626", penwidth=3'
+_MARKS = {mark: f'color="{color}", penwidth=3' for mark, color in MARK_COLORS.items()}
 
 
 def render(graph: Graph) -> str:
@@ -71,8 +80,7 @@ def _frame(cluster: Cluster, graph: Graph, indent: str) -> Iterator[str]:
 
 def _vertex(vertex: Vertex) -> str:
     attributes = [f"label={_label(vertex.lines)}", _VERTICES[vertex.kind]]
-    if vertex.wrong:
-        attributes += [_WRONG, f"tooltip={_text(vertex.wrong)}"]
+    attributes += _mark(vertex.problem)
     return f"{_key(vertex.key)} [{', '.join(attributes)}]"
 
 
@@ -80,9 +88,14 @@ def _edge(edge: Edge) -> str:
     attributes = [_EDGES[edge.kind]]
     if edge.lines:
         attributes.append(f"label={_label(edge.lines)}")
-    if edge.wrong:
-        attributes += [_WRONG, f"tooltip={_text(edge.wrong)}"]
+    attributes += _mark(edge.problem)
     return f"{_key(edge.source)} -> {_key(edge.target)} [{', '.join(attributes)}]"
+
+
+def _mark(problem: Problem | None) -> list[str]:
+    if problem is None:
+        return []
+    return [_MARKS[problem.mark], f"tooltip={_text(problem.text)}"]
 
 
 def _label(lines: tuple[str, ...]) -> str:

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from composer.characters import escape_json
-from composer.graph.diagram import Cluster, Edge, Graph, Vertex
+from composer.graph.diagram import Cluster, Edge, Graph, Problem, Vertex
 
 
 def render(graph: Graph) -> str:
@@ -31,7 +31,7 @@ def _cluster(cluster: Cluster) -> dict[str, Any]:
         "label": cluster.label,
         "parent": cluster.parent or None,
         "details": dict(cluster.details),
-        "wrong": cluster.wrong or None,
+        **_problem(cluster.problem),
     }
 
 
@@ -42,7 +42,7 @@ def _vertex(vertex: Vertex) -> dict[str, Any]:
         "label": list(vertex.lines),
         "cluster": vertex.cluster or None,
         "details": dict(vertex.details),
-        "wrong": vertex.wrong or None,
+        **_problem(vertex.problem),
     }
 
 
@@ -54,5 +54,12 @@ def _edge(edge: Edge) -> dict[str, Any]:
         "kind": edge.kind.value,
         "label": list(edge.lines),
         "details": dict(edge.details),
-        "wrong": edge.wrong or None,
+        **_problem(edge.problem),
     }
+
+
+def _problem(problem: Problem | None) -> dict[str, str | None]:
+    """Return the text of a problem, and how the part is marked."""
+    if problem is None:
+        return {"wrong": None}
+    return {"wrong": problem.text, "mark": problem.mark.value}

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from composer.characters import escape_line
 from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.formats.theme import MARK_COLORS
 
 #: Mermaid's default limits (``maxTextSize``, ``maxEdges``).
 MAX_CHARACTERS = 50_000
@@ -32,6 +33,8 @@ _ARROWS = {
     EdgeKind.TRANSFORM: "-->",
 }
 
+_MARKS = {mark: f"stroke:{color},stroke-width:3px" for mark, color in MARK_COLORS.items()}
+
 _STYLES = (
     "classDef node fill:#dbeafe,stroke:#1d4ed8,color:#172554",
     "classDef topic fill:#dcfce7,stroke:#15803d,color:#052e16",
@@ -40,7 +43,7 @@ _STYLES = (
     "classDef port fill:#f8fafc,stroke:#64748b,color:#0f172a",
     "classDef state fill:#e2e8f0,stroke:#475569,color:#0f172a",
     "classDef coordinate_frame fill:#fef9c3,stroke:#a16207,color:#422006",
-    "classDef wrong stroke:#dc2626,stroke-width:3px",
+    *(f"classDef {mark} {style}" for mark, style in _MARKS.items()),
 )
 
 
@@ -66,7 +69,7 @@ def _lines(graph: Graph) -> Iterator[str]:
     for style in _STYLES:
         if style.split()[1] in _classes(graph):
             yield f"  {style}"
-    yield from _wrong_parts(graph, identifiers)
+    yield from _marked_parts(graph, identifiers)
 
 
 def _title(graph: Graph) -> str:
@@ -102,18 +105,25 @@ def _arrow(edge: Edge, identifiers: dict[str, str]) -> str:
 
 def _classes(graph: Graph) -> set[str]:
     classes = {vertex.kind.value for vertex in graph.vertices}
-    if any(vertex.wrong for vertex in graph.vertices):
-        classes.add("wrong")
-    return classes
+    return classes | {vertex.problem.mark for vertex in graph.vertices if vertex.problem}
 
 
-def _wrong_parts(graph: Graph, identifiers: dict[str, str]) -> Iterator[str]:
-    vertices = [identifiers[vertex.key] for vertex in graph.vertices if vertex.wrong]
-    if vertices:
-        yield f"  class {','.join(vertices)} wrong"
-    edges = [str(number) for number, edge in enumerate(graph.edges) if edge.wrong]
-    if edges:
-        yield f"  linkStyle {','.join(edges)} stroke:#dc2626,stroke-width:3px"
+def _marked_parts(graph: Graph, identifiers: dict[str, str]) -> Iterator[str]:
+    for mark, style in _MARKS.items():
+        vertices = [
+            identifiers[vertex.key]
+            for vertex in graph.vertices
+            if vertex.problem and vertex.problem.mark is mark
+        ]
+        if vertices:
+            yield f"  class {','.join(vertices)} {mark}"
+        edges = [
+            str(number)
+            for number, edge in enumerate(graph.edges)
+            if edge.problem and edge.problem.mark is mark
+        ]
+        if edges:
+            yield f"  linkStyle {','.join(edges)} {style}"
 
 
 def _quoted(lines: tuple[str, ...]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from html import escape
 
 from composer.characters import is_safe
-from composer.graph.diagram import EdgeKind, Vertex, VertexKind
+from composer.graph.diagram import EdgeKind, Mark, Problem, Vertex, VertexKind
 from composer.graph.layout import Frame, Path, Point, Rectangle, Size
 from composer.graph.measure import (
     EDGE_LINE_HEIGHT,
@@ -20,7 +20,7 @@ from composer.graph.measure import (
 
 def markers() -> str:
     """Return arrow heads, one per color, since a marker cannot inherit that of its line."""
-    kinds = [*(kind.value for kind in EdgeKind), "wrong"]
+    kinds = [*(kind.value for kind in EdgeKind), *Mark]
     return "<defs>" + "".join(map(_marker, kinds)) + "</defs>"
 
 
@@ -36,10 +36,10 @@ def frame(item: Frame) -> Iterator[str]:
     """Yield a frame with its label, or a block with its outline and head."""
     cluster, place = item.cluster, item.place
     if cluster.block:
-        wrong = " wrong" if cluster.wrong else ""
+        mark = _mark(cluster.problem)
         data = _data_attributes(cluster.key, "node", cluster.namespace)
-        yield f"<g {data}>{_tooltip(cluster.wrong)}"
-        yield _rectangle(place, 6.0, f"shape node{wrong}")
+        yield f"<g {data}>{_tooltip(cluster.problem)}"
+        yield _rectangle(place, 6.0, f"shape node{mark}")
         y = place.top + HEAD_HEIGHT / 2 + 4.0
         yield f'<text x="{number(place.center.x)}" y="{number(y)}">{text(cluster.label)}</text>'
     else:
@@ -57,14 +57,14 @@ def line(path: Path) -> str:
     curves = " ".join(
         "C" + " ".join(map(_point, others[index : index + 3])) for index in range(0, len(others), 3)
     )
-    wrong = " wrong" if edge.wrong else ""
+    mark = _mark(edge.problem)
     between = " between" if path.is_between_parts else ""
-    head = "wrong" if edge.wrong else edge.kind.value
+    head = edge.problem.mark if edge.problem else edge.kind.value
     return (
-        f'<path class="edge {edge.kind}{wrong}{between}" data-edge="{text(edge.key)}"'
+        f'<path class="edge {edge.kind}{mark}{between}" data-edge="{text(edge.key)}"'
         f' data-kind="{edge.kind}" data-source="{text(edge.source)}"'
         f' data-target="{text(edge.target)}" marker-end="url(#head-{head})"'
-        f' d="M{_point(begin)} {curves}">{_tooltip(edge.wrong)}</path>'
+        f' d="M{_point(begin)} {curves}">{_tooltip(edge.problem)}</path>'
     )
 
 
@@ -83,9 +83,9 @@ def label(path: Path, middle: Point) -> Iterator[str]:
 
 def vertex(item: Vertex, place: Rectangle) -> Iterator[str]:
     """Yield a vertex: its shape and the lines of text in it."""
-    wrong = " wrong" if item.wrong else ""
-    yield f"<g {_data_attributes(item.key, item.kind, item.namespace)}>{_tooltip(item.wrong)}"
-    yield _shape(item.kind, place, f"shape {item.kind}{wrong}")
+    mark = _mark(item.problem)
+    yield f"<g {_data_attributes(item.key, item.kind, item.namespace)}>{_tooltip(item.problem)}"
+    yield _shape(item.kind, place, f"shape {item.kind}{mark}")
     top = place.center.y - (len(item.lines) - 1) * LINE_HEIGHT / 2 + 4.0
     for index, line_text in enumerate(item.lines):
         faint = ' class="faint"' if index else ""
@@ -96,11 +96,11 @@ def vertex(item: Vertex, place: Rectangle) -> Iterator[str]:
 
 def row(item: Vertex, place: Rectangle) -> Iterator[str]:
     """Yield a port as a row of its block: its name on the left, its kind on the right."""
-    wrong = " wrong" if item.wrong else ""
+    mark = _mark(item.problem)
     name, *others = item.lines
     y = number(place.center.y + 4.0)
-    yield f"<g {_data_attributes(item.key, item.kind, item.namespace)}>{_tooltip(item.wrong)}"
-    yield _rectangle(place, 0.0, f"shape {item.kind}{wrong}")
+    yield f"<g {_data_attributes(item.key, item.kind, item.namespace)}>{_tooltip(item.problem)}"
+    yield _rectangle(place, 0.0, f"shape {item.kind}{mark}")
     left, right = number(place.left + ROW_INDENT), place.left + place.size.width - ROW_INDENT
     yield f'<text class="row" x="{left}" y="{y}">{text(name)}</text>'
     for line_text in others:
@@ -164,8 +164,13 @@ def _hexagon(place: Rectangle) -> str:
     return " ".join(map(_point, corners))
 
 
-def _tooltip(line_text: str) -> str:
-    return f"<title>{text(line_text)}</title>" if line_text else ""
+def _tooltip(problem: Problem | None) -> str:
+    return f"<title>{text(problem.text)}</title>" if problem is not None else ""
+
+
+def _mark(problem: Problem | None) -> str:
+    """Return the class that marks a part, after those that it has."""
+    return f" {problem.mark}" if problem is not None else ""
 
 
 def _point(point: Point) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from composer.graph.diagram import Mark
+
 #: name -> (on a light page, on a dark page)
 _PLAIN = {
     "page": ("#ffffff", "#0b1220"),
@@ -11,7 +13,8 @@ _PLAIN = {
     "faint": ("#475569", "#94a3b8"),
     "frame": ("#f8fafc", "#111a2c"),
     "frame-line": ("#cbd5e1", "#334155"),
-    "wrong": ("#dc2626", "#f87171"),
+    Mark.WRONG: ("#dc2626", "#f87171"),
+    Mark.DOUBTFUL: ("#ca8a04", "#fde047"),
 }
 
 #: kind -> (fill, line) on a light page, then on a dark page
@@ -28,6 +31,10 @@ _KINDS = {
     "transition": (("none", "#475569"), ("none", "#94a3b8")),
     "transform": (("none", "#a16207"), ("none", "#facc15")),
 }
+
+
+#: On a light page, for formats without style sheets.
+MARK_COLORS = {mark: _PLAIN[mark][0] for mark in Mark}
 
 
 def colors(*, dark: bool) -> dict[str, str]:
@@ -53,8 +60,9 @@ def color_rules(color: Mapping[str, str]) -> str:
         rules.append(f".shape.{kind}{{fill:{color[kind]};stroke:{line}}}")
         rules.append(f".edge.{kind}{{stroke:{line}}}")
         rules.append(f".head.{kind}{{fill:{line}}}")
-    rules.append(f".shape.wrong,.edge.wrong{{stroke:{color['wrong']};stroke-width:2.5}}")
-    rules.append(f".head.wrong{{fill:{color['wrong']}}}")
+    for mark in Mark:
+        rules.append(f".shape.{mark},.edge.{mark}{{stroke:{color[mark]};stroke-width:2.5}}")
+        rules.append(f".head.{mark}{{fill:{color[mark]}}}")
     return "".join(rules)
 
 

@@ -53,7 +53,7 @@ def _structure(graph: Graph, sizes: Sizes) -> Hashable:
                 vertices[edge.source],
                 vertices[edge.target],
                 edge.kind,
-                bool(edge.wrong),
+                edge.problem and edge.problem.mark,
                 sizes.labels.get(edge.key),
             )
             for edge in graph.edges

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import field
 
 from composer.fast_dataclass import dataclass
-from composer.graph.diagram import Cluster, Direction, Edge, Graph
+from composer.graph.diagram import Cluster, Direction, Edge, Graph, Mark
 from composer.graph.layout.result import Size
 from composer.graph.layout.self_loops import loops_of, make_room
 from composer.graph.layout.steps.boxes import (
@@ -50,9 +50,10 @@ class _DirectedEdge:
         return self.low != self.edge.source
 
     @property
-    def style(self) -> tuple[str, bool, bool]:
+    def style(self) -> tuple[str, Mark | None, bool]:
         """The style that edges must have in common to share segments."""
-        return (self.edge.kind.value, bool(self.edge.wrong), self.backward)
+        mark = self.edge.problem.mark if self.edge.problem else None
+        return (self.edge.kind.value, mark, self.backward)
 
 
 def build(graph: Graph, sizes: Sizes) -> Parts:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from composer.analysis.frames import kind_of, topic_of
 from composer.drift.compare import states_after_bring_up
 from composer.fast_dataclass import dataclass
+from composer.graph.diagram import Problem, worst
 from composer.graph.labels import qos_label
 from composer.graph.scenes.diagnostics import DiagnosticIndex
 from composer.graph.scenes.facts import node_facts, port_facts, transform_facts
@@ -94,13 +95,13 @@ def _scene_node(
             _scene_port(port, rates_hz.get(port.name.value), diagnostics) for port in node.ports
         ),
         details=node_facts(node, rates_hz),
-        wrong=diagnostics.about_node(node),
+        problem=diagnostics.about_node(node),
     )
 
 
 def _with_duplicate(scene_node: SceneNode) -> SceneNode:
-    wrong = scene_node.wrong or f"two nodes are called '{scene_node.full_name}'"
-    return replace(scene_node, wrong=wrong)
+    twice = Problem(f"two nodes are called '{scene_node.full_name}'")
+    return replace(scene_node, problem=worst((scene_node.problem, twice)))
 
 
 def _note(node: Node, system: System, several: bool) -> str:
@@ -120,7 +121,7 @@ def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex)
         qos=qos_label(port.qos.profile) if port.qos.explicit else "",
         rate_hz=rate_hz,
         details=port_facts(port, rate_hz),
-        wrong=diagnostics.about_port(port),
+        problem=diagnostics.about_port(port),
     )
 
 
@@ -133,7 +134,7 @@ def _transforms(node: Node, diagnostics: DiagnosticIndex) -> Iterator[SceneTrans
             kind=kind_of(item),
             node=node.full_name,
             details=transform_facts(item),
-            wrong=diagnostics.about_transform(item),
+            problem=diagnostics.about_transform(item),
         )
 
 

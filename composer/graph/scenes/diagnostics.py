@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from composer.diagnostics import Diagnostic, Severity
+from composer.graph.diagram import Mark, Problem, worst
 from composer.model import DynamicTransform, Node, Port, StaticTransform
 from composer.source import Span
 
@@ -15,30 +16,30 @@ class DiagnosticIndex:
     """Errors and warnings by location."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic] = ()) -> None:
-        self._by_place: dict[_Place, str] = {}
+        self._by_place: dict[_Place, Problem] = {}
         for diagnostic in diagnostics:
             if diagnostic.severity is Severity.INFO:
                 continue
-            text = f"{diagnostic.rule.code} {diagnostic.message}"
+            mark = Mark.WRONG if diagnostic.severity is Severity.ERROR else Mark.DOUBTFUL
+            problem = Problem(f"{diagnostic.rule.code} {diagnostic.message}", mark)
             for span in (diagnostic.primary, *(label.span for label in diagnostic.related)):
-                self._by_place.setdefault(_place(span), text)
+                place = _place(span)
+                self._by_place[place] = worst((self._by_place.get(place), problem)) or problem
 
-    def about_port(self, port: Port) -> str:
-        """Return the diagnostic about a port's declaration, or an empty text."""
+    def about_port(self, port: Port) -> Problem | None:
+        """Return the diagnostic about a port's declaration, if there is one."""
         return self._first(_port_spans(port))
 
-    def about_node(self, node: Node) -> str:
-        """Return the diagnostic about a node itself, or an empty text."""
+    def about_node(self, node: Node) -> Problem | None:
+        """Return the diagnostic about a node itself, if there is one."""
         return self._first(_node_spans(node))
 
-    def about_transform(self, declared: StaticTransform | DynamicTransform) -> str:
-        """Return the diagnostic about the frames of a transform, or an empty text."""
+    def about_transform(self, declared: StaticTransform | DynamicTransform) -> Problem | None:
+        """Return the diagnostic about the frames of a transform, if there is one."""
         return self._first((declared.child.span, declared.parent.span))
 
-    def _first(self, spans: Iterable[Span]) -> str:
-        return next(
-            (self._by_place[place] for place in map(_place, spans) if place in self._by_place), ""
-        )
+    def _first(self, spans: Iterable[Span]) -> Problem | None:
+        return worst(self._by_place.get(_place(span)) for span in spans)
 
 
 def _place(span: Span) -> _Place:

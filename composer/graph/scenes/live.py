@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
-from composer.graph.diagram import Details
+from composer.graph.diagram import Details, Problem
 from composer.graph.labels import discovered_qos_label, qos_facts
 from composer.graph.namespaces import parent_of
 from composer.graph.scenes.scene import ExecutorGroup, Scene, SceneNode, ScenePort
@@ -68,7 +68,7 @@ def _scene_node(node: ObservedNode, rates_hz: Mapping[str, float], group: str) -
         executor=group,
         ports=ports,
         details=_facts(node, ports),
-        wrong=f"{node.count} nodes have this name" if node.count > 1 else "",
+        problem=Problem(f"{node.count} nodes have this name") if node.count > 1 else None,
     )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field
 
 from composer.fast_dataclass import dataclass
-from composer.graph.diagram import Details
+from composer.graph.diagram import Details, Problem
 from composer.model import ChannelKind, PortKind
 
 _SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
@@ -22,8 +22,8 @@ class ScenePort:
     """An endpoint of a node on a topic, service or action.
 
     ``name`` is the port's name (of a running node, the channel's); ``rate_hz`` is the publishing
-    rate, None if unknown. ``qos`` is a short label, empty if not explicit. ``wrong`` is a
-    diagnostic, or empty.
+    rate, None if unknown. ``qos`` is a short label, empty if not explicit.
+    ``problem`` marks it.
     """
 
     kind: PortKind
@@ -33,7 +33,7 @@ class ScenePort:
     qos: str = ""
     rate_hz: float | None = None
     details: Details = ()
-    wrong: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class SceneNode:
     executor: str = ""
     ports: tuple[ScenePort, ...] = ()
     details: Details = ()
-    wrong: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class SceneTransform:
     kind: str  # static or dynamic
     node: str  # full name
     details: Details = ()
-    wrong: str = ""
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.diagram import (
+    Cluster,
+    Direction,
+    Edge,
+    EdgeKind,
+    Graph,
+    Vertex,
+    VertexKind,
+    worst,
+)
 from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces
 from composer.graph.scenes.scene import (
@@ -44,7 +53,7 @@ def _block(node: SceneNode, namespaces: Namespaces) -> Cluster:
         details=node.details,
         block=True,
         namespace=node.namespace,
-        wrong=node.wrong,
+        problem=node.problem,
     )
 
 
@@ -59,7 +68,7 @@ def _ports_of(node: SceneNode, namespaces: Namespaces) -> Iterator[Vertex]:
             cluster=node_key(node),
             namespace=node.namespace,
             details=port.details,
-            wrong=port.wrong,
+            problem=port.problem,
         )
 
 
@@ -77,7 +86,7 @@ def _edges(channel: SceneChannel) -> Iterator[Edge]:
                 kind=EdgeKind(channel.kind.value),
                 lines=(channel.name, *_label_lines(source, sink)),
                 details=(("from", dict(begin.port.details)), ("to", dict(end.port.details))),
-                wrong=source.port.wrong or sink.port.wrong,
+                problem=worst((source.port.problem, sink.port.problem)),
             )
 
 

@@ -57,7 +57,7 @@ def _edges(transforms: tuple[SceneTransform, ...]) -> Iterator[Edge]:
             kind=EdgeKind.TRANSFORM,
             lines=(item.node, item.kind),
             details=(("node", item.node), ("kind", item.kind), *item.details),
-            wrong=item.wrong,
+            problem=item.problem,
         )
 
 

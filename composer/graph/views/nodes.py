@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Problem, Vertex, VertexKind
 from composer.graph.labels import rate, short_type
 from composer.graph.namespaces import Namespaces, parent_of
 from composer.graph.scenes.facts import channel_facts
@@ -55,7 +55,9 @@ def _channel(channel: SceneChannel, namespaces: Namespaces, scene: Scene) -> Ver
         cluster=namespaces.around_name(channel.name),
         namespace=parent_of(channel.name),
         details=channel_facts(channel),
-        wrong=f"more than one type: {', '.join(channel.types)}" if len(channel.types) > 1 else "",
+        problem=Problem(f"more than one type: {', '.join(channel.types)}")
+        if len(channel.types) > 1
+        else None,
     )
 
 
@@ -72,7 +74,7 @@ def _edges(channel: SceneChannel) -> Iterator[Edge]:
             kind=EdgeKind(channel.kind.value),
             lines=_label(channel, endpoint),
             details=port.details,
-            wrong=port.wrong,
+            problem=port.problem,
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.diagram import Direction, Edge, EdgeKind, Graph, Vertex, VertexKind, worst
 from composer.graph.scenes.scene import Scene
 
 _STATES = ("unconfigured", "inactive", "active", "finalized")
@@ -53,5 +53,5 @@ def _state(state: str, scene: Scene) -> Vertex:
         kind=VertexKind.STATE,
         lines=(state, *shown, *more),
         details=(("nodes", [*names]),),
-        wrong=next((node.wrong for node in nodes if node.wrong), ""),
+        problem=worst(node.problem for node in nodes),
     )

@@ -15,5 +15,5 @@ def node_vertex(node: SceneNode, name: str, note: str, cluster: str) -> Vertex:
         cluster=cluster,
         namespace=node.namespace,
         details=node.details,
-        wrong=node.wrong,
+        problem=node.problem,
     )

@@ -13,7 +13,17 @@ import pytest
 
 from composer.characters import is_safe
 from composer.graph import View, build_graph, scene_of
-from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
+from composer.graph.diagram import (
+    Cluster,
+    Direction,
+    Edge,
+    EdgeKind,
+    Graph,
+    Mark,
+    Problem,
+    Vertex,
+    VertexKind,
+)
 from composer.graph.engines import Engine
 from composer.graph.formats import dot, mermaid, svg, theme
 from composer.graph.formats import json as graph_json
@@ -32,9 +42,9 @@ def evil_graph() -> Graph:
         direction=Direction.RIGHT,
         vertices=(
             Vertex(f"one {EVIL}", VertexKind.NODE, (EVIL, "second line"), cluster=EVIL),
-            Vertex("two", VertexKind.TOPIC, ("graph",), wrong=EVIL),
+            Vertex("two", VertexKind.TOPIC, ("graph",), problem=Problem(EVIL, Mark.DOUBTFUL)),
         ),
-        edges=(Edge("edge", f"one {EVIL}", "two", EdgeKind.TOPIC, (EVIL,), wrong=EVIL),),
+        edges=(Edge("edge", f"one {EVIL}", "two", EdgeKind.TOPIC, (EVIL,), problem=Problem(EVIL)),),
         clusters=(Cluster(EVIL, EVIL),),
     )
 
@@ -53,8 +63,8 @@ def test_mermaid_says_what_the_text_was_in_character_codes() -> None:
 
 def test_mermaid_marks_what_is_wrong() -> None:
     text = mermaid.render(evil_graph())
-    assert "\n  class v2 wrong\n" in text
-    assert "\n  linkStyle 0 stroke:" in text
+    assert "\n  class v2 doubtful\n" in text
+    assert "\n  linkStyle 0 stroke:#dc2626" in text
 
 
 def hostile_graph() -> Graph:
@@ -130,6 +140,7 @@ def test_json_says_what_is_wrong_and_where() -> None:
         "label": [EVIL],
         "details": {},
         "wrong": EVIL,
+        "mark": "wrong",
     }
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
-from composer.graph.diagram import Graph
+from composer.graph.diagram import Graph, Problem
 from composer.loading import load
 from composer.model import PortKind
 from composer.qos import QosProfile, Reliability
@@ -45,8 +45,8 @@ def test_several_systems_meet_on_their_topics() -> None:
 
 
 def test_a_name_that_two_systems_give_is_one_node_to_ros_and_marked() -> None:
-    wrong = {vertex.key: vertex.wrong for vertex in both(View.NODES).vertices if vertex.wrong}
-    assert wrong == {"node:/talker": "two nodes are called '/talker'"}
+    wrong = {item.key: item.problem for item in both(View.NODES).vertices if item.problem}
+    assert wrong == {"node:/talker": Problem("two nodes are called '/talker'")}
 
 
 def test_each_system_has_its_own_executors() -> None:
@@ -114,9 +114,9 @@ def test_a_running_graph_has_states_rates_and_reported_qos() -> None:
 
 def test_of_a_running_graph_tools_are_left_out_and_a_name_of_two_is_marked() -> None:
     graph = build_graph(live_scene_of(seen(), {}))
-    wrong = {vertex.key: vertex.wrong for vertex in graph.vertices if vertex.kind == "node"}
+    wrong = {item.key: item.problem for item in graph.vertices if item.kind == "node"}
     assert "node:/_tool" not in wrong
-    assert wrong["node:/b"] == "2 nodes have this name"
+    assert wrong["node:/b"] == Problem("2 nodes have this name")
 
 
 def test_states_of_a_running_graph() -> None:

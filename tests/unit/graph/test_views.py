@@ -6,7 +6,7 @@ from textwrap import dedent
 import pytest
 
 from composer.graph import View, build_graph, scene_of
-from composer.graph.diagram import Graph
+from composer.graph.diagram import Graph, Mark, Problem, worst
 from composer.graph.output import Engine, Format, render
 from composer.loading import load_bytes
 from tests.unit.support.resolving import system_of
@@ -162,9 +162,14 @@ def test_the_position_of_a_diagnostic_is_marked() -> None:
     loading = load_bytes(dedent(text).encode(), Path("/nowhere"), shown="broken.yaml")
     assert loading.system is not None
     graph = build_graph(scene_of([loading.system], loading.diagnostics))
-    wrong = {edge.target: edge.wrong for edge in graph.edges}
-    assert "reliab" in wrong["node:/strict"]
-    assert {vertex.key for vertex in graph.vertices if vertex.wrong} == {"node:/lost"}
+    marked = {item.key: item.problem.mark for item in graph.vertices if item.problem}
+    assert marked == {"node:/lost": Mark.WRONG}
+    found = {edge.target: edge.problem for edge in graph.edges if edge.problem}
+    assert {target: problem.mark for target, problem in found.items()} == {
+        "topic:/talk": Mark.WRONG,
+        "node:/strict": Mark.WRONG,
+    }
+    assert "reliab" in found["node:/strict"].text
 
 
 @pytest.mark.parametrize("view", View)
@@ -172,3 +177,10 @@ def test_a_node_without_a_name_is_drawn(view: View) -> None:
     text = 'system: a\nnodes: {"": {publishers: {"": {type: std_msgs/msg/String}}}}\n'
     picture = render([drawn(text, view)], Format.SVG, Engine.BUNDLED)
     assert picture.startswith(b"<svg")
+
+
+def test_an_error_marks_a_part_also_if_a_warning_comes_first() -> None:
+    warning, error = Problem("doubtful", Mark.DOUBTFUL), Problem("wrong")
+    assert worst((None, warning, error)) == error
+    assert worst((None, warning)) == warning
+    assert worst((None,)) is None

@@ -103,7 +103,8 @@ def graph(
 ) -> None:
     """Draw systems as diagrams.
 
-    Parts with errors or warnings are marked in red. ROS is needed only with --live.
+    Parts with errors are marked in red, and those with warnings in yellow. ROS is needed only with
+    --live.
     """
     chosen = output_format or _format_of(output)
     if output is None and chosen is Format.PNG and sys.stdout.isatty():

@@ -12,7 +12,7 @@ const PAGES = { topic: "topics", service: "services", action: "actions" };
 
 /** Return {element, update, end}: `update(live)` shows what is measured now. */
 export function createArticle(app, key, thing) {
-  const { details, wrong, node } = thing;
+  const { details, problem, mark, node } = thing;
   const kind = kindOf(key);
   const isEdge = !["node", "topic", "service", "action", "state"].includes(kind);
   const current = h("div");
@@ -24,7 +24,7 @@ export function createArticle(app, key, thing) {
     h("h2", {}, titleOf(key, details)),
     h("p", { class: "kind" }, kind.replaceAll("_", " ")),
     linksOf(key, thing, isEdge),
-    wrong && h("p", { class: "problem" }, wrong),
+    problem && h("p", { class: mark === "wrong" ? "problem" : "note" }, problem),
     current,
     plainFacts(details),
     (details.ports ?? []).length > 0 && [h("h3", {}, "Ports"), details.ports.map(record)],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from composer.graph.diagram import Details, Graph
+from composer.graph.diagram import Details, Graph, Problem
 from composer.graph.formats.svg_elements import text
 from composer.tree import Plain
 
@@ -24,25 +24,27 @@ def articles(graphs: Iterable[Graph]) -> Iterator[str]:
     """Yield an article for everything in the graphs that has facts or diagnostics, each once."""
     seen: set[str] = set()
     for graph in graphs:
-        for key, details, wrong in _things(graph):
-            if key not in seen and (details or wrong):
+        for key, details, problem in _things(graph):
+            if key not in seen and (details or problem):
                 seen.add(key)
-                yield _article(key, details, wrong)
+                yield _article(key, details, problem)
 
 
-def _things(graph: Graph) -> Iterator[tuple[str, Details, str]]:
+def _things(graph: Graph) -> Iterator[tuple[str, Details, Problem | None]]:
     for cluster in graph.clusters:
         if cluster.block:
-            yield cluster.key, cluster.details, cluster.wrong
+            yield cluster.key, cluster.details, cluster.problem
     for vertex in graph.vertices:
-        yield vertex.key, vertex.details, vertex.wrong
+        yield vertex.key, vertex.details, vertex.problem
     for edge in graph.edges:
-        yield edge.key, edge.details, edge.wrong
+        yield edge.key, edge.details, edge.problem
 
 
-def _article(key: str, details: Details, wrong: str) -> str:
+def _article(key: str, details: Details, problem: Problem | None) -> str:
     kind, name = _title(key)
-    diagnostic = f'<p class="diagnostic">{text(wrong)}</p>' if wrong else ""
+    diagnostic = ""
+    if problem is not None:
+        diagnostic = f'<p class="diagnostic {problem.mark}">{text(problem.text)}</p>'
     facts = {word: value for word, value in details if value != name}
     return (
         f'<article data-about="{text(key)}"{_role(kind)}><h2>{text(name)}</h2>'
