@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
+from enum import Enum, auto
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -166,6 +167,14 @@ def nearest_path(path: Path) -> Path | None:
     return None if close is None else by_stem[close]
 
 
+class ShowWarnings(Enum):
+    """What is printed of the warnings about a system, besides its errors."""
+
+    ALL = auto()
+    COUNT = auto()
+    NONE = auto()
+
+
 def load_system(
     path: Path,
     *,
@@ -173,12 +182,11 @@ def load_system(
     settings: Iterable[str] = (),
     namespace: str | None = None,
     use_sim_time: bool = False,
-    only_errors: bool = False,
+    warnings: ShowWarnings = ShowWarnings.COUNT,
 ) -> LoadResult:
-    """Read and check the system in ``path``; print errors and warnings to stderr.
+    """Read and check the system in ``path``; print errors, and warnings as chosen, to stderr.
 
-    With ``only_errors``, leave out the warnings. Only ``compose validate`` reports diagnostics of
-    severity info.
+    Only ``compose validate`` reports diagnostics of severity info.
     """
     from composer.diagnostics import Severity
     from composer.loading import load
@@ -190,10 +198,14 @@ def load_system(
         shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
         overrides=OverrideOptions(tuple(settings), namespace, use_sim_time),
     )
-    severities = (Severity.ERROR,) if only_errors else (Severity.ERROR, Severity.WARNING)
+    severities = {Severity.ERROR, *([Severity.WARNING] if warnings is ShowWarnings.ALL else [])}
     reported = [item for item in result.diagnostics if item.severity in severities]
     if reported:
         say_raw(render(reported, color=use_color(sys.stderr)))
+    count = sum(item.severity is Severity.WARNING for item in result.diagnostics)
+    if count and warnings is ShowWarnings.COUNT:
+        number = "1 warning" if count == 1 else f"{count} warnings"
+        say(f"{number}: see 'compose validate {shown or path}'")
     return result
 
 
@@ -211,7 +223,7 @@ def runnable_system(
     settings: Iterable[str] = (),
     namespace: str | None = None,
     use_sim_time: bool = False,
-    only_errors: bool = False,
+    warnings: ShowWarnings = ShowWarnings.COUNT,
     exit_code: int = FAILED,
 ) -> RunnableSystem:
     """Return the system of a SYSTEM argument; print its diagnostics as :func:`load_system` does.
@@ -225,7 +237,7 @@ def runnable_system(
         settings=settings,
         namespace=namespace,
         use_sim_time=use_sim_time,
-        only_errors=only_errors,
+        warnings=warnings,
     )
     if result.system is not None and result.system.node_type:
         raise CommandError(

@@ -141,3 +141,16 @@ def test_a_diagram_too_large_for_mermaid_prints_a_warning(tmp_path: Path) -> Non
     done = compose("graph", str(path))
     assert done.code == 0
     assert "Mermaid refuses to render a diagram of this size" in done.err
+
+
+@pytest.mark.parametrize("command", [("graph",), ("run", "--dry-run"), ("export", "launch")])
+def test_warnings_are_counted_and_errors_printed(tmp_path: Path, command: tuple[str, ...]) -> None:
+    system = tmp_path / "s.yaml"
+    text = "system: s\nnodes:\n  b: {on_activate: {log: hi}}  # compose: ignore[qos-implicit]\n"
+    system.write_text(text)
+    done = compose(*command, str(system))
+    assert (done.code, done.err) == (0, f"1 warning: see 'compose validate {system}'\n")
+    system.write_text(f"{text}  c: {{lifecycle: {{depends_on: [d]}}}}\n")
+    done = compose(*command, str(system))
+    assert "error[RC202 unknown-node]" in done.err
+    assert "warning[" not in done.err

@@ -24,7 +24,7 @@ from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examp
 from composer.cli.support.output.results import as_json
 from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.ros import ros_session
-from composer.cli.support.system_arguments import complete_system, runnable_system
+from composer.cli.support.system_arguments import ShowWarnings, complete_system, runnable_system
 
 if TYPE_CHECKING:
     from composer.doctor.result import CheckResult, Level
@@ -81,7 +81,9 @@ def doctor(
             raise UsageError("--hosts needs a system", hint="compose doctor robot.yaml --hosts")
         require_hosts("compose doctor --hosts")
     results = []
-    declared = None if system is None else runnable_system(system, only_errors=True).system
+    declared = (
+        None if system is None else runnable_system(system, warnings=ShowWarnings.NONE).system
+    )
     # Loaded before the checks: they take seconds, and their results would be lost.
     loaded = load_for_hosts(system) if hosts and system is not None else None
     elsewhere = () if loaded is None else _check_hosts(loaded, timeout)

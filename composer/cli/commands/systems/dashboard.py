@@ -26,6 +26,7 @@ from composer.cli.support.output.terminal import say, write
 from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
+    ShowWarnings,
     complete_system,
     example_systems,
     path_exists,
@@ -161,6 +162,8 @@ def _declared(
     if not is_file and text.rpartition("/")[2] not in {**project_systems(), **example_systems()}:
         return None
     name = text if is_file else text.rpartition("/")[2]
-    system, path, result = runnable_system(name, settings=settings, namespace=namespace)
+    system, path, result = runnable_system(
+        name, settings=settings, namespace=namespace, warnings=ShowWarnings.ALL
+    )
     goal = PrimaryState(autostart.value) if autostart is not None else None
     return Declared(system, str(path), tuple(result.diagnostics), goal)

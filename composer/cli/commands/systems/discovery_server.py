@@ -12,7 +12,7 @@ import typer
 from composer.cli.support.errors import CONFIG, FAILED, CommandError
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import say
-from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.names import PROGRAM_LOGGER
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def _discovery(text: str) -> Discovery:
     """Return the discovery of a system, with servers to be started. Raises CommandError."""
     from composer.model import DiscoveryKind
 
-    system = runnable_system(text, only_errors=True, exit_code=CONFIG).system
+    system = runnable_system(text, warnings=ShowWarnings.NONE, exit_code=CONFIG).system
     discovery = system.discovery
     if discovery is None or discovery.kind.value is not DiscoveryKind.SERVER:
         raise CommandError(

@@ -31,7 +31,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import announce_discovery, require_interfaces, require_ros
-from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.typings import update_typings
 
 if TYPE_CHECKING:
@@ -167,12 +167,14 @@ def run(
     """
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
+    warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
     runnable = runnable_system(
         system,
         settings=settings or (),
         namespace=namespace,
         use_sim_time=use_sim_time,
-        only_errors=process is not None,  # the coordinating process prints the warnings
+        # The coordinating process prints the warnings.
+        warnings=warnings if process is None else ShowWarnings.NONE,
         exit_code=CONFIG,
     )
     declared = runnable.system
