@@ -10,9 +10,10 @@
 See docs/decisions/0051-run-logs.md.
 """
 
+from composer.run_log.reading import last_records
 from composer.run_log.record import Record
 from composer.run_log.rotation import RotatingFile
-from composer.run_log.runs import Run, RunFolder, current_domain, find_runs
+from composer.run_log.runs import Run, RunFolder, current_domain, find_parts, find_runs
 from composer.run_log.selection import Selection, parse_since
 from composer.run_log.system_log import SystemLog
 
@@ -24,6 +25,8 @@ __all__ = [
     "Selection",
     "SystemLog",
     "current_domain",
+    "find_parts",
     "find_runs",
+    "last_records",
     "parse_since",
 ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -45,6 +47,21 @@ class RunReader:
     def _later_files(self) -> list[Path]:
         files = log_files(self._run.folder)
         return [file for file in files if self._path is None or file.name > self._path.name]
+
+
+def last_records(run: Run, max_bytes: int) -> list[Record]:
+    """Return the records in the last ``max_bytes`` of a run, as far as they can be read."""
+    lines: list[bytes] = []
+    for path in reversed(log_files(run.folder)):
+        with suppress(OSError), path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(0, size - max_bytes))
+            read = file.read(max_bytes).splitlines()
+            lines[:0] = read if size <= max_bytes else read[1:]
+            max_bytes -= min(size, max_bytes)
+        if not max_bytes:
+            break
+    return [record for line in lines if (record := parse_line(line)) is not None]
 
 
 class _LineReader:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
+from composer.dashboard.observing.log_lines import SEVERITIES
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from composer.dashboard.observing.log_lines import LogLine
     from composer.dashboard.ros_side import RosGraphSide
 
-_SEVERITIES = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 _MAX_HISTORY = 1000
 
 
@@ -28,7 +28,7 @@ class LogFeed(Feed):
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError."""
         del declared
-        self._severity = _SEVERITIES[values.choice("level", tuple(_SEVERITIES), "info")]
+        self._severity = SEVERITIES[values.choice("level", tuple(SEVERITIES), "info")]
         self._node = values.text("node", "").lower()
         self._text = values.text("text", "").lower()
         self._history = int(values.number("history", 200, 0, _MAX_HISTORY))
@@ -69,7 +69,7 @@ class LogFeed(Feed):
 
 
 def _as_data(line: LogLine) -> dict[str, Any]:
-    level = next((name for name, least in _SEVERITIES.items() if line.severity <= least), "fatal")
+    level = next((name for name, least in SEVERITIES.items() if line.severity <= least), "fatal")
     return {
         "at_s": line.at_s,
         "level": level,

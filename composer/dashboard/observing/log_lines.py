@@ -1,13 +1,21 @@
-"""The last lines of /rosout, while anything shows them."""
+"""The last lines of /rosout, while anything shows them.
+
+What the nodes of this computer have logged before comes from the log files of their runs.
+"""
 
 from __future__ import annotations
 
-from collections import deque
+import os
+import time
+from collections import Counter, deque
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from composer.names import PROGRAM_LOGGER
 from composer.qos import Durability, QosProfile, Reliability
+from composer.run_log import current_domain, find_parts, find_runs, last_records
+from composer.runtime.middleware.environment import log_folder
 
 if TYPE_CHECKING:
     from composer.remote.shared_session import SampledTopic, SharedSession
@@ -19,6 +27,10 @@ _PROFILE = QosProfile(
 )
 _MAX_LINES = 2000
 _MAX_TAKEN = 500
+#: Of each log file, as much as has about that many lines.
+_MAX_BYTES = 500_000
+#: As in rcl_interfaces/msg/Log.
+SEVERITIES = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 _MAX_LENGTH = 4000
 
 
@@ -45,12 +57,19 @@ class LogLines:
         self._sampled: SampledTopic | None = None
         self._lines: deque[LogLine] = deque(maxlen=_MAX_LINES)
         self._count = 0
+        #: How often the log files have each line, and when they were read.
+        self._repeated: Counter[tuple[str, str]] = Counter()
+        self._acquired_s = 0.0
 
     def acquire(self) -> None:
-        """Subscribe for the first user."""
+        """Subscribe for the first user, and read what was logged before."""
         self._users += 1
         if self._sampled is None:
             self._sampled = self._session.sample(_TOPIC, _TYPE, _PROFILE)
+            self._lines.extend(_lines_of_runs())
+            self._count += len(self._lines)
+            self._repeated = Counter(map(_identity, self._lines))
+            self._acquired_s = time.time()
 
     def release(self) -> None:
         """Unsubscribe after the last user, and forget the lines."""
@@ -69,14 +88,59 @@ class LogLines:
         """Take the lines that have arrived."""
         if self._sampled is not None:
             for sample in self._sampled.take(_MAX_TAKEN):
-                self._lines.append(_line(sample.content))
+                line = _line(sample.content)
+                if self._is_repeated(line):
+                    continue
+                self._lines.append(line)
                 self._count += 1
+
+    def _is_repeated(self, line: LogLine) -> bool:
+        """Return whether a line that was sent again, to a late joiner, is in a log file as well."""
+        key = _identity(line)
+        if line.at_s > self._acquired_s or not self._repeated[key]:
+            return False
+        self._repeated[key] -= 1
+        return True
 
     def since(self, number: int) -> tuple[list[LogLine], int, int]:
         """Return the lines from a number on, how many are gone already, and the next number."""
         first = self._count - len(self._lines)
         start = max(number, first)
         return list(islice(self._lines, start - first, None)), start - number, self._count
+
+
+def _identity(line: LogLine) -> tuple[str, str]:
+    return line.logger, line.text
+
+
+def _lines_of_runs() -> list[LogLine]:
+    """Return the last lines of the nodes of all systems that run here, in this ROS domain."""
+    logs = log_folder(os.environ)
+    if logs is None:
+        return []
+    domain = current_domain()
+    records = [
+        record
+        for whole in find_runs(logs)
+        if whole.domain == domain and whole.is_running()
+        for run in (whole, *(part for part in find_parts(logs, whole) if part.is_running()))
+        for record in last_records(run, _MAX_BYTES)
+        if record.logger != PROGRAM_LOGGER
+    ]
+    records.sort(key=lambda record: record.time_ns)
+    return [
+        LogLine(
+            at_s=record.time_ns * 1e-9,
+            severity=SEVERITIES.get(record.level, SEVERITIES["info"]),
+            node=f"/{record.logger.replace('.', '/')}",
+            logger=record.logger,
+            text=record.message[:_MAX_LENGTH],
+            file="",
+            line=0,
+            function="",
+        )
+        for record in records[-_MAX_LINES:]
+    ]
 
 
 def _line(message: Any) -> LogLine:

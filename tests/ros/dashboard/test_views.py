@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
+from pathlib import Path
 from typing import Any
 
+from composer.run_log import find_runs, last_records
 from tests.ros.support.commands import expect_state
 from tests.ros.support.dashboard import Browser
+from tests.ros.support.in_process import wait_until
 from tests.ros.support.system_process import RunningSystem
 
 PLANNER, CONTROLLER = "/planning/planner", "/control/motor_controller"
@@ -254,6 +258,25 @@ def test_the_log_is_filtered(page: Browser) -> None:
     some = page.subscribe("log", text="driving to", node="motor")
     lines = page.until(some, lambda data: data["lines"])["lines"]
     assert all("driving to" in line["text"] and line["node"] == CONTROLLER for line in lines)
+
+
+SILENT = """
+system: silent
+introspection: {rosout: false}
+nodes: {silent: {on_activate: {log: before the page}}}
+"""
+
+
+def test_the_log_begins_with_what_was_logged_before(page: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "silent.yaml"
+    file.write_text(SILENT)
+    with RunningSystem(str(file)) as system:
+        system.wait_for("1 of 1 nodes active")
+        (run,) = find_runs(Path(os.environ["ROS_LOG_DIR"]), "silent")
+        wait_until(lambda: last_records(run, 10_000)[-1].message.startswith("1 of 1 nodes active"))
+        channel = page.subscribe("log", node="/silent")
+        (line,) = page.until(channel, lambda data: data["lines"])["lines"]
+        assert (line["level"], line["text"]) == ("info", "before the page")
 
 
 def test_timings_have_histograms(page: Browser) -> None:
