@@ -86,8 +86,6 @@ _SENDING = {
     "composer.behavior.Goal.publish_feedback": "the feedback is",
 }
 _RCLPY_MODULES = tuple(f"rclpy.{path.stem}" for path in (LIBRARIES / "rclpy").iterdir())
-#: The usual names of messages that callbacks take.
-_MESSAGE_ARGUMENTS = frozenset({"feedback", "message", "msg", "response", "result"})
 #: Modules besides the standard library of which every name is known.
 _COMPLETE_MODULES = frozenset({"composer", "numpy", "rclpy"})
 
@@ -322,28 +320,10 @@ class _Reader:
         if not isinstance(target, ast.Attribute):  # a variable may change its kind
             is_annotated = isinstance(statement, ast.AnnAssign)
             return self._in_its_words() if is_annotated and not self._is_class else None
-        module = self.checked.copy.module
-        if dotted(target) == f"self.{target.attr}":
-            if dotted(target) in self.owners.attributes and not self._is_class:
-                message = f"'{dotted(target)}' is set by the composer and must not be changed"
-                return self._made(Family.TYPE, message)
-            return None
-        owner = self.owners.with_field(target, found["expected"], module)
-        is_certain = found["expected"] in self.owners.messages or self._is_message(target)
-        if owner is not None and (is_certain or not self._is_class):
-            if _may_be_none(found["given"], found["expected"]):
-                return self._none()
-            return self._value(owner, target.attr, found["given"])
+        if dotted(target) in self.owners.attributes and not self._is_class:
+            message = f"'{dotted(target)}' is set by the composer and must not be changed"
+            return self._made(Family.TYPE, message)
         return None
-
-    def _is_message(self, target: ast.Attribute) -> bool:
-        """Return whether an attribute that is set is, as far as syntax shows, a message's field."""
-        root = dotted(target).partition(".")[0]
-        values = self.code.values_of(root, self.span.line)
-        made = [dotted(value.func) for value in values if isinstance(value, ast.Call)]
-        imports = self.checked.copy.module.imports
-        origins = [imports[name].module for name in made if name in imports]
-        return root in _MESSAGE_ARGUMENTS or any(item.endswith(".msg") for item in origins)
 
     def _keyword(self) -> Problem:
         found = re.search(_KEYWORD, self.finding.message)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 from functools import cached_property
@@ -17,9 +16,7 @@ from composer.model import Node
 from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family
 from composer.python_code.source import Module
-from composer.python_code.source.trees import dotted
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES, member_class_name
-from composer.python_code.stubs.messages import short_type
 
 #: Names of ROS 1, with what ROS 2 has instead.
 _ROS_1_NAMES = {"nsec": "nanosec", "nsecs": "nanosec", "secs": "sec"}
@@ -90,22 +87,6 @@ class Owners:
         definition = self._definition(interface)
         found = definition.field(name) if definition is not None else None
         return str(found.type) if found is not None else None
-
-    def with_field(self, target: ast.Attribute, expected: str, module: Module) -> str | None:
-        """Return a message with such a field, best one named as in ``header.stamp``."""
-        short, parent = expected.rpartition(".")[2], dotted(target.value).rpartition(".")[2]
-        every = self._by_use((full for names in self.messages.values() for full in names), module)
-
-        def rank(full: str) -> tuple[bool, bool]:
-            name = full.rpartition("/")[2]
-            return name.lower() != parent, name not in module.imports
-
-        for full in sorted(every, key=rank):
-            definition = self._definition(full)
-            found = definition.field(target.attr) if definition is not None else None
-            if found is not None and short_type(found.type) == short:
-                return full
-        return None
 
     def shown(self, type_: str, module: Module) -> str:
         """Return how messages name a type: an interface by its full name."""

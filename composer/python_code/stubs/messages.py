@@ -1,9 +1,9 @@
 """Stubs of message, service and action packages.
 
-A field accepts more than it returns: a list of numbers may be assigned where an ``array.array``
-is read. So such a field is a property whose setter has a wider type. A float field refuses ints,
-as ROS sends garbage for them (``Float64(data=3)`` arrives as 5e-324). The types that packages share
-are in ``libraries/_ros.pyi``.
+Fields are properties, as in the classes of ROS. A field accepts more than it returns: a list of
+numbers may be assigned where an ``array.array`` is read. A float field refuses ints, as ROS sends
+garbage for them (``Float64(data=3)`` arrives as 5e-324). The types that packages share are in
+``libraries/_ros.pyi``.
 """
 
 from __future__ import annotations
@@ -115,14 +115,10 @@ def _message(name: str, message: Message) -> Iterator[str]:
     arguments = "".join(f", {item.name}: {_accepted(item.type)} = ..." for item in fields)
     yield f"    def __init__(self{', *' if arguments else ''}{arguments}) -> None: ..."
     for item in fields:
-        given, accepted = _given(item.type), _accepted(item.type)
-        if given == accepted:
-            yield f"    {item.name}: {given}"
-            continue
         yield "    @property"
-        yield f"    def {item.name}(self) -> {given}: ..."
+        yield f"    def {item.name}(self) -> {_given(item.type)}: ..."
         yield f"    @{item.name}.setter"
-        yield f"    def {item.name}(self, value: {accepted}) -> None: ..."
+        yield f"    def {item.name}(self, value: {_accepted(item.type)}) -> None: ..."
 
 
 def _element(type_: FieldType) -> str:
@@ -133,11 +129,6 @@ def _element(type_: FieldType) -> str:
     if type_.name in ("bool", "byte"):
         return {"bool": "bool", "byte": "bytes"}[type_.name]
     return "int" if type_.is_primitive else python_name(type_.name)
-
-
-def short_type(type_: FieldType) -> str:
-    """Return the type of a field that is read, without its module."""
-    return _given(type_).rpartition(".")[2]
 
 
 def _given(type_: FieldType) -> str:
