@@ -7,6 +7,7 @@ handlers and of rclpy callbacks without an annotation get one. Places in it are 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import field
 from typing import TypeGuard
@@ -125,18 +126,12 @@ class _Edits:
 
     def add_base(self, node: ast.ClassDef, base: str) -> None:
         """Add the first base class of a class."""
-        if node.bases:
-            self._insert(node.bases[0].lineno, node.bases[0].col_offset, f"{base}, ")
-            return
         line = self.lines[node.lineno - 1]
-        name_ends = line.index(node.name, line.index("class") + len("class")) + len(node.name)
-        rest = line[name_ends:].lstrip()
-        if not rest.startswith("("):
-            self.insertions.append((node.lineno, name_ends, f"({base})"))
-        else:
-            comma = ", " if node.keywords else ""
-            at = line.index("(", name_ends) + 1
-            self.insertions.append((node.lineno, at, f"{base}{comma}"))
+        named = re.search(rf"\bclass\s+{node.name}\b\s*(?:\[.*?\]\s*)?(\()?", line)
+        if named is not None:
+            comma = ", " if node.bases or node.keywords else ""
+            text = f"{base}{comma}" if named[1] else f"({base})"
+            self.insertions.append((node.lineno, named.end(), text))
 
     def annotate(self, function: Function, signature: Signature) -> None:
         """Annotate the arguments of a method, and its result."""
@@ -207,20 +202,18 @@ def _assigned_names(function: Function) -> frozenset[str]:
 
 
 def _end_of_signature(function: Function, lines: list[str]) -> tuple[int, int] | None:
-    """Return the place after the closing parenthesis of a function, None if it is not found.
-
-    It is the last one before the first statement; the colon that follows it ends the signature.
-    """
-    first = function.body[0]
-    start = min([first.lineno, *(item.lineno for item in getattr(first, "decorator_list", ()))])
-    for number in range(start, function.lineno - 1, -1):
+    """Return the place after the closing parenthesis of a function, None if it is not found."""
+    arguments = [*positional_arguments(function), *function.args.kwonlyargs]
+    defaults = [*function.args.defaults, *function.args.kw_defaults]
+    parts = (item for item in (*arguments, *defaults) if item is not None)
+    ends = [(item.end_lineno or 0, item.end_col_offset or 0) for item in parts]
+    first, column = max(ends, default=(function.lineno, function.col_offset))
+    for number in range(first, function.body[0].lineno + 1):
         line = lines[number - 1]
-        if number == start:
-            is_same_line = start == function.lineno
-            line = line[: characters(line, first.col_offset)] if is_same_line else ""
-        code = line.partition("#")[0].rstrip()
-        if code.endswith(":") and code[:-1].rstrip().endswith(")"):
-            return number, len(code[:-1].rstrip())
+        start = characters(line, column) if number == first else 0
+        closing = re.compile(r"\)(?=\s*:)").search(line, start)
+        if closing is not None:
+            return number, closing.end()
     return None
 
 

@@ -32,7 +32,6 @@ def node_class_problems(code: Code) -> Iterator[Problem]:
     for scope in code.scopes:
         if scope.function is None or scope.method is None:
             continue
-        yield from _declared_twice(scope.function.body, scope)
         for node in scope.nodes:
             for value in _values_used(node):
                 if _is_parameter(value, scope):
@@ -75,22 +74,6 @@ def _may_have_others(call: ast.Call) -> bool:
 
 def _catches_errors(scope: NodeScope) -> bool:
     return any(isinstance(x, ast.ExceptHandler) and catches(x, _ERRORS) for x in scope.nodes)
-
-
-def _declared_twice(body: Sequence[ast.stmt], scope: NodeScope) -> Iterator[Problem]:
-    """Yield the parameters that a function declares again, which raises an error."""
-    declared: set[str] = set()
-    statements = [item for item in body if isinstance(item, ast.Assign | ast.Expr)]
-    for node in walk(statements, closed=(ast.Lambda,)):
-        match node:
-            case ast.Call(func=called, args=[name, *_]):
-                is_declared = dotted(called) == "self.declare_parameter"
-                parameter = scope.constant(name) if is_declared else None
-                if isinstance(parameter, str):
-                    if parameter in declared:
-                        message = f"the parameter '{parameter}' is declared already"
-                        yield scope.problem(Family.PARAMETER, message, name)
-                    declared.add(parameter)
 
 
 def _values_used(node: ast.AST) -> Sequence[ast.expr]:

@@ -162,18 +162,6 @@ PARAMETERS = [
     """,
     """
     self.declare_parameter('rate', 1.0)
-    self.rate = self.declare_parameter('rate', 2.0).value  # PARAMETER
-    self.declare_parameter(self.name, 1.0)
-    self.declare_parameter(self.name, 1.0)
-    """,
-    """
-    if self.fast:
-        self.declare_parameter('rate', 1.0)
-    else:
-        self.declare_parameter('rate', 2.0)
-    """,
-    """
-    self.declare_parameter('rate', 1.0)
     rate: float = self.get_parameter('rate')  # TYPE
     other: object = self.get_parameter('rate')
     """,
