@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import re
 
-#: For a character class of re: controls (all but tab and line ends), characters that end a line for
-#: YAML 1.1 only, those that change the direction of text or are invisible, half surrogate pairs,
-#: byte-order marks inside the text, and noncharacters.
+#: For a character class of re: characters that change the direction of text or are invisible.
+INVISIBLE = "\u061c\u200b\u200e\u200f\u202a-\u202e\u2060-\u2069"
+#: The same with controls (all but tab and line ends), characters that end a line for YAML 1.1 only,
+#: half surrogate pairs, byte-order marks inside the text, and noncharacters.
 UNSAFE = (
     "\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f"
-    "\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069"
+    f"{INVISIBLE}\u2028\u2029"
     "\ud800-\udfff\ufeff\ufff9-\ufffb\ufffe\uffff\U000e0000-\U000e007f"
 )
 #: Matches a character that is unsafe in a text of several lines.

@@ -84,7 +84,8 @@ def parse_document(
 def read_parameter_document(path: Path, shown: str) -> tuple[Mapping | None, list[Diagnostic]]:
     """Read the ROS parameter file at ``path``, with the values that rcl reads from it.
 
-    A key may occur more than once in a map. A file without content is an empty map.
+    A key may occur more than once in a map, and comments may have invisible characters. A file
+    without content is an empty map.
     """
     data, diagnostics = read_bytes(path, SourceFile(shown))
     if diagnostics:
@@ -93,7 +94,7 @@ def read_parameter_document(path: Path, shown: str) -> tuple[Mapping | None, lis
     if diagnostics:
         return None, diagnostics
     builder = ParameterFileBuilder(source)
-    stopped = _build(builder, source)
+    stopped = _build(builder, source, may_be_invisible=True)
     if stopped is not None:
         return None, stopped
     tree = builder.merged()
@@ -102,11 +103,13 @@ def read_parameter_document(path: Path, shown: str) -> tuple[Mapping | None, lis
     return _root(tree, builder.diagnostics, source, "begin with the name of a node")
 
 
-def _build(builder: TreeBuilder, source: SourceFile) -> list[Diagnostic] | None:
+def _build(
+    builder: TreeBuilder, source: SourceFile, *, may_be_invisible: bool = False
+) -> list[Diagnostic] | None:
     """Let ``builder`` handle the events of a text; return the diagnostics if it has no tree."""
     if len(source.text) > MAX_BYTES:
         return [too_large(source)]
-    diagnostics = check_text(source)
+    diagnostics = check_text(source, may_be_invisible=may_be_invisible)
     if diagnostics:
         return diagnostics
     try:

@@ -97,6 +97,7 @@ FILES = [
     # text
     "",
     "# nothing\n",
+    "# in\u200bvisible\nn: {ros__parameters: {p: 1}} # \u202e\n",
     "- a",
     "---\nn: {ros__parameters: {p: 1}}\n...\n",
     "%YAML 1.1\n---\nn: {ros__parameters: {p: 1}}",
