@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from types import FrameType
 from typing import TypeAlias
 
 from rcl_interfaces.msg import Log as LogMessage
@@ -20,6 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from composer.model import LogLevel
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
+from composer.runtime.executors.stacks import is_internal
 from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
@@ -56,7 +59,7 @@ class Log:
     """A behavior's ``log``: to the console of the process, and to /rosout.
 
     Not by rcl, whose console has no timestamps relative to the start of the system. rclpy's logger
-    also inspects the stack for its caller at every call, which takes longer than the rest.
+    also searches the stack for its caller at every call, which takes longer than the rest.
     """
 
     def __init__(self, node: Node, level: LogLevel, write: Write, *, rosout: bool = True) -> None:
@@ -74,47 +77,55 @@ class Log:
         """Return whether messages at ``level`` are logged."""
         return SEVERITIES[level] >= self._lowest
 
-    def write(self, level: LogLevel, message: str) -> None:
-        """Log ``message`` at ``level``."""
+    def write(self, level: LogLevel, message: str, caller: FrameType | None = None) -> None:
+        """Log ``message`` at ``level``; see :meth:`emit`."""
         if self.is_enabled_for(level):
-            self.emit(level, message)
+            self.emit(level, message, caller=caller)
 
-    def emit(self, level: LogLevel, message: str, name: str | None = None) -> None:
-        """Log ``message`` whatever the level of this log is, by default as the node's."""
+    def emit(
+        self,
+        level: LogLevel,
+        message: str,
+        name: str | None = None,
+        caller: FrameType | None = None,
+    ) -> None:
+        """Log ``message`` whatever the level of this log is, by default as the node's.
+
+        ``caller`` is the frame that logs; /rosout has its place, if it is in code of the user.
+        """
         name = name or self._name
         text = printable(message)
         self._write(level, name, text)
         if self._rosout is None:
             return
         with suppress(*_DESTROYED):
-            self._rosout.publish(
-                LogMessage(
-                    stamp=self._clock.now().to_msg(),
-                    level=SEVERITIES[level],
-                    name=name,
-                    msg=text,
-                )
+            line = LogMessage(
+                stamp=self._clock.now().to_msg(), level=SEVERITIES[level], name=name, msg=text
             )
+            if caller is not None and not is_internal(caller.f_code.co_filename):
+                line.file, line.line = caller.f_code.co_filename, caller.f_lineno
+                line.function = caller.f_code.co_name
+            self._rosout.publish(line)
 
     def debug(self, message: str) -> None:
         """Log details for debugging."""
-        self.write(LogLevel.DEBUG, message)
+        self.write(LogLevel.DEBUG, message, sys._getframe(1))
 
     def info(self, message: str) -> None:
         """Log information for the operator of the system."""
-        self.write(LogLevel.INFO, message)
+        self.write(LogLevel.INFO, message, sys._getframe(1))
 
     def warn(self, message: str) -> None:
         """Log a possible problem."""
-        self.write(LogLevel.WARN, message)
+        self.write(LogLevel.WARN, message, sys._getframe(1))
 
     def error(self, message: str) -> None:
         """Log an error."""
-        self.write(LogLevel.ERROR, message)
+        self.write(LogLevel.ERROR, message, sys._getframe(1))
 
     def fatal(self, message: str) -> None:
         """Log an unrecoverable error of the node."""
-        self.write(LogLevel.FATAL, message)
+        self.write(LogLevel.FATAL, message, sys._getframe(1))
 
 
 class ErrorLimit:

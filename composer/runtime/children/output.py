@@ -70,9 +70,7 @@ class OutputLines:
             self._on_line(f"({dropped} lines were dropped: more than {_MAX_LINES_PER_S} a second)")
 
     def _emit(self, line: bytes) -> None:
-        text = _COLORS.sub(b"", line).decode(errors="backslashreplace").rstrip("\r")
-        if text.strip():
-            self._on_line(text)
+        self._on_line(_COLORS.sub(b"", line).decode(errors="backslashreplace").rstrip("\r"))
 
 
 def parse_line(text: str, *, is_error: bool) -> tuple[LogLevel, str | None, str]:

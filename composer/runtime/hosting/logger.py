@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from types import FrameType
 from typing import Any
 
 from rclpy.impl import rcutils_logger
@@ -41,7 +42,11 @@ class HostedLogger(RcutilsLogger):
         if options and not self._passes(options):
             return False
         level = _LEVELS.get(int(severity), LogLevel.INFO)
-        self._log.emit(level, str(message), name)
+        # Not by rclpy's _find_caller, which reads the source file each time.
+        caller: FrameType | None = sys._getframe(1)
+        while caller is not None and caller.f_code.co_filename == rcutils_logger.__file__:
+            caller = caller.f_back
+        self._log.emit(level, str(message), name, caller)
         return True
 
     def _passes(self, options: dict[str, Any]) -> bool:

@@ -63,6 +63,12 @@ def complete_environment(environment: MutableMapping[str, str]) -> None:
     """Set the variables that rclpy from PyPI leaves unset, and the format of log lines."""
     if Path(sys.prefix, "share", "ament_index").is_dir():
         environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    for name, value in {
+        "ROS_DISTRO": "jazzy",
+        "ROS_VERSION": "2",
+        "ROS_PYTHON_VERSION": "3",
+    }.items():
+        environment.setdefault(name, value)
     environment.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", CONSOLE_FORMAT)
 
 

@@ -62,27 +62,8 @@ class NodeParameters:
         self.values: dict[str, Any] = {}
         for parameter in self._declared.values():
             self.values[parameter.name.value] = _declare(node, parameter)
-        node.add_pre_set_parameters_callback(self._convert_integers)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
-
-    def _convert_integers(self, changes: list[RosParameter]) -> list[RosParameter]:
-        """Accept integers for parameters that are declared as floating-point numbers."""
-        return [self._converted(change) for change in changes]
-
-    def _converted(self, change: RosParameter) -> RosParameter:
-        parameter = self._declared.get(change.name)
-        if parameter is None:
-            return change
-        declared = _ROS_TYPES[ParameterType(parameter.type.value)]
-        if declared is RosParameter.Type.DOUBLE and change.type_ is RosParameter.Type.INTEGER:
-            return RosParameter(change.name, declared, float(change.value))
-        if (
-            declared is RosParameter.Type.DOUBLE_ARRAY
-            and change.type_ is RosParameter.Type.INTEGER_ARRAY
-        ):
-            return RosParameter(change.name, declared, [float(item) for item in change.value])
-        return change
 
     def _check(self, changes: list[RosParameter]) -> SetParametersResult:
         values = {change.name: _plain(change.value) for change in changes}

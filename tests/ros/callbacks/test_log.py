@@ -38,6 +38,22 @@ def test_a_late_subscription_of_rosout_receives_the_log(tmp_path: Path, peer: Pe
     assert lines[0].stamp.sec > 0
 
 
+def test_rosout_says_where_a_behavior_has_logged(tmp_path: Path, peer: Peer) -> None:
+    text = "system: loud\nnodes: {loud: {behavior: loud:Loud}}"
+    module = """
+    from composer.behavior import Behavior
+
+    class Loud(Behavior):
+        def on_activate(self):
+            self.log.info("here")
+    """
+    late = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    with running(text, tmp_path, loud=module):
+        messages = peer.listen(Log, "/rosout", late)
+        line = wait_until(lambda: next((item for item in messages if item.msg == "here"), None))
+    assert (line.file, line.function, line.line) == (str(tmp_path / "loud.py"), "on_activate", 6)
+
+
 def test_messages_below_the_level_are_not_logged(tmp_path: Path) -> None:
     with running(LOUD, tmp_path, options=HostOptions(log_level=LogLevel.WARN)) as system:
         system.wait_for_log("a warning")

@@ -238,7 +238,10 @@ def test_the_log_of_a_class_goes_to_the_console_and_to_rosout(tmp_path: Path, pe
     lines: list[Any] = peer.listen(Log, "/rosout", LATCHED)
     with running(TALKER_AND_LISTENER, tmp_path) as system:
         system.wait_for_log("got 1")
-        wait_until(lambda: any(line.msg == "got 1" for line in lines))
+        got = wait_until(lambda: next((line for line in lines if line.msg == "got 1"), None))
+        assert got.file.endswith("/node_classes.py")
+        assert got.function == "on_number"
+        assert got.line > 0
         logger = system.node("listener").instance.get_logger()
         logger.get_child("part").warning("from a part")
         wait_until(lambda: any(line.name == "listener.part" for line in lines))

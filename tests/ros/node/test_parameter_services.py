@@ -205,3 +205,10 @@ def test_the_manager_node_has_parameter_services(system: RunningSystem, peer: Pe
     names = GetParameters.Request(names=["use_sim_time"])
     (value,) = peer.call(GetParameters, "/served/manager/get_parameters", names).values
     assert (value.type, value.bool_value) == (1, False)
+
+
+@pytest.mark.usefixtures("system")
+def test_an_integer_for_a_double_is_refused_as_by_rclpy(peer: Peer) -> None:
+    refusal = peer.set_parameter("/subject", "speed", 2)
+    assert "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.INTEGER'" in refusal
+    assert peer.set_parameter("/subject", "speed", 2.0) == ""

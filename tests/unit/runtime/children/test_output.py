@@ -24,7 +24,7 @@ def lines_of(*chunks: bytes, now_s: float = 0.0) -> list[str]:
     [
         ([b"one\ntwo\n"], ["one", "two"]),
         ([b"on", b"e\ntw", b"o"], ["one", "two"]),
-        ([b"one\r\n\n  \n"], ["one"]),
+        ([b"one\r\n\n  \ntwo\n"], ["one", "", "  ", "two"]),
         ([b"\x1b[31mred\x1b[0m\n"], ["red"]),
         ([b"bad \xff\n"], ["bad \\xff"]),
         ([b"x" * 5000 + b"\nnext\n"], ["x" * 2000 + " ...", "next"]),

@@ -99,9 +99,13 @@ def test_a_middleware_that_is_not_installed_is_refused(tmp_path: Path) -> None:
 
 
 def test_variables_that_are_set_are_kept() -> None:
-    environment = {"AMENT_PREFIX_PATH": "/opt/ros/jazzy", "RCUTILS_CONSOLE_OUTPUT_FORMAT": "x"}
-    complete_environment(environment)
-    assert environment == {
+    given = {
         "AMENT_PREFIX_PATH": "/opt/ros/jazzy",
         "RCUTILS_CONSOLE_OUTPUT_FORMAT": "x",
+        "ROS_DISTRO": "kilted",
     }
+    environment = dict(given)
+    complete_environment(environment)
+    assert environment == given | {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
+    complete_environment(environment := {})
+    assert environment["ROS_DISTRO"] == "jazzy"
