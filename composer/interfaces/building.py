@@ -52,3 +52,12 @@ def how_to_build(package: str, folder: Path | None) -> str:
     if not (folder / "pyproject.toml").is_file():
         return f"compose interfaces build {package}   or: {by_colcon}"
     return f"pip install {shown_path(folder)}   or: {by_colcon}"
+
+
+def how_to_get(module: str) -> str:
+    """Return how to install the package of a Python module that an import has not found."""
+    package = module.partition(".")[0]
+    if package in Bundle().packages():
+        return how_to_build(package, None)
+    by_apt = f"apt install {_debian_name(package)}, or build it in a workspace"
+    return f"pip install {package}   or, if it is a package of ROS: {by_apt}"

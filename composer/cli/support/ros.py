@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -72,19 +72,49 @@ def require_launch(command: str) -> None:
 def require_interfaces(system: System) -> None:
     """Raise CommandError if Python lacks an interface package that a port of the system uses."""
     from composer.interfaces.building import how_to_build, used_packages
+
+    for package, node in used_packages(system).items():
+        if find_spec(package) is None:
+            raise CommandError(
+                f"interface package '{package}' of node '{node.name}' is not installed for"
+                " this Python",
+                hint=how_to_build(package, _interface_sources().get(package)),
+                exit_code=CONFIG,
+            )
+
+
+def require_modules(system: System) -> None:
+    """Import the classes of the system's own nodes; raise CommandError if a module is missing.
+
+    What else an import raises is reported when the node is configured.
+    """
+    from composer.interfaces.building import how_to_build, how_to_get
+
+    for node in system.nodes:
+        if node.hosted_class is None or not node.in_process:
+            continue
+        from composer.runtime.hosting.hosted_node import missing_module
+
+        missing = missing_module(node.hosted_class.reference)
+        if missing is not None:
+            sources = _interface_sources()
+            raise CommandError(
+                f"class '{node.hosted_class.reference.text}' of node '{node.name}' imports"
+                f" '{missing}', which is not installed for this Python",
+                hint=how_to_build(missing, sources[missing])
+                if missing in sources
+                else how_to_get(missing),
+                exit_code=CONFIG,
+            )
+
+
+def _interface_sources() -> Mapping[str, Path]:
+    """Return the folders of the project's interface packages, by name."""
     from composer.interfaces.sources import find_packages
     from composer.node_types import interface_folders
     from composer.project import Project
 
-    for package, node in used_packages(system).items():
-        if find_spec(package) is None:
-            folders = interface_folders(Project.at(Path.cwd()))
-            raise CommandError(
-                f"interface package '{package}' of node '{node.name}' is not installed for"
-                " this Python",
-                hint=how_to_build(package, find_packages(folders).folders.get(package)),
-                exit_code=CONFIG,
-            )
+    return find_packages(interface_folders(Project.at(Path.cwd()))).folders
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter as RosParameter
 
 from composer.behavior import TransitionFailed
+from composer.interfaces.building import how_to_get
 from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, LogLevel, Node
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
@@ -30,6 +31,7 @@ from composer.runtime.hosting.shared_state import SharedState
 from composer.runtime.hosting.user_code import ThreadedCall, interrupt_callbacks
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class
+from composer.runtime.node.behavior_modules import plain_name
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.node import WrongReturn
@@ -146,6 +148,9 @@ class HostedNode(LocalNode):
             node.__init__(**arguments)
         except SystemExit as error:
             raise HostingError(f"the constructor ends the process: SystemExit({error})") from error
+        except ModuleNotFoundError as error:
+            missing = plain_name(error.name or "")
+            raise HostingError(f"{error}; {how_to_get(missing)}") from error
         if instance.node is None:
             raise HostingError("the constructor does not call super().__init__()")
 
@@ -244,6 +249,18 @@ class HostedNode(LocalNode):
 
 
 _STATE_IDS = {"unconfigured": 1, "inactive": 2, "active": 3, "finalized": 4}
+
+
+def missing_module(reference: BehaviorReference) -> str | None:
+    """Import the class; return the name of a module that it or another one imports in vain."""
+    install()
+    try:
+        node_class(reference)
+    except ModuleNotFoundError as error:
+        return plain_name(error.name or "")
+    except (Exception, SystemExit):
+        return None
+    return None
 
 
 def node_class(reference: BehaviorReference) -> type[RosNode]:

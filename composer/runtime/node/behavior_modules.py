@@ -41,6 +41,11 @@ def import_module(module: str, base: Path, folders: Sequence[Path]) -> ModuleTyp
         return importlib.import_module(f"{_package(base, folders)}.{module}")
 
 
+def plain_name(module: str) -> str:
+    """Return the name of a module as files import it, without our package."""
+    return module.partition(".")[2] if module.startswith(BEHAVIOR_PACKAGE) else module
+
+
 def _package(base: Path, folders: Sequence[Path]) -> str:
     """Return the name of the package of a folder, without importing anything from it."""
     digest = hashlib.sha256(str(base.resolve()).encode()).hexdigest()[:12]

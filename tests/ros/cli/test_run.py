@@ -223,6 +223,32 @@ def test_a_missing_interface_package_is_reported_before_the_start(
 
 
 @pytest.mark.parametrize(
+    ("module", "hint"),
+    [
+        (
+            "interactive_markers",
+            "pip install interactive_markers   or, if it is a package of ROS: apt",
+        ),
+        ("geographic_msgs.msg", "compose interfaces build geographic_msgs   or: apt install ros-"),
+    ],
+)
+def test_a_module_that_a_class_imports_in_vain_is_reported_before_the_start(
+    tmp_path: Path, module: str, hint: str
+) -> None:
+    tmp_path.joinpath("marker.py").write_text(
+        f"import {module}\nfrom rclpy.node import Node\nclass Marker(Node): ...\n"
+    )
+    system = tmp_path / "marker.yaml"
+    system.write_text('system: marker\nnodes: {marker: {class: "marker:Marker"}}\n')
+    done = compose("run", system)
+    assert done.returncode == 78
+    package = module.partition(".")[0]
+    assert f"'marker:Marker' of node 'marker' imports '{package}', which is not" in done.stderr
+    assert f"\n  {hint}" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
     ("command", "kind"),
     [("node list", "node"), ("topic list", "topic"), ("lifecycle nodes", "lifecycle node")],
 )

@@ -30,7 +30,12 @@ from composer.cli.support.options import (
     options_of_run,
 )
 from composer.cli.support.output.terminal import say, write
-from composer.cli.support.ros import announce_discovery, require_interfaces, require_ros
+from composer.cli.support.ros import (
+    announce_discovery,
+    require_interfaces,
+    require_modules,
+    require_ros,
+)
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.typings import update_typings
 
@@ -255,6 +260,7 @@ def _require(system: System, *, dashboard: bool) -> None:
     """Raise CommandError if something that the run needs is not installed."""
     require_ros("compose run", system)
     require_interfaces(system)
+    require_modules(system)
     if dashboard:
         require_dashboard("compose run --dashboard")
 
