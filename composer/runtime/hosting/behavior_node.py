@@ -13,7 +13,12 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.adopted_node import AdoptedNode
 from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
 from composer.runtime.hosting.dispatch import install
-from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
+from composer.runtime.hosting.instance import (
+    HostedEntities,
+    Instance,
+    InstanceSettings,
+    changed_parameters,
+)
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.shared_state import SharedState
 from composer.runtime.node.local_node import LocalNode
@@ -64,7 +69,7 @@ class NodeOfBehavior:
 
     def end(self) -> None:
         """Release the node: its handle is not valid any more."""
-        self._parameters.update(self._instance.changed_parameters())
+        self._parameters.update(changed_parameters(self.node, self._instance.declared))
         self._instance.ended.set()
         for executor in self._instance.executors:
             executor.shutdown(0.0)

@@ -24,7 +24,12 @@ from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_cl
 from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.errors import HostingError
-from composer.runtime.hosting.instance import HostedEntities, Instance, InstanceSettings
+from composer.runtime.hosting.instance import (
+    HostedEntities,
+    Instance,
+    InstanceSettings,
+    changed_parameters,
+)
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.names import action_names, remapping_arguments
 from composer.runtime.hosting.shared_state import SharedState
@@ -69,6 +74,8 @@ class HostedNode(LocalNode):
         self._log_level: LogLevel = options.log_level
         self._instance: Instance | None = None
         self._shared: SharedState | None = None
+        #: What the last instance has declared; the parameters exist until the next one.
+        self._declared: dict[str, RosParameter] = {}
         #: Parameters that were set at run time. They keep their values, as those of other nodes do.
         self._kept: dict[str, RosParameter] = {}
         self._overrides = ros_parameters((*model.parameters, *model.undeclared_parameters))
@@ -104,6 +111,7 @@ class HostedNode(LocalNode):
 
     async def _configure(self) -> None:
         self._context.group = self._always_on_context.group = MutuallyExclusiveCallbackGroup()
+        self._keep_changed_parameters()
         instance = self._new_instance()
         self._instance, self._entities = instance, instance.entities
         vars(self._ros)["_composer_instance"] = instance
@@ -167,11 +175,21 @@ class HostedNode(LocalNode):
             self.loop.remove(service)
             self._ros.destroy_service(service)
         has_failed = outcome is not None and outcome.transition == "configure"
-        # With values that it cannot be configured with, it would never be again.
-        self._kept = {} if has_failed else self._kept | instance.changed_parameters()
+        self._declared = instance.declared
+        if self._shared is not None:
+            self._shared.remove_callbacks()
+        if has_failed:
+            # With values that it cannot be configured with, it would never be again.
+            self._keep_changed_parameters()
+            self._kept = {}
+        self._check_threads(instance.threads)
+
+    def _keep_changed_parameters(self) -> None:
+        """Remove the parameters of the last instance; the next one begins with changed values."""
+        self._kept |= changed_parameters(self._ros, self._declared)
+        self._declared = {}
         if self._shared is not None:
             self._shared.restore()
-        self._check_threads(instance.threads)
 
     # --- parts
 

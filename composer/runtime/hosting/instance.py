@@ -182,15 +182,6 @@ class Instance:
         number = self._timer_names[name] = self._timer_names.get(name, 0) + 1
         return name if number == 1 else f"{name}_{number}"
 
-    def changed_parameters(self) -> dict[str, Parameter]:
-        """Return the parameters whose values were set after their declaration."""
-        present = self.node._parameters if self.node is not None else {}
-        return {
-            name: present[name]
-            for name, declared in self.declared.items()
-            if name in present and present[name] is not declared
-        }
-
     def begin(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
         """Add the port of an entity, and activate it if the node is active."""
         self.entities.add(entity, port, always_on=always_on)
@@ -213,6 +204,16 @@ class Instance:
         """
         limit_s = None if timeout_s is None or timeout_s < 0 else timeout_s
         return self.context.loop.wait_for(future, limit_s)
+
+
+def changed_parameters(node: Any, declared: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Return the parameters of a node whose values were set after they were ``declared``."""
+    present = node._parameters
+    return {
+        name: present[name]
+        for name, parameter in declared.items()
+        if name in present and present[name] is not parameter
+    }
 
 
 def _ignore() -> None:

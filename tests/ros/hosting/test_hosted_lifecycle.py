@@ -33,11 +33,12 @@ def test_an_instance_lives_from_configure_to_cleanup(tmp_path: Path, peer: Peer)
         assert peer.change("/talker", "cleanup")
         assert history == ["constructed", "destroyed"]
         wait_until(lambda: peer.node.count_publishers("/numbers") == 0)
-        assert peer.set_parameter("/talker", "word", "x")  # not declared any more
+        assert peer.set_parameter("/talker", "period", "x")  # of another type
+        assert peer.set_parameter("/talker", "word", "kept while unconfigured") == ""
         system.change("talker", "configure", "activate")
         again = system.node("talker").instance
         assert again is not first
-        assert again.get_parameter("word").value == "kept"
+        assert again.get_parameter("word").value == "kept while unconfigured"
         assert again.get_parameter("period").value == 0.01
     assert history == ["constructed", "destroyed"] * 2
 
