@@ -11,12 +11,12 @@ import pytest
 from benchmarks.page import ALL_SHOWN, NODES
 from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.pages import opened
+from tests.ros.support.pages import opened, visit
 from tests.ros.support.system_process import RunningSystem
 from tests.unit.support.fleets import fleet_text
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Page, ViewportSize
 
 pytestmark = pytest.mark.browser
 
@@ -90,3 +90,27 @@ def test_names_can_be_read_at_once(
         page.keyboard.press("0")
         page.locator(".picture.far").wait_for()
         assert page.evaluate(NAMES)["names"] == shown["names"]
+
+
+DRIVERS = ("lidar", "imu", "camera", "odometry", "battery", "motor", "gripper", "bumper")
+OTHERS = ("localization", "obstacle_detector", "path_planner", "status_reporter", "watchdog")
+NAMELESS = """() => [...document.querySelectorAll(".world [data-kind=node]")]
+    .filter(node => node.matches(".nameless") || !node.querySelector("text").textContent)
+    .map(node => node.dataset.key)"""
+
+
+def test_on_a_phone_every_box_has_a_name(
+    browser: Browser, shared_domain_id: int, tmp_path: Path
+) -> None:
+    lines = [f"  {name}_driver: {{on_activate: {{log: on}}}}" for name in DRIVERS]
+    lines += [f"  {name}: {{lifecycle: {{depends_on: ['*_driver']}}}}" for name in OTHERS]
+    path = tmp_path / "robot.yaml"
+    path.write_text("\n".join(["system: robot", "nodes:", *lines, ""]), encoding="utf-8")
+    phone: ViewportSize = {"width": 390, "height": 844}
+    with (
+        dashboard(str(path)) as server,
+        opened(browser, server.address, viewport=phone) as page,
+    ):
+        visit(page, "/graph?view=lifecycle")
+        page.locator(".picture.far").wait_for()
+        assert page.evaluate(NAMELESS) == []

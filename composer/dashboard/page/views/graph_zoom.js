@@ -2,7 +2,8 @@
  * Leaves out of the diagram what is too small to read, and keeps names in a readable size.
  *
  * From afar, a box has only its name and its state. Names of nodes are shortened where others are next to
- * them. Names that have no room are left out: those of frames come first, then those of nodes.
+ * them. Names that have no room are shortened to their boxes, without states; those of frames are left out.
+ * Names of outer frames come first, then those of nodes.
  */
 import { setText } from "../dom.js";
 import { isNode } from "../graph/filter.js";
@@ -20,14 +21,17 @@ const DRAWN_SMALL = 10;
 const STEP = 1.04;
 /** Sizes in pixels of the screen. */
 const NODE = { font: 11, height: 17, padding: 5 };
+/** Of a name in its own box, which has no room for more. */
+const COMPACT = { font: 10, height: 13, padding: 1 };
 const CHANNEL = { font: 10, height: 14, padding: 4 };
 const FRAME = { font: 12, height: 15, padding: 0 };
 const INNER_FRAME = { font: 10, height: 12, padding: 0 };
 const MARK = 10;
 const HEAD = 6;
 const GAP = 1;
-/** Less of a name says nothing. */
+/** Less of a name says nothing, unless it has no other place than its box. */
 const LEAST_LETTERS = 3;
+const LEAST_COMPACT = 1;
 /** The size of a state's shape and of an arrow head as they are drawn, in SVG units. */
 const DRAWN_MARK = 12;
 const DRAWN_HEAD = 8;
@@ -52,8 +56,8 @@ export function createZoomLevels(picture, boxes) {
   ];
   let style = null;
   for (const entry of named) {
-    entry.font = `${entry.style.font}px ${font}`;
-    if (entry.style !== style) measuring.font = entry.font;
+    entry.family = font;
+    if (entry.style !== style) measuring.font = `${entry.style.font}px ${font}`;
     style = entry.style;
     entry.name = entry.text.textContent;
     entry.around = 2 * style.padding + (entry.hasMark ? MARK + 2 : 0);
@@ -123,13 +127,21 @@ function showFar(named, unit, right) {
   const boxesOf = (wanted) => named.filter(({ item }) => item && wanted(item)).map(({ box }) => box);
   const taken = boxesOf(isNode);
   const nodes = named.filter(({ item }) => item && isNode(item));
-  for (const entry of nodes) entry.short = shortened(entry, roomOf(entry, nodes, unit));
+  for (const entry of named) entry.label = labelOf(entry);
+  for (const entry of nodes) entry.label = shortened(entry.label, roomOf(entry, nodes, unit), LEAST_LETTERS);
   const channels = new Map(boxesOf((item) => !isNode(item)).map((box) => [box, innerHalf(box)]));
   for (const entry of named) {
-    const place = placeOf(entry, unit, right);
     const isFree = (wanted, gap) => !taken.some((other) => other !== entry.box && overlap(other, wanted, gap));
-    const hidesChannel = () => [...channels].some(([box, inner]) => box !== entry.box && overlap(inner, place, 0));
-    const isShown = isFree(place, GAP * unit) && !(entry.style === CHANNEL && hidesChannel());
+    const hidesChannel = (place) => [...channels].some(([box, inner]) => box !== entry.box && overlap(inner, place, 0));
+    const hasRoom = (place) => isFree(place, GAP * unit) && !(entry.style === CHANNEL && hidesChannel(place));
+    let place = placeOf(entry, unit, right);
+    let isShown = hasRoom(place);
+    if (entry.item && !isShown) {
+      const room = entry.box.width / unit;
+      entry.label = shortened(labelOf(entry, COMPACT), room, LEAST_COMPACT);
+      place = placeOf(entry, unit, right);
+      isShown = entry.label.width <= room && isFree(innerHalf(place), 0);
+    }
     if (isShown) taken.push(place);
     if (!entry.item) {
       drawTitle(entry, isShown ? place : null, unit);
@@ -152,21 +164,30 @@ function roomOf(entry, nodes, unit) {
   return room;
 }
 
-/** Return a name of at most this width as {name, width}; the whole one if too little would be left. */
-function shortened({ name, width, around, font }, room) {
-  if (room >= width) return { name, width };
+/** Return the name of an entry in its style, or in the compact one, which has no mark. */
+function labelOf({ name, width, around, style, family, hasMark }, compact = null) {
+  if (!compact) return { name, width, around, style, font: `${style.font}px ${family}`, hasMark };
+  const font = `${compact.font}px ${family}`;
   measuring.font = font;
-  for (let letters = name.length - 1; letters >= LEAST_LETTERS; letters -= 1) {
-    const short = `${name.slice(0, letters)}…`;
-    const taken = measuring.measureText(short).width + around;
-    if (taken <= room) return { name: short, width: taken };
+  const taken = measuring.measureText(name).width + 2 * compact.padding;
+  return { name, width: taken, around: 2 * compact.padding, style: compact, font, hasMark: false };
+}
+
+/** Return a label of at most this width; the whole one if less than these letters would be left. */
+function shortened(label, room, least) {
+  if (room >= label.width) return label;
+  measuring.font = label.font;
+  for (let letters = label.name.length - 1; letters >= least; letters -= 1) {
+    const short = `${label.name.slice(0, letters)}…`;
+    const taken = measuring.measureText(short).width + label.around;
+    if (taken <= room) return { ...label, name: short, width: taken };
   }
-  return { name, width };
+  return label;
 }
 
 /** A name is in the middle of its box, within the picture; that of an outer frame is above it. */
-function placeOf({ item, box, center, style, width, short, isOuter }, unit, right) {
-  const size = { width: (short?.width ?? width) * unit, height: style.height * unit };
+function placeOf({ item, box, center, label, isOuter }, unit, right) {
+  const size = { width: label.width * unit, height: label.style.height * unit };
   if (item) {
     const x = Math.max(Math.min(center.x - size.width / 2, right - size.width), 0);
     return { x, y: center.y - size.height / 2, ...size };
@@ -175,15 +196,17 @@ function placeOf({ item, box, center, style, width, short, isOuter }, unit, righ
 }
 
 function drawItem(entry, place, unit) {
-  const { item, shapes, text, box, center, style, name, short } = entry;
-  setText(text, short?.name ?? name);
+  const { item, shapes, text, box, center, label } = entry;
+  const { style, hasMark } = label;
+  setText(text, label.name);
   item.element.classList.toggle("nameless", !place);
+  item.element.classList.toggle("markless", !hasMark);
   const width = place ? Math.max(place.width / box.width, 1) : 1;
   const height = place ? Math.max(place.height / box.height, 1) : 1;
   const shift = place ? place.x + place.width / 2 - center.x : 0;
   for (const shape of shapes) shape.style.transform = `translate(${shift}px) scale(${width}, ${height})`;
   if (!place) return;
-  const mark = markOf(entry);
+  const mark = hasMark ? markOf(entry) : null;
   const left = mark ? (MARK + 2) * unit : 0;
   text.style.fontSize = `${style.font * unit}px`;
   text.style.transform = `translate(${shift + left / 2}px, ${center.y - Number(text.getAttribute("y"))}px)`;
@@ -202,7 +225,7 @@ function drawTitle({ element, text, style }, place, unit) {
 function showNear(named) {
   for (const entry of named) {
     const { item, element, shapes = [], text } = entry;
-    (element ?? item.element).classList.remove("nameless", "covered");
+    (element ?? item.element).classList.remove("nameless", "markless", "covered");
     if (item) setText(text, entry.name);
     for (const part of [...shapes, text, markOf(entry)]) {
       part?.style.removeProperty("transform");
