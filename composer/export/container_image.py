@@ -22,8 +22,9 @@ _TEXT = """\
 # The ROS wheels from PyPI are for x86_64.
 FROM python:{python}-slim
 
-# Another version, a wheel or an archive: --build-arg COMPOSER="ros2-composer[ros] @ https://..."
-ARG COMPOSER="{composer}"
+# Another version or an archive: --build-arg COMPOSER="ros2-composer[ros] @ https://..."
+ARG COMPOSER="{temporary}/{wheel}[ros]"
+COPY {copied}
 RUN pip install --no-cache-dir "$COMPOSER"
 
 WORKDIR {project}
@@ -65,8 +66,8 @@ log
 class Contents:
     """What is in the image of a system.
 
-    ``file`` is the file of the system below the root of its project. ``composer`` is the
-    requirement of the composer for pip, ``python`` the version of Python (3.12).
+    ``file`` is the file of the system below the root of its project. ``python`` is the version of
+    Python (3.12).
     ``has_requirements`` is whether the project has a requirements.txt. ``interfaces`` are interface
     packages to be compiled, ``unknown_interfaces`` those of which there are no definitions here.
     ``private`` are files below the root that stay here.
@@ -74,7 +75,6 @@ class Contents:
 
     system: str
     file: PurePosixPath
-    composer: str
     python: str = "3.12"
     has_requirements: bool = False
     interfaces: tuple[str, ...] = ()
@@ -87,12 +87,17 @@ class Contents:
         return ["compose", "run", str(self.file)]
 
 
-def containerfile(contents: Contents) -> str:
-    """Return the Containerfile, which docker and podman build."""
+def containerfile(contents: Contents, wheel: PurePosixPath) -> str:
+    """Return the Containerfile, which docker and podman build.
+
+    ``wheel`` is the wheel of the composer below the root of the project.
+    """
     return _TEXT.format(
         system=contents.system,
         python=contents.python,
-        composer=contents.composer,
+        wheel=wheel.name,
+        copied=json.dumps([str(wheel), f"{WRITABLE}/"]),
+        temporary=WRITABLE,
         project=PROJECT,
         requirements=_REQUIREMENTS if contents.has_requirements else "",
         interfaces=_INTERFACES.format(packages=shlex.join(contents.interfaces))

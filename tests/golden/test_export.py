@@ -27,7 +27,6 @@ def exported() -> dict[str, str]:
     contents = Contents(
         "my_robot",
         PurePosixPath("systems/my robot.yaml"),
-        "ros2-composer[ros]==0.1.0",
         has_requirements=True,
         interfaces=("tf2_msgs", "my_msgs"),
     )
@@ -43,7 +42,9 @@ def exported() -> dict[str, str]:
     texts = {
         "compose.yaml": compose_file(system, contents, image, build, ENVIRONMENT),
         "kubernetes.yaml": manifests(system, contents, image, ENVIRONMENT),
-        "Containerfile": containerfile(contents),
+        "Containerfile": containerfile(
+            contents, PurePosixPath("deploy/ros2_composer-0.1.0-py3-none-any.whl")
+        ),
     }
     texts |= {str(name): text for name, text in services.items()}
     return {name: text.replace(str(EXPECTED), "/project") for name, text in texts.items()}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.export.wheel import wheel as composer_wheel
 from tests.packaging.installation import Installation, with_this_ros, without_ros
 
 
@@ -35,6 +36,18 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
         name for name in names if name.endswith("vendor/uplot/LICENSE") and "/licenses/" in name
     ]
     assert [name for name in names if "__pycache__" in name or name.startswith("tests/")] == []
+
+
+def test_the_wheel_of_images_is_the_same(wheel: Path, tmp_path: Path) -> None:
+    """That of ``compose export docker-compose``, made of the files of an installation."""
+    name, data = composer_wheel()
+    (tmp_path / name).write_bytes(data)
+    built, packed = zipfile.ZipFile(wheel), zipfile.ZipFile(tmp_path / name)
+    assert name == wheel.name
+    assert sorted(packed.namelist()) == sorted(built.namelist())
+    for path in built.namelist():
+        if path.startswith("composer/"):
+            assert packed.read(path) == built.read(path), path
 
 
 def test_the_command_prints_its_version(installation: Installation) -> None:

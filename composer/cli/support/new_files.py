@@ -17,19 +17,20 @@ def write_new_files(root: Path, files: Mapping[str, str]) -> None:
     _write(_encoded(root, files), replace=False)
 
 
-def write_exports(root: Path, files: Mapping[str, str], *, replace: bool) -> list[Path]:
-    """Write files below ``root``, all or none; return those that were not there with this text.
+def write_exports(root: Path, files: Mapping[str, str | bytes], *, replace: bool) -> list[Path]:
+    """Write files below ``root``, all or none; return those that were not there like that.
 
     With ``replace``, files that exist are replaced. Raises CommandError.
     """
-    changed = {path: text for path, text in files.items() if not _has_text(root / path, text)}
+    encoded = _encoded(root, files)
+    changed = {path: data for path, data in encoded.items() if not _has_content(path, data)}
     try:
-        _write(_encoded(root, changed), replace=replace)
+        _write(changed, replace=replace)
     except CommandError as error:
         if error.hint is None:
             raise
         raise CommandError(error.message, hint="--force replaces it") from error
-    return [root / path for path in changed]
+    return list(changed)
 
 
 def write_new_file(path: Path, text: str) -> None:
@@ -49,14 +50,17 @@ def write_file(path: Path, data: bytes) -> None:
         raise CommandError(f"cannot write '{path}': {error.strerror}") from error
 
 
-def _encoded(root: Path, files: Mapping[str, str]) -> dict[Path, bytes]:
-    return {root / path: text.encode() for path, text in files.items()}
+def _encoded(root: Path, files: Mapping[str, str | bytes]) -> dict[Path, bytes]:
+    return {
+        root / path: content.encode() if isinstance(content, str) else content
+        for path, content in files.items()
+    }
 
 
-def _has_text(path: Path, text: str) -> bool:
+def _has_content(path: Path, data: bytes) -> bool:
     try:
-        return path.is_file() and path.read_text(encoding="utf-8") == text
-    except (OSError, ValueError):
+        return path.is_file() and path.read_bytes() == data
+    except OSError:
         return False
 
 

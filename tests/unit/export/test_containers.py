@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -229,6 +230,7 @@ def test_a_failure_ends_a_system_that_shuts_down_on_failure(project: Path) -> No
 def test_the_image_has_what_the_project_needs(project: Path) -> None:
     export("docker-compose", "-o", "deploy")
     text = (project / "deploy" / "Containerfile").read_text()
+    assert 'COPY ["deploy/ros2_composer-' in text
     assert "requirements.txt" not in text
     assert "interfaces build" not in text
     assert "RUN compose validate systems/robot.yaml\n" in text
@@ -266,9 +268,10 @@ def test_the_image_has_the_interfaces_that_ros_on_pypi_lacks(project: Path) -> N
 
 
 def test_the_file_of_the_image_names_the_interfaces_that_it_lacks() -> None:
-    contents = Contents("robot", PurePosixPath("robot.yaml"), "composer")
-    assert "Not in the image" not in containerfile(contents)
-    text = containerfile(replace(contents, unknown_interfaces=("acme_msgs", "lab_msgs")))
+    contents = Contents("robot", PurePosixPath("robot.yaml"))
+    place = PurePosixPath("deploy/composer.whl")
+    assert "Not in the image" not in containerfile(contents, place)
+    text = containerfile(replace(contents, unknown_interfaces=("acme_msgs", "lab_msgs")), place)
     assert "# Not in the image, unless requirements.txt adds them: acme_msgs, lab_msgs\n" in text
 
 
@@ -290,6 +293,7 @@ def test_two_formats_share_the_image(project: Path) -> None:
         "Containerfile.dockerignore",
         "compose.yaml",
         "kubernetes.yaml",
+        f"ros2_composer-{version('ros2-composer')}-py3-none-any.whl",
     ]
 
 

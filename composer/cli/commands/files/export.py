@@ -181,7 +181,7 @@ def export_docker_compose(
         build["context"] = os.path.relpath(root, folder)
         build["dockerfile"] = os.path.relpath(folder / "Containerfile", root)
     text = compose_file(declared, contents, name, build, os.environ)
-    _write_image_and(output, "compose.yaml", text, contents, replace=force)
+    _write_image_and(output, {"compose.yaml": text}, contents, result, replace=force)
 
 
 @app.command(
@@ -206,7 +206,7 @@ def export_kubernetes(
     declared, path, result = runnable_system(system)
     contents, name = _image(declared, result, path, image)
     text = manifests(declared, contents, name, os.environ)
-    _write_image_and(output, "kubernetes.yaml", text, contents, replace=force)
+    _write_image_and(output, {"kubernetes.yaml": text}, contents, result, replace=force)
 
 
 @app.command(
@@ -295,7 +295,6 @@ def _image(
     from composer.interfaces.building import NOT_IN_WHEELS, used_packages
     from composer.interfaces.sources import Bundle, find_packages
     from composer.model.hosts import private_files
-    from composer.report.tool import NAME, tool_version
 
     root = result.project.root
     used = sorted(used_packages(system))
@@ -305,7 +304,6 @@ def _image(
     contents = Contents(
         system=system.name.value,
         file=PurePosixPath(path.resolve().relative_to(root).as_posix()),
-        composer=f"{NAME}[ros]=={tool_version()}",
         has_requirements=(root / "requirements.txt").is_file(),
         interfaces=tuple(built),
         unknown_interfaces=tuple(
@@ -325,31 +323,50 @@ def _write(text: str, output: Path | None, *, replace: bool) -> None:
 
 
 def _write_image_and(
-    folder: Path | None, name: str, text: str, contents: Contents, *, replace: bool
+    folder: Path | None,
+    files: dict[str, str | bytes],
+    contents: Contents,
+    result: LoadResult,
+    *,
+    replace: bool,
 ) -> None:
     """Write a file and what builds its image to a folder, or only the text of the file to stdout.
 
     Two formats may share the image. Raises CommandError.
     """
+    from importlib.metadata import PackageNotFoundError
+    from pathlib import PurePosixPath
+
     from composer.export.container_image import (
         CONTAINERFILE,
         IGNORED_FILES,
         containerfile,
         ignored_files,
     )
+    from composer.export.wheel import wheel
 
     if folder is None:
-        write_raw(text)
+        write_raw("".join(map(str, files.values())))
         return
-    files = {
-        name: text,
-        str(CONTAINERFILE): containerfile(contents),
+    if not folder.resolve().is_relative_to(result.project.root):
+        raise CommandError(
+            f"'{folder}' is not in the project '{result.project.root}'",
+            hint="images are built from the files of the project",
+        )
+    try:
+        name, data = wheel()
+    except (OSError, PackageNotFoundError) as error:
+        raise CommandError(f"cannot make a wheel of the composer: {error}") from error
+    place = PurePosixPath(folder.resolve().relative_to(result.project.root).as_posix(), name)
+    files |= {
+        str(CONTAINERFILE): containerfile(contents, place),
         str(IGNORED_FILES): ignored_files(contents),
+        name: data,
     }
     _write_all(folder, files, replace=replace)
 
 
-def _write_all(folder: Path, files: Mapping[str, str], *, replace: bool) -> None:
+def _write_all(folder: Path, files: Mapping[str, str | bytes], *, replace: bool) -> None:
     from composer.cli.support.new_files import write_exports
 
     written = write_exports(folder, files, replace=replace)
