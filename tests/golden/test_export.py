@@ -30,6 +30,7 @@ def exported() -> dict[str, str]:
         has_requirements=True,
         interfaces=("tf2_msgs", "my_msgs"),
     )
+    wheel = PurePosixPath("deploy/ros2_composer-0.1.0-py3-none-any.whl")
     image = "registry.local:5000/robot:1.2"
     build = {"context": "..", "dockerfile": "deploy/Containerfile"}
 
@@ -42,9 +43,7 @@ def exported() -> dict[str, str]:
     texts = {
         "compose.yaml": compose_file(system, contents, image, build, ENVIRONMENT),
         "kubernetes.yaml": manifests(system, contents, image, ENVIRONMENT),
-        "Containerfile": containerfile(
-            contents, PurePosixPath("deploy/ros2_composer-0.1.0-py3-none-any.whl")
-        ),
+        "Containerfile": containerfile(contents, wheel),
     }
     texts |= {str(name): text for name, text in services.items()}
     return {name: text.replace(str(EXPECTED), "/project") for name, text in texts.items()}
