@@ -77,7 +77,7 @@ def test_delay_statistics() -> None:
     [
         ([], None),
         ([5.0], None),
-        ([5.0, 5.0004], None),  # a burst, of which nobody knows when it comes again
+        ([5.0, 5.0004], None),  # a burst, without the next one
         ([5.0, 5.0004, 6.0], 2.0),
         ([5.0, 5.0004, 6.0, 6.0004], 2.0),
         ([5.0, 5.0004, 10.0, 10.0004, 15.0], 0.4),
