@@ -8,11 +8,12 @@ from composer.analysis.class_ports import CreatedPort, all_created_ports, create
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, nearest
-from composer.model import USE_SIM_TIME, ChannelKind, ParameterType, Port, PortKind
+from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
 from composer.python_code.nodes.class_interfaces import declared_parameters, passes_node_on
 from composer.python_code.nodes.classes import ClassOfNode
 from composer.qos import incompatibilities
 from composer.rules.python.definitions import as_warning, error, info, rclpy_class, warning
+from composer.spelling import is_typo
 
 
 def _publishing(name: str, type_: str, qos: str) -> str:
@@ -94,7 +95,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         if item.node.ports:
             yield from _missing_ports(item)
             yield from _different_ports(item, context)
-        if item.node.parameters:
+        if item.node.parameters or item.node.undeclared_parameters:
             yield from _parameters(item)
 
 
@@ -175,18 +176,35 @@ def _parameters(item: ClassOfNode) -> Iterator[Diagnostic]:
     """Report the parameters that the class does not declare, or with another type."""
     class_name = item.hosted.reference.class_name
     declared = declared_parameters(item.source)
-    names = [*declared.types, *_OF_EVERY_NODE]
-    for parameter in item.node.parameters:
+    for parameter in (*item.node.parameters, *item.node.undeclared_parameters):
         name, given = parameter.name.value, parameter.type.value
-        if declared.is_complete and name not in names and not name.startswith("qos_overrides."):
-            close = nearest(name, names)
-            if close is not None or not passes_node_on(item.source):
-                message = f"class '{class_name}' declares no parameter '{name}'"
-                hint = f"did you mean '{close}'?" if close is not None else None
-                yield Diagnostic(CLASS_PARAMETER, message, parameter.name.span, hint=hint)
+        if declared.is_complete and not name.startswith("qos_overrides."):
+            yield from _undeclared(item, parameter, (*declared.types, *_OF_EVERY_NODE))
         type_ = declared.types.get(name)
         if type_ is not None and given in _TYPES and type_.value != given:
             message = f"class '{class_name}' declares parameter '{name}' as {type_}, not {given}"
             label = Label(type_.span, "declared here")
             rule = as_warning(CLASS_PARAMETER_TYPE, unless=item.is_certain(type_.span))
             yield Diagnostic(rule, message, parameter.type.span, (label,))
+
+
+def _undeclared(
+    item: ClassOfNode, parameter: Parameter, names: tuple[str, ...]
+) -> Iterator[Diagnostic]:
+    """Report a parameter that is not among the ``names`` that the class declares.
+
+    One of a parameter file may be for other nodes: it is only reported if it is misspelled.
+    """
+    name = parameter.name.value
+    if name in names:
+        return
+    if item.node.parameter(name) is None:
+        close = next((other for other in names if is_typo(name, other)), None)
+        is_reported = close is not None
+    else:
+        close = nearest(name, names)
+        is_reported = close is not None or not passes_node_on(item.source)
+    if is_reported:
+        message = f"class '{item.hosted.reference.class_name}' declares no parameter '{name}'"
+        hint = f"did you mean '{close}'?" if close is not None else None
+        yield Diagnostic(CLASS_PARAMETER, message, parameter.name.span, hint=hint)

@@ -120,3 +120,31 @@ def test_parameter_files(
 )
 def test_names_and_qos(node: str, expected: list[tuple[str, str]], tmp_path: Path) -> None:
     assert reported(node, tmp_path) == expected
+
+
+CLASS = """\
+from rclpy.node import Node
+
+
+class Arm(Node):
+    def __init__(self):
+        super().__init__("arm")
+        self.declare_parameter("rate_hz", 5.0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ("{rate_hz: 2.5, of_another_node: 1}", []),
+        ("{rate_hz: 2}", [("error", "class-parameter-type")]),
+        ("{rat_hz: 2.5}", [("warning", "class-parameter")]),
+    ],
+)
+def test_parameter_files_of_classes(
+    values: str, expected: list[tuple[str, str]], tmp_path: Path
+) -> None:
+    (tmp_path / "arm.py").write_text(CLASS, encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text(f"/**: {{ros__parameters: {values}}}", encoding="utf-8")
+    above = "parameter_files: [robot.yaml]\n"
+    assert reported("class: 'arm:Arm'", tmp_path, above) == expected
