@@ -20,6 +20,7 @@ MAXIMUM_TOPIC_NAME_LENGTH = 247
 #: The logger of what the program itself says. Those of nodes have the names of the nodes.
 PROGRAM_LOGGER = "compose"
 
+_RULE_PREFIX = re.compile(r"(\w+:(?!//))?((rostopic|rosservice)://)?")
 _FOREIGN_CHARACTER = re.compile(r"[^A-Za-z0-9_]")
 
 
@@ -84,6 +85,14 @@ def expand_name(name: str, node_name: str, namespace: str) -> str:
     if name == "~" or name.startswith("~/"):
         return join(join(namespace, node_name), name[2:])
     return join(namespace, name)
+
+
+def remapped_name(source: str) -> str:
+    """Return the name that a remapping rule of rcl replaces.
+
+    It may follow a node of the program and a kind of channel: ``lidar:scan``, ``rostopic://scan``.
+    """
+    return _RULE_PREFIX.sub("", source, count=1)
 
 
 def join(namespace: str, relative: str) -> str:

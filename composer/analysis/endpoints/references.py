@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.model import Endpoint, Node, Port, Remapping, System
-from composer.names import expand_name
+from composer.names import expand_name, remapped_name
 from composer.qos import PRESETS
 from composer.source import Located
 
@@ -27,7 +27,7 @@ def own_name(node: Node, name: str) -> str:
 
 def matched_ports(node: Node, remapping: Remapping) -> Iterator[Port]:
     """Yield the ports whose declared name the remapping replaces."""
-    source = own_name(node, remapping.source.value)
+    source = own_name(node, remapped_name(remapping.source.value))
     for port in node.all_ports:
         if own_name(node, port.ros_name.value) == source:
             yield port

@@ -23,7 +23,7 @@ from composer.model import (
     Transforms,
     UnknownKey,
 )
-from composer.names import expand_name
+from composer.names import expand_name, remapped_name
 from composer.resolve.connections import PortConnection, PortConnections, connection_of
 from composer.resolve.declarations.declaration import (
     Declaration,
@@ -194,7 +194,8 @@ def place_ports(
 
     renamed: dict[str, str] = {}
     for remapping in remappings:
-        renamed.setdefault(expanded(remapping.source.value), expanded(remapping.target.value))
+        source = remapped_name(remapping.source.value)
+        renamed.setdefault(expanded(source), expanded(remapping.target.value))
     return tuple(
         _place_port(port, port_connections.get((names.key, port.name.value), ()), expanded, renamed)
         for port in ports

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Rule, Severity, register
-from composer.names import topic_name_problem
+from composer.names import remapped_name, topic_name_problem
 from composer.source import Located
 
 RULE = register(
@@ -48,20 +47,13 @@ def check(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(RULE, f"{kind} name '{name}' {problem}", name.span)
 
 
-#: What rcl allows before the name in a rule: one node of the program, and a kind of channel.
-_PREFIX = re.compile(r"(\w+:(?!//))?((rostopic|rosservice)://)?")
-
-
-def _without_prefix(source: str) -> str:
-    return _PREFIX.sub("", source, count=1)
-
-
 def _names(context: Context) -> Iterator[tuple[str, Located[str]]]:
     for node in context.system.nodes:
         for port in node.ports:
             yield port.kind.channel.value, port.ros_name
+        is_rule_of_rcl = not node.implementation.declares_everything
         for remapping in node.remappings:
-            yield "remapped", remapping.source.map(_without_prefix if node.executable else str)
+            yield "remapped", remapping.source.map(remapped_name if is_rule_of_rcl else str)
             yield "remapped", remapping.target
     for connection in context.system.connections:
         if not connection.name.value.startswith("~"):

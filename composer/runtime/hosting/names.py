@@ -17,7 +17,8 @@ def remapping_arguments(node: Node) -> list[str]:
     As with ``ros2 run --ros-args -r``, the first matching rule counts: connections come before
     remappings.
     """
-    rules = [*_connected(node), *_remapped(node)]
+    written = (f"{item.source}:={item.target}" for item in node.remappings)
+    rules = [*_connected(node), *written]
     words = [word for rule in dict.fromkeys(rules) for word in ("-r", rule)]
     return ["--ros-args", *words] if words else []
 
@@ -40,12 +41,6 @@ def _connected(node: Node) -> Iterator[str]:
         own = _expanded(node, port.ros_name.value)
         if scheme is not None and own != port.full_name:
             yield f"{scheme}://{own}:={port.full_name}"
-
-
-def _remapped(node: Node) -> Iterator[str]:
-    for remapping in node.remappings:
-        target = _expanded(node, remapping.target.value)
-        yield f"{_expanded(node, remapping.source.value)}:={target}"
 
 
 def _expanded(node: Node, name: str) -> str:

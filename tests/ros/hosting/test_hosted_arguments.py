@@ -55,7 +55,7 @@ namespace: /fleet/one
 nodes:
   robot_node:
     class: {CLASSES}:Configured
-    remappings: {{scan: /all/scan, start: begin, ~/private: open}}
+    remappings: {{robot_node:scan: /all/scan, "rosservice://start": begin, ~/private: open}}
     parameters:
       rate: {{type: double, default: 2.5}}
       count: {{type: integer, default: 3}}

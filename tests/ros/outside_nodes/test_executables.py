@@ -343,17 +343,19 @@ robot: {ros__parameters: {renamed: true}}
 """
 
 
-def test_a_program_keeps_the_names_of_its_listed_nodes(tmp_path: Path, peer: Peer) -> None:
+@pytest.mark.parametrize(("nodes", "name"), [("[base, drive/wheels]", "base"), ("[]", "robot")])
+def test_a_program_keeps_the_names_of_its_nodes(
+    nodes: str, name: str, tmp_path: Path, peer: Peer
+) -> None:
     (tmp_path / "robot.yaml").write_text(PARAMETERS, encoding="utf-8")
-    text = TWO_NODES.replace(".py]", ".py], nodes: [base, drive/wheels]")
-    with running(text, tmp_path) as system:
+    with running(TWO_NODES.replace(".py]", f".py], nodes: {nodes}"), tmp_path) as system:
         port = '"port": "/dev/ttyACM0", '
         system.wait_for_log(f'/base {{"opencr.id": 200, {port}"use_sim_time": true}}')
         wheels = '{"port": "other", "radius": 0.5, "use_sim_time": true}'
         system.wait_for_log(f"/drive/wheels {wheels}")
         names = {("base", "/"), ("wheels", "/drive")}
         wait_until(lambda: names <= set(peer.node.get_node_names_and_namespaces()), "both nodes")
-        assert system.states()[-1] == "/base active"
+        assert system.states()[-1] == f"/{name} active"
 
 
 def test_several_nodes_with_the_name_of_the_entry_are_reported(tmp_path: Path) -> None:

@@ -26,7 +26,10 @@ def reported(node: str, folder: Path, above: str = "") -> list[tuple[str, str]]:
     [
         (f"{PROGRAM}, remappings: {{/tf: tf, joint_states: /arm/joint_states}}", []),
         ("external: true, remappings: {joint_states: /arm/joint_states}", []),
-        ("class: 'zzz:Arm', remappings: {chatter: news}", [("info", "class-not-installed")]),
+        (
+            "class: 'zzz:Arm', remappings: {chatter: news, 'rosservice://arm/go': go}",
+            [("info", "class-not-installed")],
+        ),
         (f"{PROGRAM}, {WORDS}, remappings: {{chatter: news}}", []),
         (f"{PROGRAM}, remappings: {{'lidar:scan': a, 'rostopic://~/b': b}}", []),
         (f"{PROGRAM}, {WORDS}, remappings: {{wods: news}}", [("info", "unknown-remapping")]),
