@@ -109,6 +109,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         gets_undeclared=gets_undeclared,
         is_program=declared.implementation.executable is not None and external is None,
     )
+    is_complete = made.complete and not declared.implementation.conflicting
     remappings = _remappings(tree.get("remappings"))
     lifecycle = tree.get("lifecycle")
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
@@ -151,9 +152,9 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         else read_introspection(
             declared.introspection, context.introspection, tree.get("introspection")
         ),
-        unknown=(*made.unknown, *(parameters.unknown if made.complete else ())),
+        unknown=(*made.unknown, *(parameters.unknown if is_complete else ())),
         given=tuple(map(key, tree)),
-        complete=made.complete and not declared.implementation.conflicting,
+        complete=is_complete,
     )
 
 

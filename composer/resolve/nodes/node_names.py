@@ -5,7 +5,7 @@ from __future__ import annotations
 from composer.fast_dataclass import dataclass
 from composer.model import Executable
 from composer.names import join
-from composer.resolve.tree_values import is_opaque, text, text_or_opaque
+from composer.resolve.tree_values import is_opaque, text_or_opaque
 from composer.source import Located
 from composer.tree import Entry, Mapping, Tree
 
@@ -40,7 +40,8 @@ def node_names(
 ) -> NodeNames:
     """Return the names of the node of an entry in ``nodes``."""
     namespace = _namespace(tree.get("namespace"), system_namespace)
-    own_name = text(tree.get("name"))
+    written = tree.get("name")
+    own_name = None if written is None else text_or_opaque(written, written.span)
     listed = None if program is None else program.nodes
     are_kept = listed is not None and own_name is None
     if listed and own_name is None:

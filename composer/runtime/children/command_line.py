@@ -99,13 +99,13 @@ def parameter_file(node: Node) -> str:
 
 def _section(section: ParameterSection) -> str:
     values = [
-        f"    {json.dumps(parameter.name.value)}: {_yaml(parameter.value.value, kind)}\n"
+        f"    {_text(parameter.name.value)}: {_yaml(parameter.value.value, kind)}\n"
         for parameter in section.parameters
         if parameter.value is not None
         and parameter.value.value != []  # rcl cannot read a list without a type
         for kind in (parameter.type.value,)
     ]
-    head = f"{json.dumps(section.name)}:\n  ros__parameters:\n"
+    head = f"{_text(section.name)}:\n  ros__parameters:\n"
     return head + "".join(values) if values else ""
 
 
@@ -145,6 +145,11 @@ def _yaml(value: Plain, kind: str) -> str:
         return _double(float(value))
     if isinstance(value, int):
         return str(value)
+    return _text(value)
+
+
+def _text(value: Plain) -> str:
+    # YAML does not know the pairs of escapes with which JSON writes emojis.
     return json.dumps(value, ensure_ascii=False)
 
 

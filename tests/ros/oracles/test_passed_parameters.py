@@ -31,6 +31,7 @@ FIRST = """\
     numbers: [0x10, -3, 9223372036854775807]
     doubles: [1.0, .nan, -.inf, 1e-300]
     null: null
+    "\U0001f916": "\U0001f916"
     "odd name/-": !!str 5
     start_type_description_service: false
 /**: {ros__parameters: {a: 2, use_sim_time: true, everywhere: here}}

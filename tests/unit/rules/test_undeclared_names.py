@@ -89,6 +89,7 @@ def test_remappings(node: str, expected: list[tuple[str, str]], tmp_path: Path) 
             "/a/b/arm: {ros__parameters: {a: 1}}",
             [("error", "wrong-type")],
         ),
+        (f"{WHEEL}, name: [hand]", "hand: {ros__parameters: {a: 1}}", [("error", "wrong-type")]),
         (
             f"{WHEEL}, namespace: [a, b]",
             "/a/b/arm: {ros__parameters: {a: 1}}",
@@ -115,6 +116,10 @@ def test_parameter_files(
         (
             "executable: {command: [python3, -V], nodes: [base, front-left/wheel]}",
             [("error", "invalid-node-name")],
+        ),
+        (
+            f"{PROGRAM}, behavior: 'arm:Arm', timers: {{t: {{rate_hz: 1}}}}, remappings: {{a: b}}",
+            [("error", "several-implementations")],
         ),
         # PX4's QoS: described for a program, chosen for a node of the system.
         (f"{PROGRAM}, {WORDS.replace('command', PX4)}", []),
