@@ -11,6 +11,7 @@ from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import ReliabilityPolicy
 
 from tests.ros.support.external_processes import soon_missed
 from tests.ros.support.in_process import Peer, running, wait_until
@@ -117,7 +118,7 @@ def test_a_class_gets_what_it_does_not_declare_in_yaml(tmp_path: Path, peer: Pee
     """From parameter files, also by wildcards and with slashes in names."""
     (tmp_path / "robot.yaml").write_text(
         "/fleet/**: {ros__parameters: {gains: {p: 2}, start_type_description_service: true,"
-        " qos_overrides: {/all/scan: {publisher: {depth: 3}}}}}\n",
+        " qos_overrides: {/fleet/one/other: {publisher: {reliability: best_effort}}}}}\n",
         encoding="utf-8",
     )
     text = f"""
@@ -129,5 +130,7 @@ nodes:
 """
     with running(text, tmp_path):
         values = described(peer)["parameters"]
+        (other,) = peer.node.get_publishers_info_by_topic("/fleet/one/other")
     assert values["gains.p"] == 2
-    assert values["qos_overrides./all/scan.publisher.depth"] == 3
+    assert values["qos_overrides./fleet/one/other.publisher.reliability"] == "best_effort"
+    assert other.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT

@@ -22,6 +22,7 @@ from rclpy.lifecycle import LifecycleNode, State, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Int64, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -289,7 +290,8 @@ class Configured(Node):
         super().__init__("configured", automatically_declare_parameters_from_overrides=True)
         self.create_publisher(String, "scan", 10)
         self.create_publisher(String, "~/private", 10)
-        self.create_publisher(String, "other", 10)
+        options = QoSOverridingOptions.with_default_policies()
+        self.create_publisher(String, "other", 10, qos_overriding_options=options)
         self.create_service(Trigger, "start", lambda _, response: response)
         self.add_on_set_parameters_callback(self.on_set)
 
