@@ -25,6 +25,8 @@ from rclpy.waitable import Waitable
 
 from composer.model import PortKind
 from composer.runtime.executors.entities.sources import rclpy_callback
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.loop import Taken
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.actions import HostedActionClient, HostedActionServer
@@ -218,6 +220,35 @@ class AdoptedNode(Node):
         self._composer_instance.entities.pop(waitable)
         self._composer_instance.context.loop.remove(waitable)
         super().remove_waitable(waitable)
+
+    def wait_for_message(
+        self, msg_type: Any, topic: str, qos_profile: Any, timeout_s: float
+    ) -> tuple[bool, Any]:
+        """Wait for the next message of a topic, as rclpy's function, in any state of the node."""
+        load_type_support(msg_type)
+        instance = self._composer_instance
+        loop = instance.context.loop
+        received: Future[Any] = Future()
+
+        def receive(taken: Taken) -> None:
+            received.set_result(taken[0])
+
+        # Not a port: the gate would close it, and the class uses it only here.
+        subscription = super().create_subscription(
+            msg_type,
+            topic,
+            receive,
+            qos_profile,
+            event_callbacks=PendingQosEvents(None),  # type: ignore[arg-type]
+        )
+        instance.ports.awaited.add(subscription.topic_name)
+        loop.add_subscription(subscription, receive)
+        try:
+            is_received = instance.wait_for(received, timeout_s)
+        finally:
+            loop.remove(subscription)
+            super().destroy_subscription(subscription)
+        return is_received, received.result() if is_received else None
 
     def adopt_action(self, action: Any, full_name: str) -> None:
         """Give an action server or client its port."""

@@ -29,13 +29,15 @@ class DeclaredPorts:
     """The declared ports of a node, and which of them its class has created.
 
     ``on_undeclared`` is called with the first port on each name that the class creates without a
-    declaration. ``differences`` are the ports whose QoS is not the declared one.
+    declaration. ``differences`` are the ports whose QoS is not the declared one. ``awaited`` are
+    the topics of which the class has waited for one message.
     """
 
     node: Node
     on_undeclared: Callable[[Port], None]
     created: set[str] = field(default_factory=set)  # names in use
     differences: list[str] = field(default_factory=list)
+    awaited: set[str] = field(default_factory=set)
     _reported: set[tuple[PortKind, str]] = field(default_factory=set)
 
     def port(self, kind: PortKind, full_name: str, interface: Any, qos: Any = None) -> Port:
@@ -57,7 +59,9 @@ class DeclaredPorts:
 
     def missing(self) -> Iterator[Port]:
         """Yield the declared ports that the class has not created."""
-        yield from (port for port in self.node.ports if port.name.value not in self.created)
+        for port in self.node.ports:
+            if port.name.value not in self.created and port.full_name not in self.awaited:
+                yield port
 
     def forget(self, port: Port) -> None:
         """Know that the class has destroyed an endpoint, and may create it again."""

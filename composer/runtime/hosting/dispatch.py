@@ -6,6 +6,7 @@ Installed once per process, before the first class is imported. Other nodes are 
 from __future__ import annotations
 
 import contextlib
+import signal
 import sys
 import threading
 from functools import cache, wraps
@@ -13,12 +14,12 @@ from typing import Any
 
 import rclpy
 from rclpy import utilities
+from rclpy import wait_for_message as waiting
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
-from rclpy.executors import Executor
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.node import Node
-from rclpy.task import Future
 
 from composer.model import PortKind
 from composer.runtime.executors.stacks import is_internal
@@ -46,8 +47,10 @@ def install() -> None:
     _install_actions()
     _install_spinning()
     _install_executors()
+    _install_waiting()
     _install_threads()
     _install_context()
+    _install_signals()
 
 
 def _install_nodes() -> None:
@@ -112,7 +115,7 @@ def _install_spinning() -> None:
 
     def spin_node_once(node: Any, *, executor: Any = None, timeout_sec: Any = None) -> None:
         if isinstance(node, AdoptedNode):
-            node._composer_instance.wait_for(Future(), 0.01 if timeout_sec is None else timeout_sec)
+            node._composer_instance.spin_once(timeout_sec)
         else:
             spin_once(node, executor=executor, timeout_sec=timeout_sec)
 
@@ -120,7 +123,7 @@ def _install_spinning() -> None:
         node: Any, future: Any, executor: Any = None, timeout_sec: Any = None
     ) -> None:
         if isinstance(node, AdoptedNode):
-            node._composer_instance.wait_for(future, timeout_sec)
+            node._composer_instance.spin(future, timeout_sec)
         else:
             spin_until_complete(node, future, executor, timeout_sec)
 
@@ -141,12 +144,42 @@ def _install_executors() -> None:
     def executor_spins_until(self: Any, future: Any, timeout_sec: Any = None) -> None:
         instance = current_instance()
         if instance is not None and self in instance.executors:
-            instance.wait_for(future, timeout_sec)
+            instance.spin(future, timeout_sec)
         else:
             spin_until_complete(self, future, timeout_sec)
 
     Executor.add_node = add_node_to_executor  # type: ignore[method-assign]
     Executor.spin_until_future_complete = executor_spins_until  # type: ignore[method-assign]
+    for kind in (SingleThreadedExecutor, MultiThreadedExecutor):
+        _install_spin_once(kind)
+
+
+def _install_spin_once(kind: Any) -> None:
+    spin_once = kind.spin_once
+
+    @wraps(spin_once)
+    def executor_spins_once(self: Any, timeout_sec: Any = None) -> None:
+        instance = current_instance()
+        if instance is not None and self in instance.executors:
+            instance.spin_once(timeout_sec)
+        else:
+            spin_once(self, timeout_sec)
+
+    kind.spin_once = executor_spins_once
+
+
+def _install_waiting() -> None:
+    wait: Any = waiting.wait_for_message
+
+    @wraps(wait)
+    def wait_for_message(
+        msg_type: Any, node: Any, topic: str, *, qos_profile: Any = 1, time_to_wait: float = -1
+    ) -> Any:
+        if isinstance(node, AdoptedNode):
+            return node.wait_for_message(msg_type, topic, qos_profile, time_to_wait)
+        return wait(msg_type, node, topic, qos_profile=qos_profile, time_to_wait=time_to_wait)
+
+    waiting.wait_for_message = wait_for_message
 
 
 def _install_threads() -> None:
@@ -158,6 +191,21 @@ def _install_threads() -> None:
         start(self)
 
     threading.Thread.start = start_thread  # type: ignore[method-assign]
+
+
+def _install_signals() -> None:
+    set_handler: Any = signal.signal
+
+    @wraps(set_handler)
+    def set_handler_of_class(number: int, handler: Any) -> Any:
+        instance = current_instance()
+        if instance is None or number not in (signal.SIGINT, signal.SIGTERM):
+            return set_handler(number, handler)
+        before = instance.signal_handlers.get(number, signal.SIG_DFL)
+        instance.signal_handlers[number] = handler
+        return before
+
+    signal.signal = set_handler_of_class  # type: ignore[assignment]
 
 
 def _wait_until_ended(instance: Instance) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any, cast
@@ -129,6 +131,7 @@ class HostedNode(LocalNode):
             self._report_missing(instance.ports)
         if transition in ("cleanup", "shutdown"):
             interrupt_callbacks(instance)
+            await self._in_thread(instance, partial(_end_as_by_signal, instance), "signal handler")
             await self._in_thread(instance, instance.node.destroy_node, "destroy_node")
 
     async def _call_user_on_error(self, _cause: BaseException) -> None:
@@ -152,6 +155,7 @@ class HostedNode(LocalNode):
         kind = adopted(target)
         node: Any = kind.__new__(kind, **arguments)
         node._composer_instance = instance
+        instance.is_constructing = True
         try:
             node.__init__(**arguments)
         except SystemExit as error:
@@ -159,6 +163,8 @@ class HostedNode(LocalNode):
         except ModuleNotFoundError as error:
             missing = plain_name(error.name or "")
             raise HostingError(f"{error}; {how_to_get(missing)}") from error
+        finally:
+            instance.end_construction()
         if instance.node is None:
             raise HostingError("the constructor does not call super().__init__()")
 
@@ -230,6 +236,8 @@ class HostedNode(LocalNode):
 
     def _finish(self, reason: str) -> None:
         """Deactivate the node: in a process of its own, the class would have ended it."""
+        if self._instance is not None and self._instance.in_transition:
+            return
         self._context.log.warn(f"the node is deactivated: {reason}")
         self._request("deactivate")
 
@@ -264,6 +272,22 @@ class HostedNode(LocalNode):
                 self._context.error_log.error(
                     "cleanup", f"thread '{thread.name}' of the class still runs"
                 )
+
+
+def _end_as_by_signal(instance: Instance) -> None:
+    """Call the handler of the signal that would have ended the class in a process of its own."""
+    handlers = instance.signal_handlers
+    number = signal.SIGTERM if signal.SIGTERM in handlers else signal.SIGINT
+    handler = handlers.get(number)
+    if not callable(handler) or handler is signal.default_int_handler:
+        return
+    gate = instance.context.gate
+    gate.outgoing = True  # for a last message, such as one that stops motors
+    try:
+        with suppress(SystemExit, KeyboardInterrupt):
+            handler(number, None)
+    finally:
+        gate.outgoing = False
 
 
 _STATE_IDS = {"unconfigured": 1, "inactive": 2, "active": 3, "finalized": 4}

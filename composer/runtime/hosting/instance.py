@@ -18,12 +18,14 @@ from rclpy.service import Service
 
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Awaited
 from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.callback_groups import OwnGroup
 from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.logger import HostedLogger
+from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.node.local_node import ActionServing, RunningPort
 
 
@@ -96,6 +98,8 @@ def is_reentrant(context: NodeContext) -> bool:
     return type(context.group) is ReentrantCallbackGroup
 
 
+#: How long ``rclpy.spin_once`` without a time waits: responses of clients do not end it.
+_SPINS_WITHIN_S = 0.05
 #: The groups of rclpy. Classes derived from them are groups of a class's own.
 _GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 
@@ -127,6 +131,14 @@ class Instance:
         self.node: Any = None
         #: True while the constructor or a handler of a transition runs.
         self.in_transition = False
+        #: What the class calls when its process is interrupted or terminated, by signal.
+        self.signal_handlers: dict[int, Any] = {}
+        #: True while the constructor runs.
+        self.is_constructing = False
+        #: Done at the end of the next callback, if ``rclpy.spin_once`` waits for it.
+        self.spun: Future[None] | None = None
+        #: The gates as they were before the constructor has spun.
+        self._gates: list[tuple[LifecycleGate, bool, bool]] = []
         #: The parameters as they were declared.
         self.declared: dict[str, Parameter] = {}
         #: Set when the instance has been destroyed.
@@ -196,6 +208,39 @@ class Instance:
             return False
         port.destroy()
         return True
+
+    def spin(self, future: Awaited, timeout_s: float | None) -> None:
+        """Wait as :meth:`wait_for`, for a function of rclpy that spins.
+
+        From the first spin in the constructor to its end, callbacks run as if the node were active.
+        """
+        if self.is_constructing and not self._gates and self._is_in_transition():
+            for context in (self.context, self._always_on_context):
+                gate = context.gate
+                self._gates.append((gate, gate.incoming, gate.outgoing))
+                gate.incoming = gate.outgoing = True
+            for port in self.entities.ports:
+                port.activate()
+        self.wait_for(future, timeout_s)
+
+    def spin_once(self, timeout_s: float | None) -> None:
+        """Spin until a callback has ended."""
+        self.spun = Future()
+        self.spin(self.spun, _SPINS_WITHIN_S if timeout_s is None else timeout_s)
+        self.spun = None
+
+    def end_construction(self) -> None:
+        """Close the gates again if the constructor has spun."""
+        self.is_constructing = False
+        gates, self._gates = self._gates, []
+        for gate, incoming, outgoing in gates:
+            gate.incoming, gate.outgoing = incoming, outgoing
+        if gates:
+            for port in self.entities.ports:
+                port.deactivate()
+
+    def _is_in_transition(self) -> bool:
+        return threading.current_thread() is self.transition_thread
 
     def wait_for(self, future: Awaited, timeout_s: float | None) -> bool:
         """Block until ``future`` is done, in code of the class; return false after the time.

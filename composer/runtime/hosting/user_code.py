@@ -82,6 +82,8 @@ class UserFunction:
         finally:
             self._instance.end_blocking(began)
             _CURRENT.instance = before
+            if self._instance.spun is not None:
+                self._instance.spun.set_result(None)
         return in_steps(_Steps(self), result) if inspect.iscoroutine(result) else result
 
     def is_one(self, instance: Instance, function: UserFunction | None) -> bool:

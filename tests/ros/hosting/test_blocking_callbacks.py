@@ -73,3 +73,60 @@ def test_a_callback_that_blocks_is_logged_once_with_its_place(
         assert finished(call).success
         assert "callback_classes.py:" in line
         assert system.log_text().count("on_wait has not returned") == 1
+
+
+DECLARED = """
+        publishers: {stopped: {type: std_msgs/msg/Int64, qos: command, external: true}}
+        subscriptions: {numbers: {type: std_msgs/msg/Int64, qos: command}}
+"""
+
+
+@pytest.mark.parametrize("declared", ["", DECLARED])
+def test_a_constructor_waits_for_nodes_that_it_depends_on(
+    tmp_path: Path, peer: Peer, declared: str
+) -> None:
+    text = f"""
+    system: waiting
+    nodes:
+      listener: {{class: "tests.ros.support.node_classes:Listener"}}
+      source:
+        publishers: {{numbers: {{type: std_msgs/msg/Int64, qos: command, external: true}}}}
+        timers: {{tick: {{period_ms: 10, publish: {{numbers: {{data: "{{count}}"}}}}}}}}
+      waiter:
+        class: {CLASSES}:Waiter
+        lifecycle: {{depends_on: [source, listener]}}
+        {declared}
+    """
+    with running(text, tmp_path) as system:
+        waiter = system.node("waiter").instance
+        assert waiter.waited_for < waiter.numbers[0] < waiter.numbers[1]
+        assert waiter.response.success
+        wait_until(lambda: waiter.awaited >= 2)
+        stopped = peer.listen(Int64, "/stopped")
+        wait_until(waiter.publisher.get_subscription_count)
+        system.change("waiter", "deactivate", "cleanup")
+        wait_until(lambda: [message.data for message in stopped] == [15])
+        counted = system.summary("/waiter")
+    assert counted.errors == 0
+    assert "has not created" not in system.log_text()
+
+
+def test_a_class_is_told_of_matches_before_the_activation_and_in_the_process(
+    tmp_path: Path, peer: Peer
+) -> None:
+    text = f"""
+    system: matching
+    nodes:
+      matched:
+        class: {CLASSES}:Matched
+        publishers: {{out: {{type: std_msgs/msg/Int64, qos: command}}}}
+      reader: {{subscriptions: {{out: {{type: std_msgs/msg/Int64, qos: command}}}}}}
+    """
+    with running(text, tmp_path) as system:
+        matched = system.node("matched").instance
+        wait_until(lambda: matched.matches == [("publisher", 1)])
+        peer.publisher(Int64, "/in")
+        wait_until(lambda: matched.matches[1:] == [("subscription", 1)])
+        system.change("matched", "deactivate", "activate")
+        peer.node.create_subscription(Int64, "out", print, 10)
+        wait_until(lambda: matched.matches[2:] == [("publisher", 2)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 import time
 from typing import Any
@@ -14,7 +15,9 @@ from rclpy.callback_groups import (
     MutuallyExclusiveCallbackGroup,
     ReentrantCallbackGroup,
 )
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.wait_for_message import wait_for_message
 from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
@@ -185,3 +188,53 @@ class SleepingServer(Node):
 
     async def execute_async(self, goal: Any) -> Any:
         return self.execute(goal)
+
+
+class Waiter(Node):
+    """Waits in its constructor: for messages, in two ways, and for the response of a service."""
+
+    def __init__(self) -> None:
+        super().__init__("waiter")
+        self.numbers: list[int] = []
+        self.publisher = self.create_publisher(Int64, "stopped", 10)
+        signal.signal(signal.SIGTERM, self.on_signal)
+        _, message = wait_for_message(Int64, self, "numbers", time_to_wait=10.0)
+        self.waited_for = message.data
+        self.create_subscription(Int64, "numbers", self.on_number, 10)
+        while len(self.numbers) < 2:
+            rclpy.spin_once(self, timeout_sec=1.0)
+        client = self.create_client(Trigger, "count")
+        client.wait_for_service()
+        future = client.call_async(Trigger.Request())
+        rclpy.spin_until_future_complete(self, future)
+        self.response = future.result()
+        self.create_timer(0.01, self.on_timer)
+        self.awaited = 0
+
+    def on_number(self, message: Int64) -> None:
+        self.numbers.append(message.data)
+
+    def on_timer(self) -> None:
+        is_received, _ = wait_for_message(Int64, self, "numbers", time_to_wait=10.0)
+        self.awaited += is_received
+
+    def on_signal(self, number: int, _: Any) -> None:
+        self.publisher.publish(Int64(data=number))
+
+
+class Matched(Node):
+    """Is told of the matches of a publisher and a subscription, in its process and outside."""
+
+    def __init__(self) -> None:
+        super().__init__("matched")
+        self.matches: list[tuple[str, int]] = []
+        publisher = PublisherEventCallbacks(matched=self.on_publisher)
+        self.create_publisher(Int64, "out", 10, event_callbacks=publisher)
+        subscription = SubscriptionEventCallbacks(matched=self.on_subscription)
+        self.create_subscription(Int64, "in", print, 10, event_callbacks=subscription)
+
+    def on_publisher(self, status: Any) -> None:
+        self.matches.append(("publisher", status.current_count))
+
+    def on_subscription(self, status: Any) -> None:
+        self.matches.append(("subscription", status.current_count))

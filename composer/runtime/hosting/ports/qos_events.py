@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
 from typing import Any
@@ -23,6 +24,11 @@ from composer.runtime.ports.qos_events import QosEvents
 
 _PUBLISHER = QoSPublisherEventType
 _SUBSCRIPTION = QoSSubscriptionEventType
+#: Returns the number of matches of an endpoint, by the kind of event.
+_COUNTS: Mapping[IntEnum, Callable[[Any], int]] = {
+    _PUBLISHER.RCL_PUBLISHER_MATCHED: lambda endpoint: int(endpoint.get_subscription_count()),
+    _SUBSCRIPTION.RCL_SUBSCRIPTION_MATCHED: lambda endpoint: int(endpoint.get_publisher_count()),
+}
 #: The kinds of events by the attributes of rclpy's event callbacks.
 _KINDS: Mapping[PortKind, Mapping[str, IntEnum]] = {
     PortKind.PUBLISHER: {
@@ -64,10 +70,22 @@ class PendingQosEvents:
         return {event: callback for event, callback in found.items() if callback is not None}
 
 
+@dataclass(frozen=True, slots=True)
+class MatchedStatus:
+    """What a callback of matches gets, as of rclpy, whose own type cannot be constructed."""
+
+    total_count: int = 0
+    total_count_change: int = 0
+    current_count: int = 0
+    current_count_change: int = 0
+
+
 class HostedQosEvents(QosEvents):
     """Counts and logs the events of an endpoint, except those that have a callback of the class.
 
-    Those are passed to the callback. Each is called while the node is active.
+    Those are passed to the callback. Each is called while the node is active. At the activation,
+    the callback of matches is called if their number has changed: under rclpy, a class gets earlier
+    matches as soon as it is spun.
     """
 
     def __init__(
@@ -79,18 +97,35 @@ class HostedQosEvents(QosEvents):
         super().__init__(context, port)
         self._callbacks = dict(callbacks)
         self.uses_matches = _PUBLISHER.RCL_PUBLISHER_MATCHED in callbacks
+        self._endpoint: Any = None
+        self._matches = MatchedStatus()
+
+    def activate(self) -> None:
+        """Call back from now on."""
+        super().activate()
+        matched = next((kind for kind in self._callbacks if kind in _COUNTS), None)
+        if matched is None:
+            return
+        count = _COUNTS[matched](self._endpoint)
+        change = count - self._matches.current_count
+        if change:
+            added = max(change, 0)
+            self._call(
+                matched, MatchedStatus(self._matches.total_count + added, added, count, change)
+            )
 
     def create_event_handlers(
         self, callback_group: CallbackGroup, endpoint: Any, topic_name: str
     ) -> list[EventHandler]:
         """Watch the events; those with a callback first, as far as lost messages come last."""
+        self._endpoint = endpoint
         lost = _SUBSCRIPTION.RCL_SUBSCRIPTION_MESSAGE_LOST
-        for kind, callback in self._callbacks.items():
+        for kind in self._callbacks:
             if kind is not lost:
-                self._watch_for_class(endpoint, kind, callback)
+                self._watch_for_class(endpoint, kind)
         super().create_event_handlers(callback_group, endpoint, topic_name)
         if lost in self._callbacks:
-            self._watch_for_class(endpoint, lost, self._callbacks[lost])
+            self._watch_for_class(endpoint, lost)
         return []
 
     def _watch_incompatible(self, endpoint: Any, kind: IntEnum) -> None:
@@ -101,13 +136,14 @@ class HostedQosEvents(QosEvents):
         if event.kind not in self._callbacks:
             super()._watch(endpoint, event)
 
-    def _watch_for_class(
-        self, endpoint: Any, kind: IntEnum, callback: Callable[[Any], Any]
-    ) -> None:
-        call_soon = self._context.loop.call_soon
-
-        def on_status(status: Any) -> None:
-            call_soon(partial(call_in_group, self._context, callback, status))
-
+    def _watch_for_class(self, endpoint: Any, kind: IntEnum) -> None:
+        on_status = partial(self._call, kind)
         with suppress(UnsupportedEventTypeError):
             self._stop_watching.append(self._context.events.watch_status(endpoint, kind, on_status))
+
+    def _call(self, kind: IntEnum, status: Any) -> None:
+        """Call the callback of the class soon, if the node is active then."""
+        if kind in _COUNTS and self._context.gate.incoming:
+            self._matches = status
+        callback = self._callbacks[kind]
+        self._context.loop.call_soon(partial(call_in_group, self._context, callback, status))

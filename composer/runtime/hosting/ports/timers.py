@@ -81,7 +81,7 @@ class HostedTimerPort(TimerPort):
         context = instance.context_for(timer.callback_group, timer)
         self._function = UserFunction(instance, self._call_back)
         super().__init__(context, self._model(context), None, self._function)
-        self._name = getattr(timer.callback, "__name__", self._name)
+        self._name = self._function.__name__ = getattr(timer.callback, "__name__", self._name)
         if self._is_rate:
             self.follow()
 
