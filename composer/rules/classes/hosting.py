@@ -9,6 +9,7 @@ from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic
 from composer.model import ExecutorKind, Node, System
+from composer.model.dependencies import dependency_edges
 from composer.python_code.nodes.classes import ClassOfNode
 from composer.python_code.source import Call
 from composer.python_code.source.trees import SCOPES, is_none, span_of, walk
@@ -53,17 +54,22 @@ CLASS_CONTEXT = error(
 CLASS_BLOCKS = warning(
     code="RC467",
     name="class-blocks",
-    summary="A class blocks an executor that other nodes use, or reads from the terminal.",
+    summary="A class blocks a thread that others need, or waits in its constructor.",
     why=(
-        "While a callback sleeps or waits for a response, its thread runs no other callback. "
-        "By default each class has an executor of its own, where it delays nothing else. "
-        "Input from the terminal would keep its node waiting, and so the whole bring-up."
+        "While a callback sleeps or waits for a response, a single-threaded executor runs no "
+        "other callback. By default each class has an event loop of its own, which another thread "
+        "serves meanwhile. A constructor that waits for messages or a response needs the nodes "
+        "that send them to be active before: only those that it depends on are. Input from the "
+        "terminal would keep its node waiting, and so the whole bring-up."
     ),
     bad=rclpy_class(methods=_ASKING),
     good=rclpy_class(methods=_ASKING.replace("input", "str")),
 )
 
 _ALONE = "leave out 'executor': each class then has an event loop of its own"
+_DEPENDS = "declare what it waits for: 'lifecycle: {depends_on: [...]}'"
+#: Functions of rclpy that return when something has arrived.
+_WAITS = frozenset(("spin_once", "spin_until_future_complete", "wait_for_message"))
 _CREATORS = frozenset(
     {
         "rclpy.create_node",
@@ -85,6 +91,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
         yield from _constructor(item)
         yield from _second_nodes(item)
         yield from _blocking_calls(item, context.system)
+        yield from _waiting_constructor(item, context.system)
 
 
 def _constructor(item: ClassOfNode) -> Iterator[Diagnostic]:
@@ -129,8 +136,7 @@ def _second_nodes(item: ClassOfNode) -> Iterator[Diagnostic]:
 def _blocking_calls(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
     """Report input from the terminal, and waiting where the executor does not allow it."""
     name = item.source.reference.class_name
-    others = list(_on_same_executor(item.node, system))
-    is_single = _is_single_threaded(item.node, system)
+    others = list(_on_same_thread(item.node, system))
     for method in item.source.methods:
         what = f"'{method.name}' of '{name}'"
         for call in method.calls:
@@ -138,26 +144,39 @@ def _blocking_calls(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
                 message = f"{what} reads from the terminal"
                 hint = "run the program in a terminal of its own, outside the system"
                 yield item.diagnostic(CLASS_BLOCKS, message, call.span, hint)
-            elif others and call.name == "time.sleep" and method.name != "__init__":
-                message = f"{what} sleeps, and node '{others[0].name}' waits"
+            elif others[1:] and call.name == "time.sleep" and method.name != "__init__":
+                other = next(other for other in others if other is not item.node)
+                message = f"{what} sleeps, and node '{other.name}' waits"
                 yield item.diagnostic(CLASS_BLOCKS, message, call.span, _ALONE)
-            elif is_single and _waits_for_response(call):
+            elif others and _waits_for_response(call):
                 message = f"{what} waits for a response that its only thread would have to receive"
                 yield item.diagnostic(CLASS_BLOCKS, message, call.span, _ALONE)
 
 
-def _on_same_executor(node: Node, system: System) -> Iterator[Node]:
-    if node.executor is not None:
-        for other in system.nodes:
-            name = other.executor.value if other.executor is not None else None
-            if other is not node and name == node.executor.value:
-                yield other
+def _waiting_constructor(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
+    """Report a constructor that waits for nodes of the system that need not be active yet."""
+    constructor = item.constructor
+    key = item.node.name.value
+    if constructor is None or len(system.nodes) == 1:
+        return
+    if any(edge.node == key for edge in dependency_edges(system)):
+        return
+    for call in constructor.calls:
+        if not call.deferred and call.name.rpartition(".")[2] in _WAITS:
+            name = item.source.reference.class_name
+            message = f"the constructor of '{name}' waits, maybe for a node that is not active yet"
+            yield item.diagnostic(CLASS_BLOCKS, message, call.span, _DEPENDS)
+            return
 
 
-def _is_single_threaded(node: Node, system: System) -> bool:
+def _on_same_thread(node: Node, system: System) -> Iterator[Node]:
+    """Yield the nodes of a single-threaded executor, this one included."""
     kinds = {item.name.value: item.kind for item in system.executors}
-    kind = kinds.get(node.executor.value) if node.executor is not None else None
-    return kind is ExecutorKind.SINGLE_THREADED
+    name = node.executor.value if node.executor is not None else None
+    if kinds.get(name or "") is ExecutorKind.SINGLE_THREADED:
+        yield from (
+            other for other in system.nodes if other.executor and other.executor.value == name
+        )
 
 
 def _waits_for_response(call: Call) -> bool:

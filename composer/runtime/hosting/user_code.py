@@ -126,7 +126,7 @@ class _Steps:
 
 
 class CallAbandoned(Cancelled):
-    """Raised in code of a class whose time is over. It is no error of the class."""
+    """Raised in code of a class whose time is over. It is not a fault of the class."""
 
 
 def interrupt(ident: int) -> str:

@@ -58,3 +58,10 @@ class Sleeper(Node):
     def tick(self):
         time.sleep(0.5)
         self.client.call(Trigger.Request())
+
+
+class Waiter(Node):
+    def __init__(self):
+        super().__init__("waiter")
+        self.client = self.create_client(Trigger, "x")
+        rclpy.spin_until_future_complete(self, self.client.call_async(Trigger.Request()))

@@ -111,7 +111,7 @@ def test_a_constructor_waits_for_nodes_that_it_depends_on(
     assert "has not created" not in system.log_text()
 
 
-def test_a_class_is_told_of_matches_before_the_activation_and_in_the_process(
+def test_a_class_gets_matches_before_the_activation_and_in_the_process(
     tmp_path: Path, peer: Peer
 ) -> None:
     text = f"""

@@ -223,7 +223,7 @@ class Waiter(Node):
 
 
 class Matched(Node):
-    """Is told of the matches of a publisher and a subscription, in its process and outside."""
+    """Gets the matches of a publisher and a subscription, in its process and outside."""
 
     def __init__(self) -> None:
         super().__init__("matched")

@@ -86,3 +86,27 @@ def test_every_goal_is_reached_from_everywhere_by_legal_steps() -> None:
         assert "".join(at.values()) == goal
         steps = [(step.transition, step.node) for step in plan.steps]
         assert len(steps) == len(set(steps))
+
+
+def test_a_class_is_configured_once_what_it_depends_on_is_active() -> None:
+    system = system_of(
+        """
+        system: robot
+        nodes:
+          driver: {class: "driver:Driver"}
+          filter: {lifecycle: {depends_on: [driver]}}
+          viewer: {class: "viewer:Viewer", lifecycle: {depends_on: {filter: inactive}}}
+          planner: {class: "planner:Planner", lifecycle: {depends_on: [filter]}}
+          logger: {lifecycle: {depends_on: [planner]}}
+        """
+    )
+    here = {node.name.value: PrimaryState.UNCONFIGURED for node in system.nodes}
+    goals = dict.fromkeys(here, PrimaryState.ACTIVE)
+    plan = plan_transitions(system, here, goals, dict.fromkeys(here, "asked for"))
+    phases = [f"{phase[0].transition} {[step.node for step in phase]}" for phase in plan.phases]
+    assert phases == [
+        "configure ['driver', 'filter', 'viewer']",
+        "activate ['driver', 'filter', 'viewer']",
+        "configure ['planner', 'logger']",
+        "activate ['planner', 'logger']",
+    ]
