@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from importlib.metadata import Distribution, distribution
 from pathlib import Path
 
-from composer.report.tool import NAME
 from composer.resources import data_folder
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -22,13 +21,13 @@ _SHARED = ("interfaces", "nodes", "schemas", "systems")
 _ABOUT = "Wheel-Version: 1.0\nGenerator: compose export\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
 
 
-def wheel() -> tuple[str, bytes]:
+def wheel(distribution_name: str) -> tuple[str, bytes]:
     """Return the name and the content of the wheel, the same for the same files.
 
     Raises PackageNotFoundError if the composer is not installed, and OSError.
     """
-    installed = distribution(NAME)
-    name = f"{NAME.replace('-', '_')}-{installed.version}"
+    installed = distribution(distribution_name)
+    name = f"{distribution_name.replace('-', '_')}-{installed.version}"
     info = f"{name}.dist-info"
     files = dict(_package())
     files |= {f"{info}/{path}": data for path, data in _metadata(installed)}

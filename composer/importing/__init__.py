@@ -1,12 +1,12 @@
 """Describes existing nodes, and writes the descriptions as systems and node types.
 
 A description comes from the ROS graph (:mod:`.live`), from the source of a class
-(:mod:`.python_class`) or from a launch file (:mod:`composer.launch_interop`). Nothing here imports
+(:mod:`.python_class`) or from a launch file (:mod:`composer.launch`). Nothing here imports
 ROS or runs the code of users.
 """
 
 from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
-from composer.importing.writing import write_node_type, write_system
+from composer.importing.writing import write_node_type, write_parameters, write_system
 
 __all__ = [
     "FoundNode",
@@ -14,5 +14,6 @@ __all__ = [
     "FoundPort",
     "FoundSystem",
     "write_node_type",
+    "write_parameters",
     "write_system",
 ]

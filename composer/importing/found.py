@@ -62,9 +62,13 @@ class FoundNode:
 
 @dataclass(frozen=True, slots=True)
 class FoundSystem:
-    """Nodes that belong together. ``left_out`` says what could not be described, and why."""
+    """Nodes that belong together. ``left_out`` says what could not be described, and why.
+
+    ``sections`` are parameters of further nodes, by their full names.
+    """
 
     name: str
     nodes: tuple[FoundNode, ...]
     comments: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    sections: Mapping[str, Mapping[str, Plain]] = field(default_factory=dict)

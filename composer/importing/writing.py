@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from composer.document.writer import write_document
 from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
@@ -39,15 +39,29 @@ _NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_]+")
 _Comments = dict[tuple[str, ...], tuple[str, ...]]
 
 
-def write_system(found: FoundSystem) -> str:
-    """Return a system file."""
+def write_system(found: FoundSystem, parameter_file: str | None = None) -> str:
+    """Return a system file. ``parameter_file`` is the file of :func:`write_parameters`, if any."""
     comments: _Comments = {(): found.comments}
     if found.left_out:
         comments[()] += ("", "Left out:", *(f"- {text}" for text in found.left_out))
     nodes: dict[str, Plain] = {}
     for key, node in node_keys(found.nodes).items():
         nodes[key] = _node(key, node, ("nodes", key), comments)
-    return write_document(_map({"system": found.name, "nodes": nodes}), comments)
+    content: dict[str, Plain] = {"system": found.name}
+    if parameter_file is not None:
+        content["parameter_files"] = [parameter_file]
+    return write_document(_map({**content, "nodes": nodes}), comments)
+
+
+def write_parameters(found: FoundSystem) -> str:
+    """Return the parameters of further nodes as a ROS parameter file."""
+    sections: dict[str, Plain] = {
+        name: {"ros__parameters": dict(values)} for name, values in found.sections.items()
+    }
+    comments: _Comments = {
+        (): (*found.comments[:1], "Of nodes that the programs of the system may create.")
+    }
+    return write_document(_map(sections, has_variables=False), comments)
 
 
 def write_node_type(type_name: str, found: FoundNode) -> str:
@@ -171,20 +185,20 @@ def _free(key: str, taken: Iterable[str]) -> str:
     return free
 
 
-def _map(content: dict[str, Plain]) -> Mapping:
-    tree = _tree(content)
+def _map(content: dict[str, Plain], *, has_variables: bool = True) -> Mapping:
+    tree = _tree(content, _literal if has_variables else str)
     return tree if isinstance(tree, Mapping) else Mapping((), _NOWHERE)
 
 
-def _tree(value: Plain) -> Tree:
+def _tree(value: Plain, text: Callable[[str], str]) -> Tree:
     if isinstance(value, dict):
         entries = (
-            Entry(Scalar(_literal(key), _NOWHERE), _tree(item)) for key, item in value.items()
+            Entry(Scalar(text(key), _NOWHERE), _tree(item, text)) for key, item in value.items()
         )
         return Mapping(tuple(entries), _NOWHERE)
     if isinstance(value, list):
-        return Sequence(tuple(map(_tree, value)), _NOWHERE)
-    return Scalar(_literal(value) if isinstance(value, str) else value, _NOWHERE)
+        return Sequence(tuple(_tree(item, text) for item in value), _NOWHERE)
+    return Scalar(text(value) if isinstance(value, str) else value, _NOWHERE)
 
 
 def _literal(text: str) -> str:

@@ -10,6 +10,7 @@ import asyncio
 import json
 import os
 import sys
+import traceback
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -25,12 +26,15 @@ from launch.actions import (
 )
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
-from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros.actions import LifecycleNode, LoadComposableNodes, Node
 
 from composer.launch.parameter_values import parameter_values
+from composer.launch.process_options import process_options
+from composer.source import shown_path
 
 _UNKNOWN_NAME = "<node_name_unspecified>"
+#: The name that launch gives to the module of each launch file.
+_LAUNCH_MODULE = "python_launch_file"
 _MAXIMUM_ENTITIES = 100_000
 
 
@@ -55,8 +59,10 @@ class Visitor:
         if isinstance(entity, Node):
             self.nodes.append(self._node(entity, note))
         elif isinstance(entity, TimerAction):
+            period = f"after {self._text(entity.period)} s"
+            self.left_out.append(f"timer: what it starts {period} starts at once")
             for inner in entity.actions:
-                self.visit(inner, f"after {self._text(entity.period)} s")
+                self.visit(inner, period)
             return
         described = self._left_out(entity)
         self.left_out += described
@@ -93,13 +99,13 @@ class Visitor:
             "remappings": dict(node.expanded_remapping_rules or ()),
             "environment": self._environment_of(node),
             "lifecycle": isinstance(node, LifecycleNode),
-            "respawn": self._respawns(node),
             "note": note,
+            "process": process_options(node, self._context),
         }
         sources = [*self._global_parameters()]
         expanded = getattr(node, "_Node__expanded_parameter_arguments", None) or ()
         sources += [(str(text), bool(is_file)) for text, is_file in expanded]
-        found["parameters"], found["problems"] = parameter_values(sources, full_name)
+        found |= parameter_values(sources, full_name)
         ros_arguments = getattr(node, "_Node__ros_arguments", None) or ()
         found["ros_arguments"] = [self._text(argument) for argument in ros_arguments]
         return found
@@ -122,10 +128,6 @@ class Visitor:
             found |= {self._text(name): self._text(value) for name, value in pairs}
         return found
 
-    def _respawns(self, node: Any) -> bool:
-        respawn = getattr(node, "_ExecuteLocal__respawn", False)
-        return bool(perform_typed_substitution(self._context, respawn, bool))
-
     def _component(self, component: Any) -> str:
         plugin, package = self._text(component.node_plugin), self._text(component.package)
         return f"component: {plugin} of package {package}"
@@ -137,6 +139,21 @@ class Visitor:
         if isinstance(value, int | float):
             return str(value)
         return str(perform_substitutions(self._context, normalize_to_list_of_substitutions(value)))
+
+
+def _cause(error: BaseException) -> str:
+    """Return the first of the errors that launch has tried, with its place in a launch file."""
+    while causes := getattr(error, "_likely_errors", None):
+        error = causes[0]
+    frames = traceback.walk_tb(error.__traceback__)
+    places = [
+        f"{shown_path(Path(frame.f_code.co_filename))}:{line}: "
+        for frame, line in frames
+        if frame.f_globals.get("__name__") == _LAUNCH_MODULE
+    ]
+    text = error.args[0] if isinstance(error, KeyError) and error.args else error
+    first = (str(text).strip() or type(error).__name__).splitlines()[0]
+    return f"{''.join(places[-1:])}{type(error).__name__}: {first}"
 
 
 def _components(action: Any) -> Iterable[Any]:
@@ -160,7 +177,12 @@ def main(report: Path, path: str, arguments: list[str]) -> None:
         launch_arguments=[tuple(text.split(":=", 1)) for text in arguments],
     )
     visitor = Visitor(context)
-    visitor.visit(LaunchDescription([include]))
+    try:
+        visitor.visit(LaunchDescription([include]))
+    except Exception as error:
+        traceback.print_exc()
+        print(_cause(error), file=sys.stderr, flush=True)
+        os._exit(1)
     found = {"nodes": visitor.nodes, "left_out": visitor.left_out}
     report.write_text(json.dumps(found), encoding="utf-8")
     os._exit(0)  # whatever the launch file has started

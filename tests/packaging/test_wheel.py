@@ -40,7 +40,7 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
 
 def test_the_wheel_of_images_is_the_same(wheel: Path, tmp_path: Path) -> None:
     """That of ``compose export docker-compose``, made of the files of an installation."""
-    name, data = composer_wheel()
+    name, data = composer_wheel("ros2-composer")
     (tmp_path / name).write_bytes(data)
     built, packed = zipfile.ZipFile(wheel), zipfile.ZipFile(tmp_path / name)
     assert name == wheel.name

@@ -99,7 +99,7 @@ def test_a_constructor_that_fails_or_waits_is_reported(
 
 LAUNCH = """\
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction, LogInfo, Shutdown
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace, SetParameter
@@ -116,6 +116,10 @@ def generate_launch_description():
         ]),
         Node(package="demo", executable="sim", name="sim",
              condition=IfCondition(LaunchConfiguration("sim"))),
+        Node(package="demo", executable="driver", parameters=["PARAMETERS"], respawn=True,
+             respawn_delay=1.5, respawn_max_retries=4, cwd="/tmp", sigterm_timeout="9",
+             prefix="nice", on_exit=[LogInfo(msg="ended")]),
+        Node(package="demo", executable="last", name="last", on_exit=Shutdown()),
         ExecuteProcess(cmd=["true"]),
     ])
 """
@@ -126,12 +130,20 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
     parameters = tmp_path / "parameters.yaml"
     parameters.write_text(
         "/a/talker: {ros__parameters: {rate: 7.5}}\n/**: {ros__parameters: {x: 1}}\n"
+        "wheel: {left: {ros__parameters: {radius: 0.1}}}\n"
     )
     file = tmp_path / "robot.launch.py"
     file.write_text(LAUNCH.replace("PARAMETERS", str(parameters)))
     done = compose("import", "launch", file)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == "left out:\n  process: true\n"
+    assert done.stderr.splitlines() == [
+        "left out:",
+        "  process: true",
+        "  prefix: nice (of /driver)",
+        "  on_exit: LogInfo (of /driver)",
+        "  parameters of /wheel/left: they differ, and are joined for all programs",
+        "  parameters of /wheel/left: with --output, a file has them",
+    ]
     assert (
         done.stdout.partition("nodes:\n")[2]
         == """\
@@ -143,9 +155,42 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
       rate: {type: double, default: 7.5}
       x: {type: integer, default: 1}
     remappings: {chatter: /chat}
+  # The launch file does not name its nodes; list them under 'nodes'.
+  # Its parameter files name: /a/talker, /wheel/left.
+  driver:
+    executable:
+      package: demo
+      name: driver
+      nodes: []
+      working_directory: /tmp
+      sigterm_timeout_ms: 9000
+    lifecycle:
+      on_failure: restart
+      restart: {backoff_ms: 1500, backoff_max_ms: 1500, max_attempts: 4}
+    parameters: {x: {type: integer, default: 1}}
+  last: {executable: {package: demo, name: last}, lifecycle: {on_failure: shutdown}}
 """
     )
+    written = tmp_path / "robot.yaml"
+    assert compose("import", "launch", file, "-o", written).returncode == 0
+    assert (
+        "  ros__parameters: {use_sim_time: true, x: 1, radius: 0.1}\n"
+        in (tmp_path / "robot_parameters.yaml").read_text()
+    )
+    assert compose("validate", written).returncode == 0
     assert "\n  sim: {executable: " in output_of("import", "launch", file, "sim:=true")
+
+
+@pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch_ros is not installed")
+def test_the_first_cause_of_a_failure_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "robot.launch.py"
+    file.write_text(
+        "from ament_index_python.packages import get_package_share_directory\n"
+        "def generate_launch_description():\n"
+        "    return get_package_share_directory('no_such_package')\n"
+    )
+    expected = f"{file}:3: PackageNotFoundError: package 'no_such_package' not found, "
+    expect_error(expected, "import", "launch", file)
 
 
 @pytest.mark.skipif(find_spec("launch_ros") is not None, reason="launch_ros is installed")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
 from composer.importing import FoundNode, FoundParameter, FoundPort, write_node_type, write_system
-from composer.importing.launch_file import describe_launch_file
 from composer.importing.live import describe_graph
 from composer.interfaces import Interfaces
 from composer.loading import load
@@ -142,53 +141,6 @@ parameters:
 publishers:
   # x\\nnode: y
   a: {type: std_msgs/msg/String, qos: state}
-"""
-    )
-
-
-def test_the_nodes_of_a_launch_file_are_executables() -> None:
-    item = {
-        "name": None,
-        "namespace": "/a",
-        "package": "demo",
-        "executable": "listener.py",
-        "arguments": ["-v"],
-        "remappings": {"x": "/y"},
-        "parameters": {"rate": 2, "empty": []},
-        "problems": [],
-        "environment": {"A": "b"},
-        "lifecycle": True,
-        "respawn": True,
-        "note": "after 3 s",
-        "ros_arguments": ["--log-level", "debug"],
-    }
-    found = describe_launch_file("s", "r.launch.py", ["a:=b"], {"nodes": [item], "left_out": ["x"]})
-    assert (
-        write_system(found)
-        == """\
-# Imported by 'compose import launch r.launch.py a:=b'.
-# A launch file does not show topics, services and actions, so the nodes have no ports.
-# To add them, start it, and copy the ports from the output of 'compose import live'.
-#
-# Left out:
-# - x
-# - name of demo listener.py: the launch file does not set it; it is 'listener' here
-# - --ros-args of demo listener.py: --log-level debug
-# - parameter empty of /a/listener: its type is not known
-system: s
-nodes:
-  # Started after 3 s by the launch file.
-  listener:
-    namespace: /a
-    executable:
-      package: demo
-      name: listener.py
-      arguments: ["-v"]
-      environment: {A: b}
-      lifecycle: managed
-    lifecycle: {on_failure: restart}
-    parameters: {rate: {type: integer, default: 2}}
-    remappings: {x: /y}
 """
     )
 

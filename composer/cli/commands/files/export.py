@@ -344,6 +344,7 @@ def _write_image_and(
         ignored_files,
     )
     from composer.export.wheel import wheel
+    from composer.report.tool import NAME
 
     if folder is None:
         write_raw("".join(map(str, files.values())))
@@ -354,7 +355,7 @@ def _write_image_and(
             hint="images are built from the files of the project",
         )
     try:
-        name, data = wheel()
+        name, data = wheel(NAME)
     except (OSError, PackageNotFoundError) as error:
         raise CommandError(f"cannot make a wheel of the composer: {error}") from error
     place = PurePosixPath(folder.resolve().relative_to(result.project.root).as_posix(), name)

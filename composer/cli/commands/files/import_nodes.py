@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -211,8 +212,12 @@ def import_launch(
 
     The file is evaluated with these arguments in a process of its own, like 'ros2 launch' does, but
     nothing is started: nodes become executables with their names, namespaces, parameters,
-    remappings and environment. Includes, groups and conditions are resolved. Components, processes
-    that are not nodes and event handlers are listed and left out.
+    remappings, environment and restarts. Includes, groups and conditions are resolved. Components,
+    processes that are not nodes, event handlers, and options that systems do not have are listed
+    and left out.
+
+    Parameters of nodes that the launch file does not name are for nodes inside the programs. With
+    --output, they are written to a parameter file next to the system.
 
     Launch files do not show topics, services and actions: see 'compose import live'. The packages
     launch and launch_ros must be installed.
@@ -225,7 +230,7 @@ def import_launch(
         raise UsageError(f"there is no file '{file}'")
     require_launch("compose import launch")
     from composer.cli.support.user_processes import run_user_process
-    from composer.importing import write_system
+    from composer.importing import write_parameters, write_system
     from composer.importing.launch_file import describe_launch_file
 
     arguments_of_process = [str(file.absolute()), *given]
@@ -235,7 +240,18 @@ def import_launch(
     if not found.nodes:
         _report_left_out(found.left_out)
         raise CommandError(f"'{file}' starts no node with these arguments")
-    _write(write_system(found), output)
+    if not found.sections or output is None:
+        if found.sections:
+            others = f"parameters of {', '.join(found.sections)}: with --output, a file has them"
+            found = replace(found, left_out=(*found.left_out, others))
+        _write(write_system(found), output)
+    else:
+        from composer.cli.support.new_files import write_new_files
+
+        name = f"{output.stem}_parameters.yaml"
+        texts = {output.name: write_system(found, name), name: write_parameters(found)}
+        write_new_files(output.parent, texts)
+        say(f"wrote {output} and {output.with_name(name)}")
     _report_left_out(found.left_out)
 
 
