@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 
-from composer.python_code.source import Module, imported_from
-from composer.python_code.source.trees import argument, called_name, dotted, last_name
+from composer.python_code.source import Function, Module, imported_from
+from composer.python_code.source.trees import argument, called_name, dotted, is_none, last_name
 from composer.python_code.stubs.behaviors import Signature
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
@@ -22,6 +23,8 @@ _TRANSITIONS = ("activate", "cleanup", "configure", "deactivate", "error", "shut
 _TRANSITION = Signature(
     (("state", "rclpy.lifecycle.LifecycleState"),), "rclpy.lifecycle.TransitionCallbackReturn"
 )
+_PARAMETERS = (("parameters", "list[{0}]"),)
+_CHANGED = "rcl_interfaces.msg.SetParametersResult"
 _FEEDBACK = "rclpy.action.client._FeedbackMessage[{0}.Feedback]"
 _FUTURES = {
     "call_async": "rclpy.task.Future[{0}.Response]",
@@ -30,9 +33,12 @@ _FUTURES = {
 }
 
 
-def callback_signatures(node: ast.ClassDef, module: Module) -> dict[str, Signature]:
+def callback_signatures(
+    node: ast.ClassDef, module: Module, ports: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, Signature]:
     """Return the methods of a class that rclpy calls, with what they are called with.
 
+    ``ports`` are the types of what a behavior sends goals with: ``self.action_clients.navigate``.
     A method that is passed as a callback of several types is left out. A callback of a client or
     future has a known type if the class has clients of one service, or of one action, only.
     """
@@ -44,11 +50,14 @@ def callback_signatures(node: ast.ClassDef, module: Module) -> dict[str, Signatu
     action = _only(
         _type(argument(x, 1, "action_type"), module) for x in _named("ActionClient", calls)
     )
-    clients = {"call_async": service, "send_goal_async": action, "get_result_async": action}
-    futures = dict(_futures(node))
-    for call in calls:
-        for name, signature in _of_call(call, module, clients, futures):
-            found.setdefault(name, set()).add(signature)
+    goals = {"send_goal_async": action, "get_result_async": action}
+    clients = {**ports, **goals, "call_async": service}
+    attributes = {name: made for name, made in _futures(node).items() if "." in name}
+    for function in (item for item in node.body if isinstance(item, Function)):
+        futures = {**_futures(function), **attributes}
+        for call in (item for item in ast.walk(function) if isinstance(item, ast.Call)):
+            for name, signature in _of_call(call, module, clients, futures):
+                found.setdefault(name, set()).add(signature)
     origins = [imported_from(module, dotted(base)) for base in node.bases]
     if any(origin is not None and origin.name == "LifecycleNode" for origin in origins):
         found |= {f"on_{name}": {_TRANSITION} for name in _TRANSITIONS}
@@ -67,11 +76,18 @@ def _of_call(
             arguments = (("request", "{0}.Request"), ("response", "{0}.Response"))
             callback = argument(call, 2, "callback")
             yield from _bound(callback, type_, arguments, "{0}.Response")
+        case "add_on_set_parameters_callback":
+            callback = argument(call, 0, "callback")
+            yield from _bound(callback, "rclpy.parameter.Parameter", _PARAMETERS, _CHANGED)
         case "ActionServer":
             type_ = _type(argument(call, 1, "action_type"), module)
             for keyword, (position, taken, result) in _OF_ACTION_SERVERS.items():
                 at = len(call.args) if position is None else position
                 yield from _bound(argument(call, at, keyword), type_, (taken,), result)
+        case "send_goal":
+            callback = argument(call, len(call.args), "on_feedback")
+            port = dotted(call.func).removesuffix(".send_goal")
+            yield from _bound(callback, clients.get(port, ""), (("feedback", "{0}.Feedback"),))
         case "send_goal_async":
             callback = argument(call, 1, "feedback_callback")
             feedback = (("feedback_message", _FEEDBACK),)
@@ -103,13 +119,14 @@ def _bound(
         yield name.removeprefix("self."), Signature(taken, result.format(type_))
 
 
-def _futures(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
-    """Yield the names of futures in a class, each with the method that has returned it."""
+def _futures(node: ast.ClassDef | Function) -> dict[str, str]:
+    """Return the names that always have futures of one kind, with the method that returns them."""
+    found: dict[str, set[str]] = {}
     for item in ast.walk(node):
         match item:
-            case ast.Assign(targets=[target], value=ast.Call(func=function)):
-                if last_name(function) in _FUTURES:
-                    yield dotted(target), last_name(function)
+            case ast.Assign(targets=[target], value=value) if not is_none(value):
+                found.setdefault(dotted(target), set()).add(called_name(value))
+    return {name: _only(made) for name, made in found.items()}
 
 
 def _named(name: str, calls: list[ast.Call]) -> Iterator[ast.Call]:

@@ -21,16 +21,21 @@ from composer.python_code.stubs.messages import interface_modules
 
 #: The line that a copy gets, so that annotations can name what they need.
 _IMPORTS = (
-    "import composer.behavior, composer.typed, rclpy.action, rclpy.lifecycle, rclpy.task, typing"
+    "import composer.behavior, composer.typed, rclpy.action, rclpy.lifecycle, "
+    "rclpy.parameter, rclpy.task, typing"
 )
 
 
 @dataclass(frozen=True, slots=True)
 class ClassEdit:
-    """What a class of the project gets: a base class, "" for none, and signatures by method."""
+    """What a class of the project gets: a base class, "" for none, and signatures by method.
+
+    ``ports`` are the types of the action clients of a behavior, by what its code calls them.
+    """
 
     base: str = ""
     signatures: Mapping[str, Signature] = field(default_factory=dict)
+    ports: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -67,8 +72,10 @@ def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior
         edit = classes.get(class_.name, ClassEdit())
         if edit.base and edit.base.rpartition(".")[2] not in class_.bases:
             edits.add_base(class_.node, edit.base)
-        callbacks = {} if is_behavior else callback_signatures(class_.node, module)
-        signatures = {**callbacks, **edit.signatures}
+        signatures = {
+            **callback_signatures(class_.node, module, edit.ports),
+            **edit.signatures,
+        }
         for method in class_.methods:
             signature = signatures.get(method.name)
             if signature is not None and method.node is not None:

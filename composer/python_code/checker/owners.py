@@ -66,7 +66,9 @@ class Owners:
         if name in self._groups:
             return self._groups[name]
         full = self._full_name(name, module)
-        if full is not None:
+        imported = module.imports.get(name)
+        is_of_rclpy = name == "Parameter" and (imported is None or imported.module[:5] == "rclpy")
+        if full is not None and not is_of_rclpy:
             return self.message(full)
         if not with_api or name not in API_CLASSES:
             return None

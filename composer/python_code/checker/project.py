@@ -14,13 +14,14 @@ from pathlib import Path
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
-from composer.model import Node
+from composer.model import Node, PortKind
 from composer.python_code.checker.copies import ClassEdit, Copy, edited_copy
 from composer.python_code.source import BehaviorSource, Module
 from composer.python_code.source.lookup import BrokenModule
 from composer.python_code.stubs.behaviors import (
     behavior_class_name,
     behavior_module,
+    port_type,
     signatures,
 )
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
@@ -84,13 +85,18 @@ class FileSet:
             self.search[folder] = None
         base = ""
         handlers = {}
+        types = {
+            f"self.action_clients.{port.name.value}": port_type(port, interfaces) or ""
+            for port in node.ports_of(PortKind.ACTION_CLIENT)
+        }
         if node.behavior is not None:
             base = _unused_name(node, self.behaviors)
             self.behaviors[base] = node
             handlers = signatures(node, interfaces)
         for module, class_ in source.own_classes:
             is_start = class_.name == reference.class_name and module.path == source.path
-            edit = ClassEdit(f"composer.typed.{base}" if base and is_start else "", handlers)
+            start = f"composer.typed.{base}" if base and is_start else ""
+            edit = ClassEdit(start, handlers, types)
             self.edits.setdefault(module.path, {})[class_.name] = edit
 
     def copies(self) -> dict[str, CheckedFile]:

@@ -26,7 +26,7 @@ _CERTAIN_KINDS = frozenset(
 _ALWAYS = frozenset({"invalid-syntax", "missing-module-attribute", "parse-error"})
 #: Kinds that are kept in classes if they are about a type of ROS.
 _KINDS_ABOUT_TYPES = frozenset(
-    {"bad-argument-type", "bad-index", "not-iterable", "unsupported-operation"}
+    {"bad-argument-type", "bad-index", "not-async", "not-iterable", "unsupported-operation"}
 )
 #: All kinds that may be mistakes; the others are about annotations and definitions.
 _KINDS = (
@@ -41,16 +41,16 @@ _KINDS = (
         "bad-unpacking",
     }
     | {"incompatible-comparison", "invalid-argument", "invalid-format-spec", "missing-attribute"}
-    | {"no-matching-overload", "not-async", "read-only", "regex", "unbound-name"}
+    | {"no-matching-overload", "read-only", "regex", "unbound-name"}
     | {"unreachable-except-clause"}
 )
-_NUMPY = r"\b(?:ndarray|dtype|numpy|(?:un)?signedinteger|floating|bool_|generic\[)"
+_NUMPY = r"\b(?:(?:ndarray|dtype|numpy|(?:un)?signedinteger|floating|bool_)\b|generic\[)"
 _ROS = (
     r"in function `(?:rclpy|composer|\w+\.(?:msg|srv|action))\."
     r"|`(?:Time|Duration|Parameter|Future\[|Client\[|Publisher\[|rclpy\.)"
     r"|between `Literal\['[^`]*` and `(?:int|float)`"
 )
-_RESULT_FOR_RCLPY = r" return (?:type )?`[\w.]*(?:_Response|_Result|CallbackReturnType)`"
+_RESULT_FOR_RCLPY = r" return (?:type )?`[\w.]*(?:_Response|Result|CallbackReturnType)`"
 #: A missing module of rclpy; the composer checks other imports itself.
 _KNOWN_PACKAGE = r"`rclpy\."
 _BUILTINS = frozenset(
@@ -131,8 +131,10 @@ class Relevance:
             return False
         if not self.is_class or kind in _CERTAIN_KINDS or kind == "bad-assignment":
             return True
-        is_message = given is not None and self._is_message(given["given"])
-        return kind in _KINDS_ABOUT_TYPES and (is_ros or is_message)
+        types = re.findall(r"`(\w+)`", message) if given is None else [given["given"]]
+        if given is None and (node is None or self._uses_annotated_argument(node)):
+            types = []
+        return kind in _KINDS_ABOUT_TYPES and (is_ros or any(map(self._is_message, types)))
 
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
         owner = re.search(_OWNER, message)
@@ -192,6 +194,10 @@ class Relevance:
         if given == "int" and isinstance(node, ast.Subscript):
             return True  # an element of a list that got other values later
         return self.is_class and self._is_annotated_argument(node)
+
+    def _uses_annotated_argument(self, node: ast.expr) -> bool:
+        names = (item for item in ast.walk(node) if isinstance(item, ast.Name | ast.Attribute))
+        return any(map(self._is_annotated_argument, names))
 
     def _is_annotated_argument(self, node: ast.expr) -> bool:
         """Return whether a value is an argument, or stores one, whose annotation may be wrong."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from composer.diagnostics import nearest
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.nodes.class_interfaces import (
+    UNDECLARED,
     declared_parameters,
     passes_node_on,
 )
@@ -30,6 +31,7 @@ def node_class_problems(code: Code) -> Iterator[Problem]:
         return  # they may do something else
     yield from _undeclared(code)
     for scope in code.scopes:
+        yield from _incomplete_profiles(scope)
         if scope.function is None or scope.method is None:
             continue
         for node in scope.nodes:
@@ -48,7 +50,11 @@ def _undeclared(code: Code) -> Iterator[Problem]:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
     ]
     parameters = declared_parameters(code.source)
-    if not parameters.is_complete or any(_may_have_others(call) for _, call in calls):
+    hosted = code.node.hosted_class
+    given = {name.value for name, _ in hosted.arguments} if hosted is not None else set()
+    if not parameters.is_complete or not UNDECLARED.isdisjoint(given):
+        return
+    if any(_may_have_others(call, scope) for scope, call in calls):
         return
     declared = _DECLARED | parameters.types.keys()
     is_shared = passes_node_on(code.source)
@@ -65,15 +71,32 @@ def _undeclared(code: Code) -> Iterator[Problem]:
             yield scope.problem(Family.PARAMETER, message, call.args[0], hint)
 
 
-def _may_have_others(call: ast.Call) -> bool:
-    """Return whether a call shows that parameters come from elsewhere."""
+def _may_have_others(call: ast.Call, scope: NodeScope) -> bool:
+    """Return whether a call shows that parameters come from elsewhere.
+
+    With ``**kwargs``, a constructor passes on the arguments of the node.
+    """
     name = getattr(call.func, "attr", "")
-    is_open = name == "__init__" and any(item.arg is None for item in call.keywords)
-    return is_open or name in _ASKING
+    own = scope.function.args.kwarg if scope.function is not None else None
+    passed_on = own.arg if own is not None else None
+    others = (item for item in call.keywords if item.arg is None)
+    is_open = any(dotted(item.value) != passed_on for item in others)
+    return name in _ASKING or (name == "__init__" and is_open)
 
 
 def _catches_errors(scope: NodeScope) -> bool:
     return any(isinstance(x, ast.ExceptHandler) and catches(x, _ERRORS) for x in scope.nodes)
+
+
+def _incomplete_profiles(scope: NodeScope) -> Iterator[Problem]:
+    """Yield the QoS profiles without history and depth, which rclpy refuses."""
+    for node in scope.nodes:
+        match node:
+            case ast.Call(args=[], keywords=keywords):
+                is_profile = scope.full_name(node.func) == "rclpy.qos.QoSProfile"
+                if is_profile and {"depth", "history", None}.isdisjoint(x.arg for x in keywords):
+                    message = "a QoSProfile needs its depth or its history"
+                    yield scope.problem(Family.ARGUMENTS, message, node, "add 'depth=10'")
 
 
 def _values_used(node: ast.AST) -> Sequence[ast.expr]:

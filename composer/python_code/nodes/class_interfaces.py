@@ -13,7 +13,7 @@ from composer.source import Located
 
 _DECLARING = frozenset({"declare_parameter", "declare_parameters"})
 #: With one of these, parameters exist that the class does not declare by name.
-_UNDECLARED = frozenset(
+UNDECLARED = frozenset(
     {"allow_undeclared_parameters", "automatically_declare_parameters_from_overrides"}
 )
 #: Packages whose functions take a node and declare no parameters of the class.
@@ -34,7 +34,8 @@ class DeclaredParameters:
 def declared_parameters(source: BehaviorSource) -> DeclaredParameters:
     """Return the parameters that a class declares by methods of Node."""
     nodes = [node for module in source.own_modules for node in walk(module.tree.body)]
-    is_open = any(isinstance(node, ast.keyword) and node.arg in _UNDECLARED for node in nodes)
+    texts = [module.source.text for module in source.own_modules]
+    is_open = any(name in text for name in UNDECLARED for text in texts)
     # A method that is passed on, or called for another object, may declare anything.
     mentions = sum(isinstance(node, ast.Attribute) and node.attr in _DECLARING for node in nodes)
     parameters = DeclaredParameters({}, source.complete and source.class_found and not is_open)

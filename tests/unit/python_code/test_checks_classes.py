@@ -212,6 +212,19 @@ FILES = [
     """,
     """
     class Robot(Node):
+        def __init__(self, **kwargs):
+            super().__init__('robot', **kwargs)
+            self.get_parameter('rate').value  # PARAMETER
+    """,
+    """
+    class Robot(Node):
+        def __init__(self, **kwargs):
+            kwargs['allow_undeclared_parameters'] = True
+            super().__init__('robot', **kwargs)
+            self.get_parameter('rate').value
+    """,
+    """
+    class Robot(Node):
         def __init__(self):
             super().__init__('robot', allow_undeclared_parameters=True)
             self.get_parameter('rate').value

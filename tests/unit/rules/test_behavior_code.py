@@ -122,6 +122,7 @@ MISTAKES = [
         "invalid-value",
         "'success'",
     ),
+    ("turning", "feedback.feedback", "unknown-field", "feedback"),
     ("odometry", "total += 1", "type-error", "total"),
     ("odometry", "self.scale()", "call-arguments", "()"),
     ("odometry", "self.scale(1.0, 'a', 2)", "call-arguments", "2"),

@@ -73,10 +73,22 @@ class Robot(LifecycleNode):
     def on_parameters(self, parameters):
         for parameter in parameters:
             self.speed = parameter.value
+            {parameters}
         return SetParametersResult(successful=True)
 
     def on_stopped(self, future):
         {stopped}
+
+    def halt(self):
+        future = self.stop.call_async(SetBool.Request())
+        future.add_done_callback(self.on_stopped)
+
+    def turn(self):
+        future = self.action.send_goal_async(Fibonacci.Goal())
+        future.add_done_callback(self.on_accepted)
+
+    def on_accepted(self, future):
+        self.count = future.result().accepted
 
     def on_activate(self, state):
         {activate}
@@ -92,7 +104,8 @@ class Robot(LifecycleNode):
     def count_up(self):
         self.count += 1
 """
-PLACES = ("init", "point", "reset", "tick", "accept", "goal", "stopped", "activate", "typed_goal")
+PLACES = ("init", "point", "reset", "tick", "accept", "goal", "stopped", "parameters", "activate")
+PLACES += ("typed_goal",)
 
 #: The place of a statement, the statement, the rule it breaks, and the text that is underlined.
 MISTAKES = [
@@ -129,7 +142,12 @@ MISTAKES = [
         "self.count_up",
     ),
     ("init", "ActionServer(self, Fibonacci, 'x')", "call-arguments", "(self, Fibonacci, 'x')"),
-    ("init", "QoSProfile(reliability=ReliabilityPolicy.BEST)", "missing-attribute", "BEST"),
+    (
+        "init",
+        "QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST)",
+        "missing-attribute",
+        "BEST",
+    ),
     ("init", "self.get_parameter('sped')", "undeclared-parameter", "'sped'"),
     ("init", "self.get_parameter('speed').get_parameter_value().double", "unknown-field", "double"),
     ("init", "self.logger().info('x')", "missing-attribute", "logger"),
@@ -139,7 +157,22 @@ MISTAKES = [
     ("init", "self.texts.publish(Twist())", "call-arguments", "Twist()"),
     ("init", "self.texts.publish(String)", "call-arguments", "String"),
     ("init", "self.text.publish(String())", "missing-attribute", "text"),
+    (
+        "init",
+        "self.get_parameter('speed').get_parameter_value().floating_value",
+        "unknown-field",
+        "floating_value",
+    ),
+    ("init", "self.get_parameter('speed').bool_value", "missing-attribute", "bool_value"),
+    ("parameters", "parameter.type", "missing-attribute", "type"),
+    (
+        "init",
+        "QoSProfile(reliability=ReliabilityPolicy.RELIABLE)",
+        "call-arguments",
+        "QoSProfile(reliability=ReliabilityPolicy.RELIABLE)",
+    ),
     ("point", "message.x", "unknown-field", "x"),
+    ("point", "message.point[0]", "type-error", "message.point[0]"),
     ("reset", "response.ok = True", "unknown-field", "ok"),
     ("reset", "request.data", "unknown-field", "data"),
     ("accept", "goal.target", "unknown-field", "target"),
@@ -153,6 +186,14 @@ MISTAKES = [
     ),
     ("goal", "goal_handle.request.size", "unknown-field", "size"),
     ("goal", "goal_handle.cancel()", "missing-attribute", "cancel"),
+    ("stopped", "future.result().accepted", "unknown-field", "accepted"),
+    ("typed_goal", "return Fibonacci.Feedback()", "missing-return", "Fibonacci.Feedback()"),
+    (
+        "tick",
+        "async def halt():\n    await self.stop.call(SetBool.Request())",
+        "type-error",
+        "await self.stop.call(SetBool.Request())",
+    ),
     ("activate", "return True", "missing-return", "True"),
     ("activate", "super().on_activate()", "call-arguments", "()"),
     ("tick", "self.stop.call_async(SetBool())", "call-arguments", "SetBool()"),
@@ -194,7 +235,7 @@ MISTAKES = [
         "unknown-field",
         "text",
     ),
-    ("init", "QoSProfile(reliability='reliable')", "call-arguments", "'reliable'"),
+    ("init", "QoSProfile(depth=1, reliability='reliable')", "call-arguments", "'reliable'"),
     ("tick", "self.count_up.data", "missing-attribute", "data"),
     ("tick", "min([String()], key=lambda item: item.text)", "unknown-field", "text"),
     (

@@ -97,6 +97,13 @@ class Code(Behavior):
     async def on_configure(self):
         {configure}
 
+    async def turn(self):
+        turn = Navigate.Goal()
+        await self.action_clients.turn.send_goal(turn, on_feedback=self.on_turning)
+
+    def on_turning(self, feedback):
+        {turning}
+
     async def _wait(self) -> Point:
         await self.clock.sleep(0.1)
         return Point()
@@ -160,7 +167,7 @@ class Code(Behavior):
 async def wait(stamp: Time):
     {function}
 """
-PLACES = ("odometry", "reset", "drive", "configure", "follow", "function")
+PLACES = ("odometry", "reset", "drive", "configure", "follow", "turning", "function")
 
 
 def code_with(place: str, statement: str) -> str:
