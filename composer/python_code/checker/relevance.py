@@ -193,7 +193,7 @@ class Relevance:
             return False
         if given == "int" and isinstance(node, ast.Subscript):
             return True  # an element of a list that got other values later
-        return self.is_class and self._is_annotated_argument(node)
+        return self.is_class and given not in _BUILTINS and self._is_annotated_argument(node)
 
     def _uses_annotated_argument(self, node: ast.expr) -> bool:
         names = (item for item in ast.walk(node) if isinstance(item, ast.Name | ast.Attribute))

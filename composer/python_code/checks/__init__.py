@@ -11,6 +11,7 @@ from composer.python_code.checks.messages import message_problems
 from composer.python_code.checks.methods import (
     callback_problems,
     missing_self,
+    unawaited_values,
     unused_values,
 )
 from composer.python_code.checks.node_classes import node_class_problems
@@ -28,6 +29,7 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
         yield from message_problems(scope)
         yield from callback_problems(scope)
         yield from unused_values(scope)
+        yield from unawaited_values(scope)
     yield from missing_self(code)
     if node.behavior is not None:
         yield from behavior_problems(code)

@@ -56,18 +56,15 @@ class _Contents(NamedTuple):
 
 
 class _Missing(NamedTuple):
-    """What cannot be imported, and the names that were meant."""
+    """What cannot be imported."""
 
     message: str
     hint: str | None = None
-    meant: frozenset[str] = frozenset()
     family: Family = Family.IMPORT
 
 
-def import_problems(
-    module: Module, folder: Path, interfaces: Interfaces
-) -> Iterator[tuple[Problem, frozenset[str]]]:
-    """Yield the problems of the imports in a file, each with the names that may be meant.
+def import_problems(module: Module, folder: Path, interfaces: Interfaces) -> Iterator[Problem]:
+    """Yield the problems of the imports in a file.
 
     ``folder`` has the YAML file. Imports in an ``if``, a ``try`` or a ``with`` may fail, so
     they are left out. A missing module is only an error if its name is a typo: it may be installed
@@ -78,18 +75,17 @@ def import_problems(
         if isinstance(node, ast.Import):
             for alias in node.names:
                 for part, missing in imports.missing_modules(alias.name):
-                    meant = frozenset() if alias.asname else missing.meant
-                    yield imports.problem(missing, alias, alias.name, part), meant
+                    yield imports.problem(missing, alias, alias.name, part)
         elif isinstance(node, ast.ImportFrom):
             name = "." * node.level + (node.module or "")
             for part, missing in imports.missing_modules(name):
-                yield imports.problem(missing, node, f"from {name}", part), frozenset()
+                yield imports.problem(missing, node, f"from {name}", part)
                 break
             else:
                 lacking = [alias for alias in node.names if imports.lacks(name, alias.name)]
                 for alias in lacking[:1]:  # the others have the same cause
                     missing = imports.missing_names(name, [item.name for item in lacking])
-                    yield imports.problem(missing, alias, alias.name, alias.name), missing.meant
+                    yield imports.problem(missing, alias, alias.name, alias.name)
 
 
 class _Imports:
@@ -130,12 +126,12 @@ class _Imports:
         home = self._home(module, names)
         if home is not None:
             them = "it" if len(names) == 1 else "them"
-            return _Missing(message, f"import {them} from '{home}'", frozenset(names))
+            return _Missing(message, f"import {them} from '{home}'")
         known, is_closed = self._contents(module) or _Contents(frozenset(), is_closed=True)
         if not is_closed:
             return _missing(message, names[0], known)
         hint = suggestion(names[0], known) if len(names) == 1 else None
-        return _Missing(message, hint, known.union(names))
+        return _Missing(message, hint)
 
     def lacks(self, module: str, name: str) -> bool:
         """Return whether a module has no such name, as far as is known."""
@@ -243,13 +239,13 @@ def _missing(message: str, name: str, known: Iterable[str], where: str = "") -> 
     near = [(edit_distance(name, other), other) for other in known if other[:1] == name[:1]]
     distance, close = min(near, default=(limit + 1, ""))
     if distance <= limit:
-        return _Missing(message, f"did you mean '{close}'?", frozenset({close}))
-    hint, names = "install it, or correct the name", frozenset[str]()
+        return _Missing(message, f"did you mean '{close}'?")
+    hint = "install it, or correct the name"
     for other in sys.stdlib_module_names:
         is_public = len(other) >= _SHORTEST_TYPO and other[0] != "_"
         if is_public and other[:2] == name[:2] and edit_distance(name, other) == 1:
-            hint, names = f"did you mean '{other}'?", frozenset({other})
-    return _Missing(f"{message}{where}", hint, names, Family.NOT_INSTALLED)
+            hint = f"did you mean '{other}'?"
+    return _Missing(f"{message}{where}", hint, Family.NOT_INSTALLED)
 
 
 def _has_file(name: str) -> bool:

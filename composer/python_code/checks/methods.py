@@ -45,6 +45,23 @@ def unused_values(scope: NodeScope) -> Iterator[Problem]:
                     yield scope.problem(Family.UNUSED, message, value, "add '()'")
 
 
+def unawaited_values(scope: NodeScope) -> Iterator[Problem]:
+    """Yield the coroutines of the class that are assigned, and then used as if they were values.
+
+    The type checker reports those whose attributes are used, and those that are not used.
+    """
+    for node in scope.nodes:
+        match node:
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=function)):
+                method = _method(function, scope)
+                uses = [item for item in scope.nodes if isinstance(item, ast.FormattedValue)]
+                is_shown = any(dotted(item.value) == name for item in uses)
+                if method is not None and method.is_async and is_shown:
+                    message = f"'{dotted(function)}' is asynchronous and is not awaited"
+                    hint = f"write 'await {dotted(function)}(...)'"
+                    yield scope.problem(Family.AWAIT, message, function, hint)
+
+
 def missing_self(code: Code) -> Iterator[Problem]:
     """Yield the methods that lack their first argument."""
     is_behavior = code.node.behavior is not None

@@ -72,20 +72,11 @@ def diagnostic(problem: Problem, place: Span, what: What) -> Diagnostic:
 
 def check(context: Context) -> Iterator[Diagnostic]:
     """Report the problems of the files of behaviors and classes, each once."""
-    for source, what, problem, _ in context.once(_import_problems):
+    for source, what, problem in _import_problems(context):
         yield diagnostic(problem, source.reference.text.span, what)
     for node, source, what in sources(context):
         for problem in code_problems(node, source, context.interfaces):
             yield diagnostic(problem, source.reference.text.span, what)
-
-
-def names_meant(context: Context) -> frozenset[tuple[str, str]]:
-    """Return files with the names that a wrong import in the file may have been meant to define."""
-    return frozenset(
-        (problem.span.file.path, name)
-        for _, _, problem, names in context.once(_import_problems)
-        for name in names
-    )
 
 
 def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
@@ -96,22 +87,18 @@ def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
         yield item.node, item.source, "class"
 
 
-def _import_problems(
-    context: Context,
-) -> tuple[tuple[BehaviorSource, What, Problem, frozenset[str]], ...]:
-    """Return the problems of the imports in all files, with the names that were meant."""
-    problems: list[tuple[BehaviorSource, What, Problem, frozenset[str]]] = []
+def _import_problems(context: Context) -> Iterator[tuple[BehaviorSource, What, Problem]]:
+    """Yield the problems of the imports in all files."""
     checked: set[Path] = set()
     for _, source, what in sources(context):
         for module in source.own_modules:
             if module.path not in checked:
                 checked.add(module.path)
                 folder = source.reference.folder
-                for problem, names in import_problems(module, folder, context.interfaces):
-                    problems.append((source, what, problem, names))
-                others = _alternatives(module, context)
-                problems += [(source, what, problem, frozenset()) for problem in others]
-    return tuple(problems)
+                for problem in import_problems(module, folder, context.interfaces):
+                    yield source, what, problem
+                for problem in _alternatives(module, context):
+                    yield source, what, problem
 
 
 def _alternatives(module: Module, context: Context) -> Iterator[Problem]:

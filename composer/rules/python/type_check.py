@@ -20,11 +20,13 @@ from composer.python_code.checker import RunningCheck, start
 from composer.python_code.nodes.behaviors import use_of
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource
-from composer.rules.python.families import RULE_OF, diagnostic, names_meant, sources
+from composer.rules.python.families import RULE_OF, diagnostic, sources
 from composer.source import Span
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.
 _Use: TypeAlias = tuple[object, ...]
+#: Rules about imports; their texts have the names that may have been meant.
+_ABOUT_IMPORTS = frozenset({"unknown-import", "module-not-installed"})
 #: Rules about the arguments of a function: names in it, and calls of it, follow from theirs.
 _ABOUT_SIGNATURES = frozenset({"handler-signature", "missing-self"})
 
@@ -89,7 +91,7 @@ def _follows(
         errors = context.once(earlier_errors)
         if not node.complete or node.name.value in errors.nodes:
             return True  # the port may be declared where the file is wrong
-    if _is_meant(problem, context, reported):
+    if _is_meant(problem, reported):
         return True
     if problem.family is Family.ARGUMENTS and any(
         item.rule.name in _ABOUT_SIGNATURES
@@ -109,17 +111,20 @@ def _has_reported(item: Diagnostic, problem: Problem) -> bool:
     return is_end or 0 <= start < item.primary.length
 
 
-def _is_meant(problem: Problem, context: Context, reported: Sequence[Diagnostic]) -> bool:
+def _is_meant(problem: Problem, reported: Sequence[Diagnostic]) -> bool:
     """Return whether a problem is there because of a wrong import or signature."""
-    file, name = problem.span.file.path, problem.span.text
-    if problem.family is Family.NAME and (file, name) in names_meant(context):
-        return True
-    return any(
-        item.rule.name in _ABOUT_SIGNATURES
-        and item.primary.file.path == file
-        and _is_within_function(problem.span, item.primary)
-        for item in reported
-    )
+    name = f"'{problem.span.text}'"
+    for item in reported:
+        if item.primary.file.path != problem.span.file.path:
+            continue
+        is_import = item.rule.name in _ABOUT_IMPORTS and problem.family is Family.NAME
+        module = item.message.split("'")[1] if is_import else ""
+        if is_import and (name in f"{item.message} {item.hint}" or module in (problem.hint or "")):
+            return True
+        is_signature = item.rule.name in _ABOUT_SIGNATURES
+        if is_signature and _is_within_function(problem.span, item.primary):
+            return True
+    return False
 
 
 def _is_within_function(span: Span, signature: Span) -> bool:

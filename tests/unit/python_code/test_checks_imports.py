@@ -33,7 +33,7 @@ def found(code: str, folder: Path) -> list[tuple[Family, str, str | None]]:
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     module = read_module(folder / "code.py", "code.py")
-    problems = (problem for problem, _ in import_problems(module, folder, interfaces()))
+    problems = import_problems(module, folder, interfaces())
     return [(item.family, item.span.text, item.hint) for item in problems]
 
 
