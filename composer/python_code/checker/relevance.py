@@ -139,6 +139,8 @@ class Relevance:
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
         owner = re.search(_OWNER, message)
         name = owner["owner"] if owner is not None else ""
+        if name == "property":
+            return False  # of a class instead of a message, which is reported where it is sent
         if isinstance(node, ast.Attribute):
             if node.attr.startswith("_") and not node.attr.startswith("__"):
                 return name in self.code.module.classes and node.attr not in self.attributes
