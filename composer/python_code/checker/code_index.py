@@ -17,8 +17,9 @@ _ERRORS = frozenset({"AttributeError", "NameError", "TypeError"})
 class CodeIndex:
     """The parts of a file: expressions by line, assignments, functions, classes and names.
 
-    ``assignments`` are the targets with their values. ``alternative_imports`` are names that
-    several imports bind, of which a condition selects one. ``passed_on`` are names that calls pass.
+    ``assignments`` are the targets with their values. ``alternatives`` are names that
+    several imports or classes bind, of which a condition may select one. ``passed_on`` are names
+    that calls pass.
     """
 
     def __init__(self, module: Module) -> None:
@@ -27,11 +28,10 @@ class CodeIndex:
         self.classes: list[ast.ClassDef] = []
         self.functions: list[Function] = []
         self.names: set[str] = set()
-        self.alternative_imports: set[str] = set()
+        self.alternatives = {*module.alternatives}
         self.passed_on: set[str] = set()
         self._expressions: dict[int, list[ast.expr]] = defaultdict(list)
         self._guarded: list[ast.Try] = []
-        self._imported: set[str] = set()
         for node in ast.walk(module.tree):
             if isinstance(node, ast.expr):
                 self._add_expression(node)
@@ -55,14 +55,12 @@ class CodeIndex:
             case ast.AnnAssign(target=target) | ast.AugAssign(target=target):
                 self.assignments.append((target, node, node.value))
             case ast.ClassDef():
+                if any(other.name == node.name for other in self.classes):
+                    self.alternatives.add(node.name)
                 self.classes.append(node)
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 self.functions.append(node)
                 self.names.update(argument.arg for argument in arguments_of(node))
-            case ast.Import(names=names) | ast.ImportFrom(names=names):
-                bound = {item.asname or item.name for item in names}
-                self.alternative_imports |= bound & self._imported
-                self._imported |= bound
             case ast.Try() if any(catches(item, _ERRORS) for item in node.handlers):
                 self._guarded.append(node)
 

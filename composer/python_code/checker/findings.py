@@ -103,7 +103,7 @@ def problems_of(
     owners = Owners(behaviors, interfaces)
     found: list[tuple[Node, BehaviorSource, Problem]] = []
     seen: set[tuple[str, str]] = set()
-    for finding, span, code, relevance in _relevant(findings, files, owners):
+    for finding, span, code, relevance in _relevant(findings, files):
         checked = files[finding.path]
         reader = _Reader(finding, checked, code, relevance, owners, span)
         problem = reader.problem()
@@ -117,7 +117,7 @@ def problems_of(
 
 
 def _relevant(
-    findings: Iterable[Finding], files: Mapping[str, CheckedFile], owners: Owners
+    findings: Iterable[Finding], files: Mapping[str, CheckedFile]
 ) -> Iterator[tuple[Finding, Span, CodeIndex, Relevance]]:
     """Yield the findings that matter, with their places in users' files."""
     by_path: dict[str, list[tuple[Finding, Span]]] = {}
@@ -131,12 +131,11 @@ def _relevant(
             by_path.setdefault(finding.path, []).append((finding, _span(finding, checked)))
     codes = {path: CodeIndex(files[path].copy.module) for path in by_path}
     attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
+    classes = frozenset(name for code in codes.values() for name in code.module.classes)
     for path, in_file in by_path.items():
         changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
         is_class = files[path].node.behavior is None
-        relevance = Relevance.of(
-            codes[path], changed, attributes, owners.messages, is_class=is_class
-        )
+        relevance = Relevance.of(codes[path], changed, attributes, classes, is_class=is_class)
         for finding, span in in_file:
             if relevance.keeps(finding, span):
                 yield finding, span, codes[path], relevance

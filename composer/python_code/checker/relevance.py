@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.code_index import CodeIndex, arguments_of
@@ -68,14 +68,14 @@ class Relevance:
     """Decides about the findings in one file.
 
     ``reassigned`` are the names and own attributes that get values of several types, ``attributes``
-    those that any class of the project defines.
+    those that any class of the project defines, ``classes`` their names.
     """
 
     code: CodeIndex
     is_class: bool  # an rclpy class, in contrast to a behavior
     reassigned: frozenset[str]
     attributes: frozenset[str]
-    messages: Container[str]
+    classes: frozenset[str]
 
     @classmethod
     def of(
@@ -83,7 +83,7 @@ class Relevance:
         code: CodeIndex,
         changed_lines: Iterable[int],
         attributes: frozenset[str],
-        messages: Container[str],
+        classes: frozenset[str],
         *,
         is_class: bool,
     ) -> Relevance:
@@ -91,7 +91,7 @@ class Relevance:
         targets = (dotted(x) for line in changed_lines for x, _ in code.assigned_at(line))
         names = (name.removeprefix("self.") for name in targets)
         reassigned = frozenset(name for name in names if name and "." not in name)
-        return cls(code, is_class, reassigned, attributes, messages)
+        return cls(code, is_class, reassigned, attributes, classes)
 
     def keeps(self, finding: Finding, span: Span) -> bool:
         """Return whether a finding points to a mistake."""
@@ -113,6 +113,8 @@ class Relevance:
         if kind not in _KINDS or re.search(_NUMPY, message) or self.code.is_guarded(span.line):
             return True
         names = self.code.names_in(span.line)
+        if not self.code.alternatives.isdisjoint(name.partition(".")[0] for name in names):
+            return True
         return not self.reassigned.isdisjoint(re.findall(r"\w+", span.text)) or any(
             self._has_several_classes(name, span.line) for name in names
         )
@@ -131,10 +133,7 @@ class Relevance:
             return False
         if not self.is_class or kind in _CERTAIN_KINDS or kind == "bad-assignment":
             return True
-        types = re.findall(r"`(\w+)`", message) if given is None else [given["given"]]
-        if given is None and (node is None or self._uses_annotated_argument(node)):
-            types = []
-        return kind in _KINDS_ABOUT_TYPES and (is_ros or any(map(self._is_message, types)))
+        return is_ros and kind in _KINDS_ABOUT_TYPES
 
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
         owner = re.search(_OWNER, message)
@@ -143,8 +142,8 @@ class Relevance:
             return False  # of a class instead of a message, which is reported where it is sent
         if isinstance(node, ast.Attribute):
             if node.attr.startswith("_") and not node.attr.startswith("__"):
-                return name in self.code.module.classes and node.attr not in self.attributes
-            if name in self.code.module.classes or name.startswith("Self@"):
+                return name in self.classes and node.attr not in self.attributes
+            if name in self.classes or name.startswith("Self@"):
                 changed = (item for _, item in self.code.assigned_at(node.lineno))
                 is_changed = any(isinstance(item, ast.AugAssign) for item in changed)
                 is_read = isinstance(node.ctx, ast.Load) or is_changed
@@ -167,18 +166,13 @@ class Relevance:
         for value in self.code.values_of(name, line):
             made = dotted(value.func) if isinstance(value, ast.Call) else ""
             last = made.rpartition(".")[2]
-            if made in self.code.alternative_imports:
+            if made in self.code.alternatives:
                 return True
             if isinstance(value, ast.Call) and last.startswith("create_"):
                 classes.add(ast.unparse(value.args[0]) if value.args else last)
             elif last[:1].isupper():
                 classes.add(made)
         return len(classes) > 1
-
-    def _is_message(self, name: str) -> bool:
-        """Return whether a class is a message, and not one of the project with such a name."""
-        imported = self.code.module.imports.get(name)
-        return name in self.messages and (imported is None or imported.module.endswith(".msg"))
 
     def _is_loose(self, match: re.Match[str], node: ast.expr | None, *, is_ros: bool) -> bool:
         """Return whether the value of an argument may have the right type after all."""
@@ -196,10 +190,6 @@ class Relevance:
         if given == "int" and isinstance(node, ast.Subscript):
             return True  # an element of a list that got other values later
         return self.is_class and given not in _BUILTINS and self._is_annotated_argument(node)
-
-    def _uses_annotated_argument(self, node: ast.expr) -> bool:
-        names = (item for item in ast.walk(node) if isinstance(item, ast.Name | ast.Attribute))
-        return any(map(self._is_annotated_argument, names))
 
     def _is_annotated_argument(self, node: ast.expr) -> bool:
         """Return whether a value is an argument, or stores one, whose annotation may be wrong."""
