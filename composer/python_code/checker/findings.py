@@ -219,6 +219,8 @@ class _Reader:
             return self._none()
         if named == "Coroutine":
             return self._unawaited_value()
+        if named == "property":
+            return None  # a class instead of a message, which is reported where it is sent
         node = self.code.expression_at(self.span)
         is_own = named in self.checked.copy.module.classes
         owner = None
