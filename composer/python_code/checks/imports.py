@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from itertools import islice
 from pathlib import Path
@@ -93,8 +95,9 @@ class _Imports:
 
     def __init__(self, module: Module, folder: Path, interfaces: Interfaces) -> None:
         self.module = module
-        self.folder = folder
         self.interfaces = interfaces
+        homes = dict.fromkeys((module.path.parent, folder))
+        self._projects = {home: Project.at(home) for home in homes}
         self._contents = cache(self._read_contents)
 
     def missing_modules(self, name: str) -> Iterator[tuple[str, _Missing]]:
@@ -174,14 +177,14 @@ class _Imports:
         """Return what a module of the project contains. Raises Unreadable."""
         name = module.lstrip(".")
         level = len(module) - len(name)
-        homes = [self.module.path.parent, self.folder]
-        folders = [*homes, *Project.at(self.folder).node_folders]
+        others = (path for project in self._projects.values() for path in project.node_folders)
+        folders = [*dict.fromkeys((*self._projects, *others))]
         file = None
         if level:
             folders = [*self.module.path.parents[level - 1 : level]]
             file = relative_module_file(name, level, self.module.path)
         elif name:
-            files = (local_module_file(name, home, Project.at(home)) for home in homes)
+            files = (local_module_file(name, *place) for place in self._projects.items())
             file = next(filter(None, files), None)
         defined = frozenset[str]()
         if file is not None:
@@ -191,11 +194,10 @@ class _Imports:
                 return None if own.dynamic else _Contents(defined, is_closed=True)
         elif name:
             return None
-        items = (item for folder in folders for item in islice(folder.glob("*"), _MAXIMUM_FILES))
-        listed = [x for x in items if x.suffix in (".py", *_COMPILED) or x.is_dir()]
-        if module and any(item.suffix in _COMPILED for item in listed):
+        listed = [name for folder in folders for name in _modules_in(folder)]
+        if module and any(Path(name).suffix in _COMPILED for name in listed):
             return None
-        return _Contents(defined.union(item.stem for item in listed), is_closed=False)
+        return _Contents(defined.union(Path(name).stem for name in listed), is_closed=False)
 
     def _home(self, module: str, names: Sequence[str]) -> str | None:
         """Return the only module that has all these interfaces: in the same package, or any."""
@@ -246,6 +248,16 @@ def _missing(message: str, name: str, known: Iterable[str], where: str = "") -> 
         if is_public and other[:2] == name[:2] and edit_distance(name, other) == 1:
             hint = f"did you mean '{other}'?"
     return _Missing(f"{message}{where}", hint, Family.NOT_INSTALLED)
+
+
+def _modules_in(folder: Path) -> list[str]:
+    """Return the names of the files and folders in a folder that may be modules."""
+    kinds = (".py", *_COMPILED)
+    with suppress(OSError), os.scandir(folder) as items:
+        return [
+            x.name for x in islice(items, _MAXIMUM_FILES) if x.name.endswith(kinds) or x.is_dir()
+        ]
+    return []
 
 
 def _has_file(name: str) -> bool:

@@ -143,6 +143,7 @@ class _Reader:
     project: Project
     modules: dict[Path, Module] = field(default_factory=dict)
     broken: dict[Path, BrokenModule] = field(default_factory=dict)
+    projects: dict[Path, Project] = field(default_factory=dict)
 
     def module(self, path: Path) -> Module:
         """Return a module, read once. Raises Unreadable."""
@@ -223,7 +224,11 @@ class _Reader:
                 if is_outside and self.project.holds(importer.path):
                     return None
             else:
-                path = find(name, home, Project.at(home)) or find(name, self.folder, self.project)
+                if home not in self.projects:
+                    self.projects[home] = Project.at(home)
+                places = {home: self.projects[home], self.folder: self.project}
+                files = (find(name, *place) for place in places.items())
+                path = next(filter(None, files), None)
             return self.module(path) if path is not None else None
         return None
 
