@@ -118,8 +118,8 @@ def _is_meant(problem: Problem, reported: Sequence[Diagnostic]) -> bool:
         if item.primary.file.path != problem.span.file.path:
             continue
         is_import = item.rule.name in _ABOUT_IMPORTS and problem.family is Family.NAME
-        module = item.message.split("'")[1] if is_import else ""
-        if is_import and (name in f"{item.message} {item.hint}" or module in (problem.hint or "")):
+        # A class without an import may be the one that was meant.
+        if is_import and (name in f"{item.message} {item.hint}" or name[1].isupper()):
             return True
         is_signature = item.rule.name in _ABOUT_SIGNATURES
         if is_signature and _is_within_function(problem.span, item.primary):
