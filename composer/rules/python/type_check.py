@@ -20,7 +20,7 @@ from composer.python_code.checker import RunningCheck, start
 from composer.python_code.nodes.behaviors import use_of
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource
-from composer.rules.python.families import RULE_OF, diagnostic, sources
+from composer.rules.python.families import diagnostic, sources
 from composer.source import Span
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.
@@ -103,12 +103,9 @@ def _follows(
 
 
 def _has_reported(item: Diagnostic, problem: Problem) -> bool:
-    """Return whether a rule has reported the same place, or the end of the same function."""
-    if not problem.span.is_on_line_of(item.primary):
-        return False
-    is_end = problem.family is Family.RETURN and item.rule is RULE_OF[Family.RETURN]
+    """Return whether a rule has reported the same place."""
     start = problem.span.column - item.primary.column
-    return is_end or 0 <= start < item.primary.length
+    return problem.span.is_on_line_of(item.primary) and 0 <= start < item.primary.length
 
 
 def _is_meant(problem: Problem, reported: Sequence[Diagnostic]) -> bool:
