@@ -20,7 +20,7 @@ from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.project import CheckedFile
 from composer.python_code.checker.pyrefly import Finding
-from composer.python_code.checker.relevance import Relevance, unguarded_value
+from composer.python_code.checker.relevance import Relevance, reassigned, unguarded_value
 from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource, Function
@@ -103,7 +103,7 @@ def problems_of(
     owners = Owners(behaviors, interfaces)
     found: list[tuple[Node, BehaviorSource, Problem]] = []
     seen: set[tuple[str, str]] = set()
-    for finding, span, code, relevance in _relevant(findings, files):
+    for finding, span, code, relevance in _relevant(findings, files, owners):
         checked = files[finding.path]
         reader = _Reader(finding, checked, code, relevance, owners, span)
         problem = reader.problem()
@@ -117,7 +117,7 @@ def problems_of(
 
 
 def _relevant(
-    findings: Iterable[Finding], files: Mapping[str, CheckedFile]
+    findings: Iterable[Finding], files: Mapping[str, CheckedFile], owners: Owners
 ) -> Iterator[tuple[Finding, Span, CodeIndex, Relevance]]:
     """Yield the findings that matter, with their places in users' files."""
     by_path: dict[str, list[tuple[Finding, Span]]] = {}
@@ -134,8 +134,14 @@ def _relevant(
     classes = frozenset(name for code in codes.values() for name in code.module.classes)
     for path, in_file in by_path.items():
         changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
-        is_class = files[path].node.behavior is None
-        relevance = Relevance.of(codes[path], changed, attributes, classes, is_class=is_class)
+        relevance = Relevance(
+            codes[path],
+            is_class=files[path].node.behavior is None,
+            reassigned=reassigned(codes[path], changed),
+            attributes=attributes,
+            classes=classes,
+            messages=owners.messages,
+        )
         for finding, span in in_file:
             if relevance.keeps(finding, span):
                 yield finding, span, codes[path], relevance
@@ -222,11 +228,9 @@ class _Reader:
         if named == "property":
             return None  # a class instead of a message, which is reported where it is sent
         node = self.code.expression_at(self.span)
-        is_own = named in self.checked.copy.module.classes
-        owner = None
-        if not is_own:
-            module = self.checked.copy.module
-            owner = self.owners.named(named, module, with_api=not self._is_class)
+        module = self.checked.copy.module
+        is_own = named in module.classes
+        owner = None if is_own else self.owners.named(named, module, with_api=not self._is_class)
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
         if owner is not None:
@@ -237,11 +241,13 @@ class _Reader:
             return None  # most objects take any attribute
         if not is_own:
             self.about.append(f"type {named}")
-        names = _members(self.code, named) if is_own else set[str]()
-        if is_own and not self._is_class:
-            names |= {item.removeprefix("self.") for item in self.owners.attributes}
+        names = self._members(named) if is_own else set[str]()
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
         return self._made(Family.ATTRIBUTE, f"'{named}' has no attribute '{name}'", hint)
+
+    def _members(self, class_name: str) -> set[str]:
+        api = () if self._is_class else self.owners.attributes
+        return {*_members(self.code, class_name), *(item.removeprefix("self.") for item in api)}
 
     def _unawaited_value(self) -> Problem:
         """Return the problem of a name that was assigned without 'await', where it was."""

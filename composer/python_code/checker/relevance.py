@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.code_index import CodeIndex, arguments_of
@@ -68,7 +68,7 @@ class Relevance:
     """Decides about the findings in one file.
 
     ``reassigned`` are the names and own attributes that get values of several types, ``attributes``
-    those that any class of the project defines, ``classes`` their names.
+    those that any class of the project defines, ``classes`` their names, ``messages`` those of ROS.
     """
 
     code: CodeIndex
@@ -76,22 +76,7 @@ class Relevance:
     reassigned: frozenset[str]
     attributes: frozenset[str]
     classes: frozenset[str]
-
-    @classmethod
-    def of(
-        cls,
-        code: CodeIndex,
-        changed_lines: Iterable[int],
-        attributes: frozenset[str],
-        classes: frozenset[str],
-        *,
-        is_class: bool,
-    ) -> Relevance:
-        """Return what decides in a file with assignments of several types in ``changed_lines``."""
-        targets = (dotted(x) for line in changed_lines for x, _ in code.assigned_at(line))
-        names = (name.removeprefix("self.") for name in targets)
-        reassigned = frozenset(name for name in names if name and "." not in name)
-        return cls(code, is_class, reassigned, attributes, classes)
+    messages: Container[str]
 
     def keeps(self, finding: Finding, span: Span) -> bool:
         """Return whether a finding points to a mistake."""
@@ -133,7 +118,8 @@ class Relevance:
             return False
         if not self.is_class or kind in _CERTAIN_KINDS or kind == "bad-assignment":
             return True
-        return is_ros and kind in _KINDS_ABOUT_TYPES
+        is_message = given is None and self._is_about_message(message, node)
+        return kind in _KINDS_ABOUT_TYPES and (is_ros or is_message)
 
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
         owner = re.search(_OWNER, message)
@@ -191,6 +177,15 @@ class Relevance:
             return True  # an element of a list that got other values later
         return self.is_class and given not in _BUILTINS and self._is_annotated_argument(node)
 
+    def _is_about_message(self, text: str, node: ast.expr | None) -> bool:
+        """Return whether a value is certainly a message, and not just annotated as one."""
+        parts = () if node is None else ast.walk(node)
+        values = [part for part in parts if isinstance(part, ast.expr)]
+        if not values or any(map(self._is_annotated_argument, values)):
+            return False
+        names = re.findall(r"`(\w+)`", text)
+        return any(name in self.messages and name not in self.classes for name in names)
+
     def _is_annotated_argument(self, node: ast.expr) -> bool:
         """Return whether a value is an argument, or stores one, whose annotation may be wrong."""
         name = dotted(node)
@@ -202,6 +197,13 @@ class Relevance:
             if f"self.{function.name}" not in self.code.passed_on  # rclpy decides about callbacks
             for argument in arguments_of(function)
         )
+
+
+def reassigned(code: CodeIndex, lines: Iterable[int]) -> frozenset[str]:
+    """Return the names and own attributes that get values of several types in ``lines``."""
+    targets = (dotted(target) for line in lines for target, _ in code.assigned_at(line))
+    names = (name.removeprefix("self.") for name in targets)
+    return frozenset(name for name in names if name and "." not in name)
 
 
 def _arity(function: str) -> int | None:

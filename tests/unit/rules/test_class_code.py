@@ -172,6 +172,7 @@ MISTAKES = [
         "QoSProfile(reliability=ReliabilityPolicy.RELIABLE)",
     ),
     ("point", "message.x", "unknown-field", "x"),
+    ("point", "message.point[0]", "type-error", "message.point[0]"),
     ("reset", "response.ok = True", "unknown-field", "ok"),
     ("reset", "request.data", "unknown-field", "data"),
     ("accept", "goal.target", "unknown-field", "target"),
