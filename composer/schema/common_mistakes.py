@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from composer.diagnostics import nearest, suggestion
@@ -91,8 +91,11 @@ def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
     return f"did you mean '{key}'?" if key is not None else suggestion(name, keys, limit=12)
 
 
-def value_advice(key: str | int | None, value: object) -> str | None:
-    """Return the hint for a ``value`` of the wrong type that another key is for, or None."""
+def value_advice(path: Sequence[str | int], value: object) -> str | None:
+    """Return the hint for a ``value`` of the wrong type at ``path``, or None."""
+    *_, parent, key = ("", "", *path)
+    if parent == "parameters" and isinstance(value, dict) and value:
+        return f"write a nested name with a dot: '{key}.{next(iter(value))}: ...'"
     items = value if isinstance(value, list) else [value]
     if key == "parameters" and any(isinstance(item, str) for item in items):
         return "list parameter files under 'parameter_files' of the system"

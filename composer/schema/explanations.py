@@ -247,8 +247,7 @@ def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]
     required = expected(error.schema)
     found = describe(error.place.tree)
     message = f"expected {required}{error.subject}, found {found}"
-    key = error.path[-1] if error.path else None
-    hint = value_advice(key, error.instance) or type_hint(error.schema, error.instance)
+    hint = value_advice(error.path, error.instance) or type_hint(error.schema, error.instance)
     yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
 
 

@@ -68,6 +68,14 @@ def profile(text: str) -> str:
             "wrong-type", "5", "expected a string for 'system', found the number 5", "quote it",
         ),
         (
+            "system: a\nnodes: {robot: {namespace: [b, c]}}",
+            "wrong-type", "[", "expected a string for 'namespace', found a list", "write 'b/c'",
+        ),
+        (
+            "system: a\nnodes: {robot: {type: arm, parameters: {gains: {p: 1.0}}}}",
+            "wrong-type", "{", "expected true or false, a number", "with a dot: 'gains.p: ...'",
+        ),
+        (
             "system: demo\nnodes:\n  - robot: {}",
             "wrong-type", "robot", "expected a map for 'nodes', found a list", "without a dash",
         ),
