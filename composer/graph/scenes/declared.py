@@ -105,11 +105,16 @@ def _with_duplicate(scene_node: SceneNode) -> SceneNode:
 
 
 def _note(node: Node, system: System, several: bool) -> str:
-    """Return the note of a node: its type if it differs from its name, its kind, its system."""
+    """Return the note of a node: its type if it differs from its name, its kind, its system.
+
+    A program that creates further nodes is noted with their number.
+    """
     type_name = node.type_name.value if node.type_name is not None else ""
     labels = type_name if type_name != node.ros_name.value else ""
     kind = node.implementation.value if node.implementation in _NOTED else ""
-    return " · ".join(filter(None, (labels, kind, system.name.value if several else "")))
+    others = len(node.inner_nodes)
+    more = f"with {others} more node{'s' * (others > 1)}" if others else ""
+    return " · ".join(filter(None, (labels, kind, more, system.name.value if several else "")))
 
 
 def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex) -> ScenePort:

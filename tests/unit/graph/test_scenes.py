@@ -159,3 +159,13 @@ def test_parameters_that_are_not_finite_are_yaml_text(tmp_path: Path) -> None:
     assert system is not None
     (vertex,) = build_graph(scene_of([system]), View.NODES).vertices
     assert dict(vertex.details)["parameters"] == {"a": "-.inf", "b": [".nan", ".inf", 2.0]}
+
+
+def test_nodes_in_a_program_are_noted() -> None:
+    system = system_of("""
+        system: robot
+        nodes: {base: {executable: {command: [base], nodes: [base, wheels, /lidar]}}}
+    """)
+    (base,) = build_graph(scene_of([system]), View.NODES).vertices
+    assert base.lines == ("base", "executable · with 2 more nodes")
+    assert dict(base.details)["inner_nodes"] == ["/wheels", "/lidar"]
