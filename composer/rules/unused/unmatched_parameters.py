@@ -8,7 +8,7 @@ from dataclasses import replace
 from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown, suggestion
 from composer.model import UnmatchedParameters
-from composer.names import namespace_problem
+from composer.names import namespace_problem, split_node_name
 from composer.source import Located
 from composer.spelling import is_typo
 
@@ -85,9 +85,12 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _is_misspelled(unmatched: UnmatchedParameters) -> bool:
-    """Return whether a section is most likely meant for a node of the system."""
+    """Return whether a section is most likely meant for a node, perhaps in another namespace."""
     name = unmatched.section.value
-    return unmatched.renamed is not None or any(is_typo(name, other) for other in unmatched.known)
+    last = split_node_name(name)[1]
+    return unmatched.renamed is not None or any(
+        is_typo(name, other) or split_node_name(other)[1] == last for other in unmatched.known
+    )
 
 
 def _message(unmatched: UnmatchedParameters) -> str:

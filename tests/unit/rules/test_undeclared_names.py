@@ -89,6 +89,11 @@ def test_remappings(node: str, expected: list[tuple[str, str]], tmp_path: Path) 
             "/a/b/arm: {ros__parameters: {a: 1}}",
             [("error", "wrong-type")],
         ),
+        (
+            f"{PROGRAM}, namespace: left",
+            "arm: {ros__parameters: {a: 1}}",
+            [("warning", "unmatched-parameters")],
+        ),
         (f"{WHEEL}, name: [hand]", "hand: {ros__parameters: {a: 1}}", [("error", "wrong-type")]),
         (
             f"{WHEEL}, namespace: [a, b]",
