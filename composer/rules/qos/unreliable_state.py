@@ -56,7 +56,7 @@ def check(context: Context) -> Iterator[Diagnostic]:
                     RULE,
                     "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
                     qos.policy_span("reliability"),
-                    hint="use 'reliable', or 'volatile'",
+                    hint="use 'reliable' or 'volatile', unless an external node requires both",
                 )
 
 
