@@ -34,7 +34,7 @@ from composer.resolve.nodes.node import (
 )
 from composer.resolve.nodes.node_names import NodeNames
 from composer.resolve.nodes.node_options import read_introspection, read_supervision
-from composer.resolve.nodes.node_parameters import sections_of
+from composer.resolve.nodes.node_parameters import sections_of, without_sections_of_others
 from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files
@@ -88,7 +88,9 @@ def resolve_system(
         processes_of_nodes(processes),
         diagnostics,
     )
-    nodes = tuple(resolve_node(entry, context) for entry in entries(tree.get("nodes")))
+    nodes = without_sections_of_others(
+        [resolve_node(entry, context) for entry in entries(tree.get("nodes"))]
+    )
     autostart = state(lifecycle.get("autostart"))
     delivery = choice(tree.get("delivery"), Delivery)
     system = System(

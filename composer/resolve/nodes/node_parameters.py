@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Map
+from collections.abc import Sequence
+from dataclasses import replace
 
 from composer.fast_dataclass import dataclass
-from composer.model import Parameter, ParameterSection, UnknownKey
+from composer.model import Node, Parameter, ParameterSection, UnknownKey
 from composer.resolve.declarations.parameters import (
     bare_parameter,
     undeclared,
@@ -106,3 +108,15 @@ def _all_sections(
     in_files = (section for section in given.in_files if section.name != last.name)
     sections = (ParameterSection(_FIRST_FOR_ALL, first), *in_files, last)
     return tuple(section for section in sections if section.parameters)
+
+
+def without_sections_of_others(nodes: Sequence[Node]) -> tuple[Node, ...]:
+    """Return the nodes; no program gets the parameters of a node of another entry."""
+    known = {name for node in nodes for name in (node.full_name, *node.inner_nodes)}
+
+    def without_others(node: Node) -> Node:
+        others = known - {node.full_name, *node.inner_nodes}
+        sections = (item for item in node.parameter_sections if item.name not in others)
+        return replace(node, parameter_sections=tuple(sections))
+
+    return tuple(without_others(node) if node.parameter_sections else node for node in nodes)

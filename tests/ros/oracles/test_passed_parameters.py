@@ -99,11 +99,11 @@ def node_of(folder: Path, name: str, implementation: str) -> Node:
     ("name", "full_name"),
     [
         ("renamed", "/robot/arm"),
-        ("renamed", "/robot/inner/node"),  # a node of its program with a name of its own
+        ("renamed", "/other"),  # a node of its program with a name of its own
         ("renamed", "/elsewhere"),
         ("kept", "/robot/base"),
         ("kept", "/robot/inner/node"),
-        ("kept", "/robot/arm"),
+        ("kept", "/other"),
     ],
 )
 def test_programs(name: str, full_name: str, tmp_path: Path, context: Context) -> None:
