@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache, partial
+
 from composer.diagnostics import Diagnostic
 from composer.model import (
     DEFAULT_SUPERVISION,
@@ -83,7 +85,7 @@ def resolve_system(
         system_supervision,
         tree.get("introspection"),
         files,
-        sections_of(files),
+        cache(partial(sections_of, files)),
         clock,
         processes_of_nodes(processes),
         diagnostics,

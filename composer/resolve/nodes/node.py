@@ -70,7 +70,7 @@ class SystemContext:
     supervision: Supervision
     introspection: Tree | None
     parameter_files: ParameterFiles
-    parameter_sections: tuple[ParameterSection, ...]  # all of the files
+    parameter_sections: Callable[[], tuple[ParameterSection, ...]]  # all of the files
     use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
     processes: Map[str, Located[str]]  # by the nodes that they name
     diagnostics: list[Diagnostic]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Map
-from collections.abc import Sequence
 from dataclasses import replace
 
 from composer.fast_dataclass import dataclass
@@ -28,12 +28,12 @@ class GivenValues:
     """The values for a node by parameter. A later field takes precedence.
 
     ``system`` is ``use_sim_time`` of the system, ``own`` are the values of the node's entry.
-    ``in_files`` are all sections of the files.
+    ``in_files()`` are all sections of the files.
     """
 
     system: Map[str, Entry]
     files: ParameterFiles
-    in_files: tuple[ParameterSection, ...]
+    in_files: Callable[[], tuple[ParameterSection, ...]]
     own: Map[str, Entry]
     command_line: Map[str, Entry]
 
@@ -105,7 +105,7 @@ def _all_sections(
         valued = (item for item in with_values(declared, values) if item.name.value in values)
         passed = map(bare_parameter, undeclared(declared, values))
         last = ParameterSection(_LAST_FOR_ALL, (*valued, *passed))
-    in_files = (section for section in given.in_files if section.name != last.name)
+    in_files = (section for section in given.in_files() if section.name != last.name)
     sections = (ParameterSection(_FIRST_FOR_ALL, first), *in_files, last)
     return tuple(section for section in sections if section.parameters)
 
