@@ -111,8 +111,12 @@ def _all_sections(
 
 
 def without_sections_of_others(nodes: Sequence[Node]) -> tuple[Node, ...]:
-    """Return the nodes; no program gets the parameters of a node of another entry."""
-    known = {name for node in nodes for name in (node.full_name, *node.inner_nodes)}
+    """Return the nodes; no program gets the parameters of a node of another entry.
+
+    An external node may be one of the program.
+    """
+    started = (node for node in nodes if node.external is None)
+    known = {name for node in started for name in (node.full_name, *node.inner_nodes)}
 
     def without_others(node: Node) -> Node:
         others = known - {node.full_name, *node.inner_nodes}

@@ -50,6 +50,7 @@ parameter_files: [first.yaml, second.yaml]
 nodes:
   renamed: {{name: arm, {}}}
   kept: {{executable: {{command: [python3, -V], nodes: [base, inner/node]}}}}
+  other: {{external: true, namespace: /}}
 """
 PROGRAM = "executable: {command: [python3, -V]}"
 
