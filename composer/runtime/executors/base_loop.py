@@ -107,12 +107,13 @@ class BaseLoop(ABC):
         for done in tuple(self._waits):
             done.set()
 
-    def begin_blocking(self) -> object:
+    def begin_blocking(self, *, expected: bool) -> Any:  # noqa: ARG002
         """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
         return None
 
-    def end_blocking(self, began: Any) -> None:  # noqa: B027  nothing to do is the default
-        """End a call of code that may block."""
+    def end_blocking(self, began: Any) -> bool:  # noqa: ARG002
+        """End a call of code that may block; return whether it has blocked."""
+        return False
 
     def hand_over_blocked(self) -> None:  # noqa: B027  nothing to do is the default
         """Let another thread serve the loop if a call that began to block has not ended."""

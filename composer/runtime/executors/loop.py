@@ -146,11 +146,14 @@ class Loop(Protocol):
         so that its other threads have to complete the future.
         """
 
-    def begin_blocking(self) -> object:
-        """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
+    def begin_blocking(self, *, expected: bool) -> Any:
+        """Begin a call of code that may block; return what :meth:`end_blocking` needs.
 
-    def end_blocking(self, began: Any) -> None:
-        """End a call of code that may block."""
+        If it is ``expected`` to block, another thread serves an event loop at once.
+        """
+
+    def end_blocking(self, began: Any) -> bool:
+        """End a call of code that may block; return whether it has blocked."""
 
     def hand_over_blocked(self) -> None:
         """Let another thread serve an event loop if a call that began to block has not ended.

@@ -15,6 +15,7 @@ import queue
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from math import inf
 from threading import get_ident
@@ -34,16 +35,23 @@ from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
 
 #: How long calls, then items of entities, are served before the next poll.
 _ROUND_S = 5e-4
+#: A call that is expected to block, and takes less, is not expected to next time.
+_BLOCKS_S = 0.005
 _MAX_FINAL_ROUNDS = 64  # of calls that other calls cause at shutdown
 
 
 class _Turn:
-    """The time in which one thread serves the loop. ``thread`` is its identifier."""
+    """The time in which one thread serves the loop.
 
-    __slots__ = ("thread",)
+    ``thread`` is its identifier. ``call`` is a call of code that may block, or None: an item that
+    is removed either by the thread, at the end of the call, or by the one that takes the turn away.
+    """
 
-    def __init__(self, thread: int = 0) -> None:
+    __slots__ = ("call", "thread")
+
+    def __init__(self, thread: int = 0, call: list[bool] | None = None) -> None:
         self.thread = thread
+        self.call = call
 
 
 class Scheduler(BaseLoop):
@@ -60,11 +68,9 @@ class Scheduler(BaseLoop):
         self._timer: ScheduledCall | None = None  # whose callback is being called
         self._sleeping = False
         self._turn = _Turn()
-        #: Callbacks whose threads have lost their turn, by the identifiers of the threads.
-        self._blocked: dict[int, object] = {}
-        #: Holds one item while the code of a class has the turn; removing it takes the turn away.
-        self._may_block: list[bool] = []
-        self._checked: list[bool] = []  # ``_may_block`` at the last check
+        #: The identifiers of threads in a callback that have lost their turn.
+        self._blocked: set[int] = set()
+        self._checked: list[bool] | None = None  # the call that had the turn at the last check
         self._handing_over = threading.Lock()
         self._turns: queue.SimpleQueue[_Turn | None] = queue.SimpleQueue()  # for idle threads
         self._idle: list[threading.Thread] = []
@@ -111,7 +117,7 @@ class Scheduler(BaseLoop):
     def busy_threads(self) -> tuple[int, ...]:
         """Return the identifiers of the threads that are in a callback now."""
         serving = () if self._running is None else (self._turn.thread,)
-        return (*serving, *self._blocked)
+        return (*serving, *tuple(self._blocked))
 
     def is_current(self) -> bool:
         """Return whether the calling thread belongs to the loop."""
@@ -119,31 +125,43 @@ class Scheduler(BaseLoop):
 
     # --- callbacks that block
 
-    def begin_blocking(self) -> list[bool] | None:
-        """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
-        if self._may_block or not self._has_turn():
-            return None
-        self._may_block = turn = [True]
-        return turn
+    def begin_blocking(self, *, expected: bool) -> list[bool] | float | None:
+        """Begin a call of code that may block; return what :meth:`end_blocking` needs.
 
-    def end_blocking(self, began: list[bool] | None) -> None:
-        """End a call of code that may block."""
+        If it is ``expected`` to block, another thread serves the loop at once.
+        """
+        turn = self._turn
+        if turn.call is not None or turn.thread != get_ident():
+            return None
+        if expected:
+            with self._handing_over:
+                self._hand_over()
+            return monotonic()
+        turn.call = call = [True]
+        return call
+
+    def end_blocking(self, began: list[bool] | float | None) -> bool:
+        """End a call of code that may block; return whether it has blocked."""
         if began is None:
-            return
+            return False
+        if isinstance(began, float):
+            return monotonic() - began > _BLOCKS_S
         try:
             began.pop()
         except IndexError:
             with self._handing_over:
-                pass  # until another thread has the turn
+                return True  # once another thread has the turn
+        self._turn.call = None
+        return False
 
     def hand_over_blocked(self) -> None:
-        """Take the turn away from a callback that had it at the last call of this method too."""
-        running = self._may_block
-        if running and running is self._checked:
-            with self._handing_over:
-                if running:
-                    self._hand_over()
-        self._checked = running
+        """Take the turn away from a call that had it at the last call of this method too."""
+        call = self._turn.call
+        if call and call is self._checked:
+            with self._handing_over, suppress(IndexError):  # it has just ended
+                call.pop()
+                self._hand_over()
+        self._checked = call
 
     def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
         """Block until ``future`` is done; return false if that takes longer, or the loop stops.
@@ -151,29 +169,28 @@ class Scheduler(BaseLoop):
         In a callback, another thread serves the loop meanwhile. The callback continues with its
         turn, so that it overlaps with no other callback of the loop.
         """
-        may_block = self._may_block
-        is_watched = bool(may_block)
         with self._handing_over:
             had_turn = self._has_turn() and not future.done()
+            call = self._turn.call
             if had_turn:
+                if call is not None:
+                    call.clear()
                 self._hand_over()
         try:
             return super().wait_for(future, timeout_s)
         finally:
             if had_turn:
-                self._resume(may_block if is_watched else None)
+                self._resume(call)
 
     def _has_turn(self) -> bool:
         return self._turn.thread == get_ident()
 
     def _hand_over(self) -> None:
         """Let another thread serve the loop from now on; its thread is in a callback."""
-        self._may_block.clear()
-        ident, running, timer = self._turn.thread, self._running, self._timer
-        self._blocked[ident] = running
-        self._running = self._timer = None
-        if timer is not None:
-            self._timers.reschedule(timer)
+        running = self._running
+        self._blocked.add(self._turn.thread)
+        self._running = None
+        self._end_timer()
         for group in list(self._groups.values()):
             if running in group.sources:
                 group.due = max(0, group.due - 1)  # the item that was taken
@@ -186,17 +203,24 @@ class Scheduler(BaseLoop):
         else:
             self._add_thread(turn).start()
 
-    def _resume(self, may_block: list[bool] | None) -> None:
+    def _end_timer(self) -> None:
+        """Schedule the next call of the timer whose callback is being called, if any."""
+        timer, self._timer = self._timer, None
+        if timer is not None:
+            self._timers.reschedule(timer)
+
+    def _resume(self, call: list[bool] | None) -> None:
         """Get the turn back from the thread that has it now, unless the loop stops."""
         has_turn = threading.Event()
         ident = get_ident()
 
         def resume() -> None:
-            self._running = self._blocked.pop(ident)
-            if may_block is not None:
-                may_block.append(True)
-                self._may_block = may_block
-            self._turn = _Turn(ident)
+            self._end_timer()
+            self._blocked.discard(ident)
+            self._running = resume  # not what it was: that has been accounted for
+            if call is not None:
+                call.append(True)
+            self._turn = _Turn(ident, call)
             has_turn.set()
 
         self._waits.add(has_turn)
@@ -262,7 +286,7 @@ class Scheduler(BaseLoop):
 
     def _next_turn(self) -> _Turn | None:
         """Return the turn of this thread, which has lost its last one; None if the loop stops."""
-        self._blocked.pop(get_ident(), None)
+        self._blocked.discard(get_ident())
         if self._has_turn():
             return self._turn
         self._idle.append(threading.current_thread())
@@ -273,11 +297,11 @@ class Scheduler(BaseLoop):
         timers, calls, poller = self._timers, self._calls, self._poller
         groups, ready = self._groups, self._ready
         yield_at_s = inf  # not known yet
-        while not self._stopping:
+        while self._turn is turn and not self._stopping:
             now_s = monotonic()
             if now_s >= timers.next_s:
                 self._run_timers(turn, now_s)
-            if calls:
+            if calls and self._turn is turn:
                 self._run_calls(turn)
             if self._turn is not turn:
                 return
@@ -315,8 +339,7 @@ class Scheduler(BaseLoop):
                     self._run_calls(turn)  # calls that it causes run before it is rescheduled
             finally:
                 if self._turn is turn:
-                    self._timer = None
-                    timers.reschedule(call)
+                    self._end_timer()
             if self._turn is not turn:
                 return
 
@@ -371,7 +394,7 @@ class Scheduler(BaseLoop):
                 break
 
     def _schedule(self, call: ScheduledCall) -> ScheduledCall:
-        if self._has_turn() and not self._may_block:
+        if self._has_turn() and self._turn.call is None:  # or the turn may be taken meanwhile
             self._timers.add(call)
         else:
             self.call_soon(partial(self._timers.add, call))

@@ -261,5 +261,5 @@ def changed_parameters(node: Any, declared: Mapping[str, Parameter]) -> dict[str
     }
 
 
-def _ignore() -> None:
+def _ignore(*, expected: bool) -> None:
     """Do not watch a call."""

@@ -61,6 +61,8 @@ class UserFunction:
         self._instance = instance
         self._function = function
         self.is_async = inspect.iscoroutinefunction(function)
+        #: Whether the last call, or the last step of a coroutine, has blocked.
+        self.blocks = False
         self.__name__ = getattr(function, "__name__", type(function).__name__)
         self.__qualname__ = getattr(function, "__qualname__", self.__name__)
 
@@ -68,7 +70,7 @@ class UserFunction:
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function. Raises what it raises."""
         before, _CURRENT.instance = _CURRENT.instance, self._instance
-        began = self._instance.begin_blocking()
+        began = self._instance.begin_blocking(expected=self.blocks)
         try:
             result = self._function(*arguments, **options)
         except SystemExit:
@@ -80,7 +82,7 @@ class UserFunction:
             self._context.log.debug(f"{self.__name__}: {error}")
             return None
         finally:
-            self._instance.end_blocking(began)
+            self.blocks = self._instance.end_blocking(began)
             _CURRENT.instance = before
             if self._instance.spun is not None:
                 self._instance.spun.set_result(None)
@@ -117,11 +119,11 @@ class _Steps:
     def enter(self) -> None:
         """Begin a step, at once."""
         self._before, _CURRENT.instance = _CURRENT.instance, self._instance
-        self._began = self._instance.begin_blocking()
+        self._began = self._instance.begin_blocking(expected=self.function.blocks)
 
     def leave(self) -> None:
         """End a step."""
-        self._instance.end_blocking(self._began)
+        self.function.blocks = self._instance.end_blocking(self._began)
         _CURRENT.instance = self._before
 
 

@@ -130,3 +130,19 @@ def test_a_class_gets_matches_before_the_activation_and_in_the_process(
         system.change("matched", "deactivate", "activate")
         peer.node.create_subscription(Int64, "out", print, 10)
         wait_until(lambda: matched.matches[2:] == [("publisher", 2)])
+
+
+def test_nothing_is_lost_while_callbacks_of_all_kinds_block(tmp_path: Path) -> None:
+    text = f'system: busy\nnodes: {{busy: {{class: "{CLASSES}:Busy"}}}}'
+    with running(text, tmp_path) as system:
+        busy = system.node("busy").instance
+        for _ in range(4):
+            calls, naps, numbers = busy.calls, busy.naps, len(busy.numbers)
+            wait_until(lambda: busy.calls > calls + 10, "calls")  # noqa: B023
+            wait_until(lambda: busy.naps > naps + 10, "naps")  # noqa: B023
+            wait_until(lambda: len(busy.numbers) > numbers + 100, "numbers")  # noqa: B023
+        received = tuple(busy.numbers)
+        counted = system.summary("/busy")
+    assert received == tuple(range(received[0], received[0] + len(received)))
+    assert busy.overlaps == 0
+    assert counted.errors == 0

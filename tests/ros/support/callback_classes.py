@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import signal
 import threading
 import time
@@ -238,3 +239,55 @@ class Matched(Node):
 
     def on_subscription(self, status: Any) -> None:
         self.matches.append(("subscription", status.current_count))
+
+
+class Busy(Node):
+    """Publishes, receives, calls itself and sleeps at random, in four callback groups."""
+
+    def __init__(self) -> None:
+        super().__init__("busy")
+        self.random = random.Random(1)
+        self.sent = self.calls = self.naps = self.overlaps = 0
+        self.numbers: list[int] = []
+        self.busy = False
+        shared = ReentrantCallbackGroup()
+        own = [MutuallyExclusiveCallbackGroup() for _ in range(3)]
+        self.publisher = self.create_publisher(Int64, "numbers", 10_000)
+        self.create_subscription(Int64, "numbers", self.on_number, 10_000, callback_group=own[0])
+        self.create_service(Trigger, "answer", self.on_answer, callback_group=shared)
+        self.client = self.create_client(Trigger, "answer", callback_group=shared)
+        self.create_timer(0.002, self.publish, callback_group=own[1])
+        self.create_timer(0.005, self.call, callback_group=own[2])
+        self.create_timer(0.005, self.nap, callback_group=shared)
+
+    def publish(self) -> None:
+        self.publisher.publish(Int64(data=self.sent))
+        self.sent += 1
+
+    def on_number(self, message: Int64) -> None:
+        self.overlaps += self.busy
+        self.busy = True
+        self.numbers.append(message.data)
+        chance = self.random.random()
+        if chance < 0.01:
+            time.sleep(0.05)
+        elif chance < 0.02:
+            self.client.call(Trigger.Request())
+        self.busy = False
+
+    def on_answer(self, _: Any, response: Any) -> Any:
+        if self.random.random() < 0.1:
+            time.sleep(0.05)
+        return response
+
+    def call(self) -> None:
+        self.client.call(Trigger.Request())
+        future = self.client.call_async(Trigger.Request())
+        rclpy.spin_until_future_complete(self, future)
+        self.calls += future.done()
+
+    def nap(self) -> None:
+        rate = self.create_rate(100)
+        rate.sleep()
+        self.destroy_rate(rate)
+        self.naps += 1
