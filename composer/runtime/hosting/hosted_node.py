@@ -35,7 +35,7 @@ from composer.runtime.hosting.instance import (
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.names import action_names, remapping_arguments
 from composer.runtime.hosting.shared_state import SharedState
-from composer.runtime.hosting.user_code import ThreadedCall, interrupt_callbacks
+from composer.runtime.hosting.user_code import ThreadedCall, end_callbacks
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class
 from composer.runtime.node.behavior_modules import plain_name
@@ -130,7 +130,7 @@ class HostedNode(LocalNode):
         if transition == "configure":
             self._report_missing(instance.ports)
         if transition in ("cleanup", "shutdown"):
-            interrupt_callbacks(instance)
+            await end_callbacks(instance)
             await self._in_thread(instance, partial(_end_as_by_signal, instance), "signal handler")
             await self._in_thread(instance, instance.node.destroy_node, "destroy_node")
 

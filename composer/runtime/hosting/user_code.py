@@ -20,6 +20,7 @@ from composer.runtime.executors.stacks import (
     stacks_of,
 )
 from composer.runtime.executors.strand import in_steps, scope_of
+from composer.runtime.executors.tasks import sleep
 
 if TYPE_CHECKING:
     from composer.runtime.callbacks.context import NodeContext
@@ -149,21 +150,36 @@ def interrupt(ident: int) -> str:
     return ""
 
 
+async def end_callbacks(instance: Instance) -> None:
+    """Wait a moment for the callbacks of an instance to return, then interrupt those that run."""
+    until_s = time.monotonic() + _RETURN_WITHIN_S
+    while running_callbacks(instance) and time.monotonic() < until_s:
+        await sleep(instance.context.loop, _PERIOD_S)
+    interrupt_callbacks(instance)
+
+
 def interrupt_callbacks(instance: Instance, function: UserFunction | None = None) -> None:
     """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
-    current = threading.get_ident()
-    busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
-    for ident, stack in busy.items():
-        with gc_paused():
-            called = [item for item in map(_function_of, stack) if item is not None]
-        name = next((item.__name__ for item in called if item.is_one(instance, function)), None)
-        if name is None:
-            continue
+    for ident, name in running_callbacks(instance, function):
         at = interrupt(ident)
         if (ident, name) not in instance.interrupted:
             instance.interrupted.add((ident, name))
             where = f"; it is at {at}" if at else ""
             instance.context.log.warn(f"{name} is interrupted{where}")
+
+
+def running_callbacks(
+    instance: Instance, function: UserFunction | None = None
+) -> list[tuple[int, str]]:
+    """Return the callbacks that other threads run: their threads' identifiers, and their names."""
+    current = threading.get_ident()
+    found: list[tuple[int, str]] = []
+    busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
+    for ident, stack in busy.items():
+        with gc_paused():
+            called = [item for item in map(_function_of, stack) if item is not None]
+        found += [(ident, item.__name__) for item in called if item.is_one(instance, function)][:1]
+    return found
 
 
 def _function_of(frame: FrameType) -> UserFunction | None:
@@ -215,3 +231,5 @@ class ThreadedCall:
 
 _ATTEMPTS = 50
 _PERIOD_S = 0.02
+#: How long a callback may go on when its node is cleaned up.
+_RETURN_WITHIN_S = 0.2
