@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -11,6 +12,7 @@ from typing import TypeVar
 from composer.analysis.class_ports import CREATORS, qos_profile
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
+from composer.importing.branches import conditions_of_calls, negated
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.model import BehaviorReference, PortKind
 from composer.project import Project
@@ -65,6 +67,7 @@ def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]
     reader = _ClassReader([], [], [])
     for scope in scopes_in(source.classes):
         reader.read(scope)
+    reader.add_conditions()
     own_module, own = source.classes[0]
     place = f"{shown_path(own_module.path)}:{own.span.line}"
     comments: tuple[str, ...] = (
@@ -120,13 +123,18 @@ class _ClassReader:
     parameters: list[FoundParameter]
     unknown: list[str]
     name: str = ""
+    #: The place and the condition, if any, of each call that creates something.
+    created: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    _condition: str = ""  # of the call that is being read
 
     def read(self, scope: Scope) -> None:
         """Read one method."""
+        conditions = {} if scope.function is None else conditions_of_calls(scope.function)
         for call in scope.nodes:
             if not isinstance(call, ast.Call):
                 continue
             place = f"{Path(scope.source.path).name}:{call.lineno}"
+            self._condition = conditions.get(call, "")
             name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
             full_name = scope.full_name(call.func)
             if name in CREATORS and full_name.startswith("self."):
@@ -165,9 +173,24 @@ class _ClassReader:
                 lambda: qos_profile(scope, given["qos_profile"]),
                 f"{place}: the QoS of {kind} {port_name}",
             )
-        known = {(port.kind, port.name) for port in self.ports}
-        if (kind, port_name) not in known:
+        self._remember(f"{kind} {port_name}", place)
+        types = {(port.kind, port.name): port.type for port in self.ports}
+        known = types.setdefault((kind, port_name), "")
+        if not known:
             self.ports.append(FoundPort(kind, port_name, port_type, qos, comments=(place,)))
+        elif known != port_type:
+            self.unknown.append(f"{place}: which type the {kind} {port_name} has: also {port_type}")
+
+    def _remember(self, what: str, place: str) -> None:
+        self.created.setdefault(what, []).append((place, self._condition))
+
+    def add_conditions(self) -> None:
+        """List what no call creates without a condition, nor calls on opposite conditions."""
+        for what, calls in self.created.items():
+            conditions = {condition for _, condition in calls}
+            if "" not in conditions and conditions.isdisjoint(map(negated, conditions)):
+                place, condition = calls[0]
+                self.unknown.append(f"{place}: whether there is the {what}: only if {condition}")
 
     def _add_parameter(self, scope: Scope, call: ast.Call, place: str) -> None:
         given = _arguments(call, ("name", "value", "descriptor"))
@@ -217,8 +240,13 @@ class _ClassReader:
             kind = _type_of_node(scope, value_node)
         if kind is None:
             self.unknown.append(f"{place}: the type of parameter {name}")
-        elif name not in {item.name for item in self.parameters}:
-            self.parameters.append(FoundParameter(name, kind, value, settings, (place,)))
+        else:
+            self._remember(f"parameter {name}", place)
+            self._add_first(FoundParameter(name, kind, value, settings, (place,)))
+
+    def _add_first(self, parameter: FoundParameter) -> None:
+        if parameter.name not in {item.name for item in self.parameters}:
+            self.parameters.append(parameter)
 
     def _try(self, read: Callable[[], T], what: str) -> T | None:
         """Return ``read()``; if only running would show it, add ``what`` to the unknown."""

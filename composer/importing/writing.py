@@ -123,12 +123,14 @@ def _declarations(node: FoundNode, path: tuple[str, ...], comments: _Comments) -
         for item in node.parameters:
             if item.comments:
                 comments[*path, "parameters", item.name] = item.comments
+    keys: set[str] = set()  # a key is the name of one port of the node, whatever its kind
     for kind, section in _SECTIONS.items():
         ports = [port for port in node.ports if port.kind is kind]
         written: dict[str, Plain] = {}
         for port in ports:
             relative = _relative(port.name, node) if path else port.name
-            key = _free(_key(_last_part(relative), relative), written)
+            key = _free(_key(_last_part(relative), relative), keys)
+            keys.add(key)
             written[key] = _port(port, relative, key)
             if port.comments:
                 comments[*path, section, key] = port.comments

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
-from composer.interfaces import InvalidDefinition
+from composer.interfaces import Interfaces, InvalidDefinition
 from composer.interfaces.index import similar_interface
+from composer.interfaces.sources import FOLDERS
 from composer.model import Port
 from composer.source import shown_path
 
@@ -66,6 +67,16 @@ def _invalid(context: Context, port: Port, problem: InvalidDefinition) -> Diagno
         return Diagnostic(RULE, str(problem), used, hint=f"see {shown(problem.place, limit=300)}")
     label = Label(used, f"'{port.name}' has this type")
     return Diagnostic(RULE, str(problem), problem.span, (label,), problem.hint)
+
+
+def invalid_definitions(interfaces: Interfaces, packages: Collection[str]) -> Iterator[Diagnostic]:
+    """Check all definitions of some packages of a project, whether a system uses them or not."""
+    for folder in FOLDERS:
+        for name in interfaces.names(folder):
+            if name.partition("/")[0] in packages and interfaces.find(name) is None:
+                problem = interfaces.problem(name)
+                if problem is not None:
+                    yield Diagnostic(RULE, str(problem), problem.span, hint=problem.hint)
 
 
 def _word(port: Port) -> str:

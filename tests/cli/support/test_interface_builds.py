@@ -31,4 +31,24 @@ def test_packages_for_colcon_need_no_wheels(
     assert "'generated' exists already" in done.err
     status.write_text("strng text\n")
     done = compose("interfaces", "build")
-    assert done.err.endswith("Status.msg:1: 'strng' is neither a primitive type nor a message\n")
+    assert "'strng' is neither a primitive type nor a message" in done.err
+    assert "Status.msg:1:1\n" in done.err
+
+
+def test_definitions_are_checked_before_anything_is_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "composer.yaml").write_text("interfaces: [interfaces]\n")
+    for name, definition in (("my_msgs", "Header header"), ("good_msgs", "float32 speed")):
+        package = tmp_path / "interfaces" / name
+        (package / "msg").mkdir(parents=True)
+        (package / "package.xml").write_text(f"<package><name>{name}</name></package>\n")
+        (package / "msg" / "Speed.msg").write_text(f"{definition}\n")
+    done = compose("interfaces", "build")
+    assert (done.code, done.out) == (1, "")
+    assert "interfaces/my_msgs/msg/Speed.msg:1:1\n" in done.err
+    assert "did you mean 'std_msgs/Header'?" in done.err
+    assert not (tmp_path / "build").exists()
+    done = compose("interfaces", "build", "good_msgs", "--generate", "complete")
+    assert (done.code, done.out) == (0, "good_msgs: complete\n")

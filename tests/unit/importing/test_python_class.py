@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from composer.diagnostics import Severity
 from composer.importing import write_node_type
 from composer.importing.python_class import ClassNotFound, describe_class
+from composer.loading import load
+from composer.model import PortKind
 
 DRIVER = """\
 import sys
@@ -133,3 +136,62 @@ def test_a_source_folder_with_the_name_of_rclpy_is_read(tmp_path: Path) -> None:
     (folder / "driver.py").write_text(DRIVER, encoding="utf-8")
     node, _ = describe_class("driver:Lidar", folder)
     assert node.ports
+
+
+BRANCHES = """\
+import os
+from rclpy.node import Node
+from std_msgs.msg import Int32, String
+
+
+class Guard(Node):
+    def __init__(self):
+        super().__init__("guard")
+        self.create_subscription(String, "words", print, 10)
+        self.create_publisher(String, "words", 10)
+        if os.environ.get("DEBUG"):
+            self.create_publisher(String, "debug", 10)
+            self.declare_parameter("depth", 1)
+        elif self.name:
+            self.create_publisher(String, "both", 10)
+        else:
+            self.create_publisher(Int32, "both", 10)
+        try:
+            self.create_publisher(String, "tried", 10)
+        except (ValueError, KeyError):
+            self.create_publisher(String, "fallback", 10)
+        match self.name:
+            case "a":
+                self.create_publisher(String, "matched", 10)
+        for name in ():
+            self.create_publisher(String, "looped", 10)
+        self.ready() and self.create_publisher(String, "ready", 10)
+        pub = self.create_publisher(String, "x", 10) if self.name else None
+        if not self.name:
+            return
+        self.create_publisher(String, "last", 10)
+"""
+
+
+def test_what_depends_on_branches_is_listed_and_ports_of_one_name_are_two(tmp_path: Path) -> None:
+    (tmp_path / "guard.py").write_text(BRANCHES)
+    node, unknown = describe_class("guard:Guard", tmp_path)
+    assert unknown == (
+        "guard.py:17: which type the publisher both has: also std_msgs/msg/Int32",
+        "guard.py:12: whether there is the publisher debug: only if os.environ.get('DEBUG')",
+        "guard.py:13: whether there is the parameter depth: only if os.environ.get('DEBUG')",
+        "guard.py:21: whether there is the publisher fallback: "
+        "only if (ValueError, KeyError) is raised",
+        "guard.py:24: whether there is the publisher matched: only if self.name matches 'a'",
+        "guard.py:27: whether there is the publisher ready: only if self.ready()",
+        "guard.py:28: whether there is the publisher x: only if self.name",
+        "guard.py:31: whether there is the publisher last: only if self.name",
+    )
+    path = tmp_path / "guard.yaml"
+    path.write_text(write_node_type("guard", node))
+    result = load(path)
+    assert [item for item in result.diagnostics if item.severity is Severity.ERROR] == []
+    assert result.system is not None
+    (guard,) = result.system.nodes
+    words = {port.name.value: port.kind for port in guard.ports if port.full_name == "/words"}
+    assert words == {"words": PortKind.PUBLISHER, "words_2": PortKind.SUBSCRIPTION}

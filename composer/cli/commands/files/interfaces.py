@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from composer.cli.support.errors import CommandError
+from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.options import examples
-from composer.cli.support.output.terminal import lines, write
+from composer.cli.support.output.terminal import lines, say_raw, use_color, write
 
 app = typer.Typer(
     help="""Build the interface packages of the project.
@@ -76,6 +77,7 @@ def build(
 
     project = Project.at(Path.cwd())
     found = _found(project.interface_folders, packages or [], install=generate is None)
+    _check(project.interface_folders, found)
     if generate is not None:
         if generate.exists():
             raise CommandError(f"'{generate}' exists already", hint="choose a new folder")
@@ -92,6 +94,19 @@ def build(
             complete_package(name, folder, source)
         install_package(name, source)
         write(lines([f"{name}: installed"]))
+
+
+def _check(folders: tuple[Path, ...], packages: dict[str, Path | None]) -> None:
+    """Check the definitions of the packages as 'compose validate' does. Raises typer.Exit."""
+    from composer.interfaces import Interfaces
+    from composer.report.text import render
+    from composer.rules.messages.unknown_interface import invalid_definitions
+
+    own = [name for name, folder in packages.items() if folder is not None]
+    diagnostics = list(invalid_definitions(Interfaces.load(folders), own))
+    if diagnostics:
+        say_raw(render(diagnostics, color=use_color(sys.stderr)))
+        raise typer.Exit(FAILED)
 
 
 def _found(
