@@ -12,7 +12,7 @@ def conditions_of_calls(function: ast.AST) -> dict[ast.Call, str]:
     """Return the innermost condition of each call that may not be made, as code.
 
     A call in an exception handler depends on an exception. What follows a branch that returns
-    depends on its condition as well. Loops are no conditions.
+    depends on its condition as well. A loop is not a condition.
     """
     return dict(_in_node(function, ""))
 
