@@ -29,7 +29,7 @@ def describe_launch_file(
         _node(item, node_name, left_out)
         for item, node_name in zip(found["nodes"], names, strict=True)
     )
-    sections = _sections(found["nodes"], {node.full_name for node in nodes}, left_out)
+    sections = _sections(found["nodes"], left_out)
     command = " ".join(["compose import launch", path, *arguments])
     return FoundSystem(
         name,
@@ -166,20 +166,28 @@ def _declared(
 
 
 def _sections(
-    nodes: Iterable[Mapping[str, Any]], started: set[str], left_out: list[str]
+    items: Iterable[Mapping[str, Any]], left_out: list[str]
 ) -> dict[str, dict[str, Plain]]:
     """Return the parameters of the nodes that the launch file does not name, by full names.
 
-    Programs may create them. A system has one set of parameters for each name.
+    Programs may create them. A system has one set of parameters for each name, so what only some
+    programs give to that name is left out.
     """
-    found: dict[str, dict[str, Plain]] = {}
-    for item in nodes:
+    named = {join_node_name(item["namespace"], item["name"]) for item in items if item["name"]}
+    given: dict[str, list[Mapping[str, Plain]]] = {}
+    for item in items:
         for name, values in item["sections"].items():
-            if name in started or not values:
-                continue
-            if found.get(name, values) != values:
-                left_out.append(
-                    f"parameters of {name}: they differ, and are joined for all programs"
-                )
-            found[name] = found.get(name, {}) | values
+            if name not in named:
+                given.setdefault(name, []).append(values)
+    found: dict[str, dict[str, Plain]] = {}
+    for name, (first, *others) in given.items():
+        shared = {
+            key: value
+            for key, value in first.items()
+            if all(key in values and values[key] == value for values in others)
+        }
+        if lost := sorted({key for values in (first, *others) for key in values} - shared.keys()):
+            left_out.append(f"parameters of {name} in some programs only: {', '.join(lost)}")
+        if shared:
+            found[name] = shared
     return found

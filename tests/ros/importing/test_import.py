@@ -141,7 +141,7 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
         "  process: true",
         "  prefix: nice (of /driver)",
         "  on_exit: LogInfo (of /driver)",
-        "  parameters of /wheel/left: they differ, and are joined for all programs",
+        "  parameters of /wheel/left in some programs only: use_sim_time",
         "  parameters of /wheel/left: with --output, a file has them",
     ]
     assert (
@@ -174,7 +174,7 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
     written = tmp_path / "robot.yaml"
     assert compose("import", "launch", file, "-o", written).returncode == 0
     assert (
-        "  ros__parameters: {use_sim_time: true, x: 1, radius: 0.1}\n"
+        "  ros__parameters: {x: 1, radius: 0.1}\n"
         in (tmp_path / "robot_parameters.yaml").read_text()
     )
     assert compose("validate", written).returncode == 0

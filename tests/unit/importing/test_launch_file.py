@@ -166,3 +166,15 @@ nodes:
     remappings: {x: /y}
 """
     )
+
+
+def test_sections_are_for_names_that_the_launch_file_does_not_give() -> None:
+    report = [
+        node("base", sections={"/wheel": {"a": 1, "map": "m"}, "/arm": {"b": 2}}),
+        node("arm", sections={"/base": {"c": 3}, "/wheel": {"a": 1}}),
+        node(None, executable="wheel", sections={"/wheel": {"a": 1}, "/base": {"c": 3}}),
+    ]
+    found = describe_launch_file("s", "f.launch.py", (), {"nodes": report, "left_out": []})
+    assert [item.name for item in found.nodes] == ["base", "arm", "wheel"]
+    assert found.sections == {"/wheel": {"a": 1}}
+    assert found.left_out == ("parameters of /wheel in some programs only: map",)
