@@ -155,10 +155,16 @@ class _Edits:
                 self._insert(*end, _type_arguments(argument.annotation, type_))
             elif type_ and argument.arg not in assigned and index < without_default:
                 self._insert(*end, f": {type_}")
-        if function.returns is None and signature.result not in ("", "None"):
-            place = _end_of_signature(function, self.lines)
-            if place is not None:
-                self.insertions.append((*place, f" -> {signature.result}"))
+        if signature.result in ("", "None"):
+            return
+        place = _end_of_signature(function, self.lines)
+        if function.returns is None and place is not None:
+            self.insertions.append((*place, f" -> {signature.result}"))
+        elif function.returns is not None and is_none(function.returns):  # by habit
+            number, line = function.returns.lineno, self.lines[function.returns.lineno - 1]
+            start = characters(line, function.returns.col_offset)
+            self.lines[number - 1] = f"{line[:start]}    {line[start + 4 :]}"
+            self.insertions.append((number, start, signature.result))
 
     def _insert(self, line: int, size_bytes: int, text: str) -> None:
         if not text:

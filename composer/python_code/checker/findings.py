@@ -24,7 +24,7 @@ from composer.python_code.checker.relevance import Relevance, reassigned, unguar
 from composer.python_code.nodes.behaviors import API_CLASSES
 from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource, Function
-from composer.python_code.source.trees import dotted, name_span, span_of
+from composer.python_code.source.trees import dotted, is_none, name_span, span_of
 from composer.python_code.stubs.folder import LIBRARIES
 from composer.source import Span
 
@@ -387,7 +387,8 @@ class _Reader:
     def _missing_return(self, function: Function) -> Problem | None:
         expected = _plain(self.finding.message.split("`")[1])
         part = _last_word(expected)
-        if part == "Result" and not self._is_class and function.returns is None:
+        is_open = function.returns is None or is_none(function.returns)
+        if part == "Result" and not self._is_class and is_open:
             return None  # the composer sends an empty result
         what, value = _RESULTS.get(part, (expected, ""))
         if function.name.startswith("accept_"):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.unit.support.behavior_code import SYSTEM, code_with
 from tests.unit.support.checking import quoted
 from tests.unit.support.python_cases import diagnostics_of
@@ -384,11 +386,12 @@ def test_each_mistake_is_reported_once_where_it_is(tmp_path: Path) -> None:
     ]
 
 
-def test_a_service_without_a_response(tmp_path: Path) -> None:
-    code = code_with("reset", "if request:\n    return response").replace(
-        "return response\n\n    async", "pass\n\n    async"
-    )
-    [[found]] = diagnostics_of(SYSTEM, [code], tmp_path)
+@pytest.mark.parametrize("annotation", ["", " -> None"])
+def test_a_service_without_a_response(annotation: str, tmp_path: Path) -> None:
+    right = code_with("reset", "pass").replace("response):", f"response){annotation}:")
+    wrong = right.replace("return response", "pass")
+    [correct, [found]] = diagnostics_of(SYSTEM, [right, wrong], tmp_path)
+    assert correct == []
     message = "'on_reset' must return the response, but may end without a 'return'"
     assert (found.message, found.hint, quoted(found)) == (
         message,
