@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from composer.analysis.context import Context
-from composer.python_code.nodes import behaviors as of_behaviors
-from composer.python_code.nodes import classes as of_classes
-from composer.python_code.nodes.behaviors import NodeBehavior
-from composer.python_code.nodes.classes import ClassOfNode
+from composer.python_code.nodes.behaviors import use_of
+from composer.python_code.nodes.classes import ClassOfNode, NodeClass, node_classes
 
 
-def behaviors(context: Context) -> tuple[NodeBehavior, ...]:
+def behaviors(context: Context) -> tuple[NodeClass, ...]:
     """Return every node that names a behavior, with its source."""
-    return context.once(_behaviors)
+    return tuple(item for item in context.once(_classes) if item[0].behavior is not None)
 
 
-def distinct_behaviors(context: Context) -> tuple[NodeBehavior, ...]:
+def distinct_behaviors(context: Context) -> tuple[NodeClass, ...]:
     """Return one node for each behavior and each set of ports, timers and parameters."""
-    return context.once(_distinct_behaviors)
+    first: dict[object, NodeClass] = {}
+    for node, source in behaviors(context):
+        first.setdefault(use_of(node, source), (node, source))
+    return tuple(first.values())
 
 
 def hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:
     """Return every node with a class, and the source of the class."""
-    return context.once(_hosted_classes)
+    return tuple(
+        ClassOfNode(node, node.hosted_class, source)
+        for node, source in context.once(_classes)
+        if node.hosted_class is not None and node.behavior is None
+    )
 
 
 def distinct_classes(context: Context) -> tuple[ClassOfNode, ...]:
@@ -32,16 +37,5 @@ def distinct_classes(context: Context) -> tuple[ClassOfNode, ...]:
     return tuple(first.values())
 
 
-def _behaviors(context: Context) -> tuple[NodeBehavior, ...]:
-    return of_behaviors.behaviors(context.system)
-
-
-def _distinct_behaviors(context: Context) -> tuple[NodeBehavior, ...]:
-    first: dict[object, NodeBehavior] = {}
-    for node, source in behaviors(context):
-        first.setdefault(of_behaviors.use_of(node, source), (node, source))
-    return tuple(first.values())
-
-
-def _hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:
-    return of_classes.hosted_classes(context.system)
+def _classes(context: Context) -> tuple[NodeClass, ...]:
+    return node_classes(context.system)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import TypeAlias
 
 from composer import behavior
 from composer.fast_dataclass import dataclass
-from composer.model import Node, Port, PortKind, System
-from composer.python_code.source import BehaviorSource, Method, find_behavior
-from composer.resolve.tree_values import is_opaque
+from composer.model import Node, Port, PortKind
+from composer.python_code.source import BehaviorSource, Method
 from composer.source import Located
 
 #: The classes that behaviors may import from ``composer.behavior``.
@@ -20,9 +17,6 @@ API_CLASSES = frozenset(
     for name, item in vars(behavior).items()
     if isinstance(item, type) and item.__module__ == behavior.__name__
 )
-#: A node that names a behavior, and the source of the behavior.
-NodeBehavior: TypeAlias = tuple[Node, BehaviorSource]
-
 #: Handlers that every behavior may have, with the arguments they are called with.
 GENERAL_HANDLERS: Mapping[str, tuple[str, ...]] = {
     "on_configure": (),
@@ -56,21 +50,6 @@ class Handler:
     kind: str  # "subscription", "timer", ...
     arguments: tuple[str, ...]
     needed: bool
-
-
-def behaviors(system: System) -> tuple[NodeBehavior, ...]:
-    """Return every node that names a behavior, with its source; each file is read once."""
-    read: dict[tuple[str, Path], BehaviorSource] = {}
-    pairs = []
-    for node in system.nodes:
-        reference = node.behavior
-        if reference is None or not reference.class_name or is_opaque(reference.text.value):
-            continue  # a missing class is reported by a rule
-        key = (reference.text.value, reference.folder)
-        if key not in read:
-            read[key] = find_behavior(reference)
-        pairs.append((node, read[key]))
-    return tuple(pairs)
 
 
 def use_of(node: Node, source: BehaviorSource) -> tuple[object, ...]:

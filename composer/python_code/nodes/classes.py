@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
+from typing import TypeAlias
 
 from composer.diagnostics import Diagnostic, Label, Rule
 from composer.fast_dataclass import dataclass
@@ -19,6 +20,10 @@ _CONDITIONAL = (
     *(ast.If, ast.IfExp, ast.BoolOp, ast.Match, ast.Try, ast.TryStar, ast.With),
     *(ast.For, ast.While, ast.ListComp, ast.GeneratorExp),
 )
+
+
+#: A node, and the source of its behavior or class.
+NodeClass: TypeAlias = tuple[Node, BehaviorSource]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +61,19 @@ class ClassOfNode:
         return Diagnostic(rule, message, self.span, related=related, hint=hint)
 
 
-def hosted_classes(system: System) -> tuple[ClassOfNode, ...]:
-    """Return every node with a class and the source of it; each class is read once."""
+def node_classes(system: System) -> tuple[NodeClass, ...]:
+    """Return every node with a behavior or a class, and its source; each class is read once."""
     read: dict[tuple[str, Path], BehaviorSource] = {}
     classes = []
     for node in system.nodes:
-        hosted = node.hosted_class
-        if hosted is None or node.external is not None:
+        hosted = node.hosted_class if node.external is None else None
+        reference = node.behavior or (hosted.reference if hosted is not None else None)
+        if reference is None or is_opaque(reference.text.value):
             continue
-        reference = hosted.reference
-        if is_opaque(reference.text.value) or not (reference.module and reference.class_name):
-            continue
+        if not (reference.module and reference.class_name):
+            continue  # a rule reports it
         key = (reference.text.value, reference.folder)
         if key not in read:
             read[key] = find_behavior(reference)
-        classes.append(ClassOfNode(node, hosted, read[key]))
+        classes.append((node, read[key]))
     return tuple(classes)
