@@ -131,7 +131,7 @@ def _relevant(
             by_path.setdefault(finding.path, []).append((finding, _span(finding, checked)))
     codes = {path: CodeIndex(files[path].copy.module) for path in by_path}
     attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
-    classes = frozenset(name for code in codes.values() for name in code.module.classes)
+    classes = frozenset(name for item in files.values() for name in item.copy.module.classes)
     for path, in_file in by_path.items():
         changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
         relevance = Relevance(

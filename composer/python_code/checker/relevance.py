@@ -118,7 +118,10 @@ class Relevance:
             return False
         if not self.is_class or kind in _CERTAIN_KINDS or kind == "bad-assignment":
             return True
-        is_message = given is None and self._is_about_message(message, node)
+        if given is not None:
+            is_message = self._is_message(given["given"])
+        else:
+            is_message = self._is_about_message(message, node)
         return kind in _KINDS_ABOUT_TYPES and (is_ros or is_message)
 
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
@@ -183,8 +186,10 @@ class Relevance:
         values = [part for part in parts if isinstance(part, ast.expr)]
         if not values or any(map(self._is_annotated_argument, values)):
             return False
-        names = re.findall(r"`(\w+)`", text)
-        return any(name in self.messages and name not in self.classes for name in names)
+        return any(map(self._is_message, re.findall(r"`(\w+)`", text)))
+
+    def _is_message(self, name: str) -> bool:
+        return name in self.messages and name not in self.classes
 
     def _is_annotated_argument(self, node: ast.expr) -> bool:
         """Return whether a value is an argument, or stores one, whose annotation may be wrong."""
