@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from composer.python_code.source import Function, Module
 from composer.python_code.source.trees import catches, dotted, positional_arguments, span_of
@@ -91,12 +91,6 @@ class CodeIndex:
     def assigned_at(self, line: int) -> list[tuple[ast.expr, ast.stmt]]:
         """Return the targets that a line assigns, with the statements."""
         return [(target, node) for target, node, _ in self.assignments if _holds(node, line)]
-
-    def names_assigned_at(self, lines: Iterable[int]) -> frozenset[str]:
-        """Return the names and own attributes that lines assign."""
-        targets = (dotted(target) for line in lines for target, _ in self.assigned_at(line))
-        names = (name.removeprefix("self.") for name in targets)
-        return frozenset(name for name in names if name and "." not in name)
 
     def values_of(self, name: str, line: int) -> list[ast.expr]:
         """Return the values of a local name or own attribute that a line may see."""

@@ -115,8 +115,9 @@ def _is_meant(problem: Problem, reported: Sequence[Diagnostic]) -> bool:
         if item.primary.file.path != problem.span.file.path:
             continue
         is_import = item.rule.name in _ABOUT_IMPORTS and problem.family is Family.NAME
-        # A class without an import may be the one that was meant.
-        if is_import and (name in f"{item.message} {item.hint}" or name[1].isupper()):
+        # A class that is not imported may be the one that was meant.
+        is_class = name[1].isupper() and item.rule.name == "unknown-import"
+        if is_import and (is_class or name in f"{item.message} {item.hint}"):
             return True
         is_signature = item.rule.name in _ABOUT_SIGNATURES
         if is_signature and _is_within_function(problem.span, item.primary):
