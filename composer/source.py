@@ -52,12 +52,6 @@ class Span:
         """Return whether both begin on the same line of a file."""
         return (self.file.path, self.line) == (other.file.path, other.line)
 
-    def overlaps(self, other: Span) -> bool:
-        """Return whether both have a character in common."""
-        is_before_end = self.column < other.column + other.length
-        is_after_start = other.column < self.column + self.length
-        return self.is_on_line_of(other) and is_before_end and is_after_start
-
     @property
     def text(self) -> str:
         """What stands there, without the quotation marks around it."""

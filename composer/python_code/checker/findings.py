@@ -313,7 +313,7 @@ class _Reader:
         """Return the problem of a value that does not fit a field."""
         type_ = self.owners.field_type(interface, name) or "something else"
         value = _plain(given)
-        hint = "add '.to_msg()'" if given.rpartition(".")[2] in ("Time", "Duration") else None
+        hint = _part_hint(type_, given)
         if type_.startswith("float") and value.lstrip("-").isdigit():
             hint = f"write {value}.0"
         message = f"field '{name}' of {interface} must be {type_}, not {value}"
@@ -453,7 +453,8 @@ def _part_hint(expected: str, given: str) -> str | None:
     """Return a hint if the class was meant instead of an object, or one part for another."""
     if given == f"type[{expected}]":
         return "create an object: add '()'"
-    if given in ("Time", "rclpy.time.Time", "Duration"):
+    short, wanted = given.rpartition(".")[2], re.split(r"\W", expected)[-1]
+    if short == wanted and short in ("Time", "Duration"):
         return "add '.to_msg()'"
     base, _, part = expected.rpartition("_")
     return f"use '{base}.{part}'" if base and given.startswith(base) else None
