@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from enum import Enum
+from typing import TypedDict, Unpack
 
 from composer.fast_dataclass import dataclass
 from composer.source import Span
@@ -90,6 +91,32 @@ def register(rule: Rule) -> Rule:
             raise ValueError(f"rule {rule.code} {rule.name!r} repeats {known.code} {known.name!r}")
     _rules[rule.code] = rule
     return rule
+
+
+class RuleTexts(TypedDict):
+    """What a rule says of itself."""
+
+    code: str
+    name: str
+    summary: str
+    why: str
+    bad: str
+    good: str
+
+
+def error(**texts: Unpack[RuleTexts]) -> Rule:
+    """Register a rule about what keeps a system from running."""
+    return register(Rule(severity=Severity.ERROR, **texts))
+
+
+def warning(**texts: Unpack[RuleTexts]) -> Rule:
+    """Register a rule about what is probably wrong."""
+    return register(Rule(severity=Severity.WARNING, **texts))
+
+
+def info(**texts: Unpack[RuleTexts]) -> Rule:
+    """Register a rule about what is only worth knowing."""
+    return register(Rule(severity=Severity.INFO, **texts))
 
 
 def registered_rules() -> Iterator[Rule]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from composer.diagnostics import Rule, Severity, register
+from composer.diagnostics import Rule, Severity, info, register
 
 _error = partial(Rule, severity=Severity.ERROR)
 
@@ -99,26 +99,23 @@ TOO_LARGE = register(
         good="variables: {a: some text}",
     )
 )
-UNUSED_VARIABLE = register(
-    Rule(
-        code="RC286",
-        name="unused-variable",
-        severity=Severity.INFO,
-        summary="A variable is declared and never used.",
-        why="It may be misspelled where it is used, and changing it has no effect.",
-        bad="""\
+UNUSED_VARIABLE = info(
+    code="RC286",
+    name="unused-variable",
+    summary="A variable is declared and never used.",
+    why="It may be misspelled where it is used, and changing it has no effect.",
+    bad="""\
 system: demo
 variables: {rate_hz: 10}
 nodes:
   robot: {timers: {tick: {rate_hz: 10, log: tick}}}
 """,
-        good="""\
+    good="""\
 system: demo
 variables: {rate_hz: 10}
 nodes:
   robot: {timers: {tick: {rate_hz: "${rate_hz}", log: tick}}}
 """,
-    )
 )
 DUPLICATE_NODE_NAME = register(
     _error(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
+from composer.diagnostics import Diagnostic, Label, error, shown
 from composer.document import parse_document
 from composer.fast_dataclass import dataclass
 from composer.model import USE_SIM_TIME
@@ -15,16 +15,13 @@ SET = "--set"
 NAMESPACE = "--namespace"
 USE_SIM_TIME_OPTION = "--use-sim-time"
 
-RULE = register(
-    Rule(
-        code="RC041",
-        name="invalid-override",
-        severity=Severity.ERROR,
-        summary="A value on the command line is not of the form node.parameter=value.",
-        why="The value is read like one in a file: a YAML scalar or list in flow style.",
-        bad="compose run systems/pipeline.yaml --set max_velocity 2.0",
-        good="compose run systems/pipeline.yaml --set planner.max_velocity=2.0",
-    )
+RULE = error(
+    code="RC041",
+    name="invalid-override",
+    summary="A value on the command line is not of the form node.parameter=value.",
+    why="The value is read like one in a file: a YAML scalar or list in flow style.",
+    bad="compose run systems/pipeline.yaml --set max_velocity 2.0",
+    good="compose run systems/pipeline.yaml --set planner.max_velocity=2.0",
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.schema import kind_of
 from composer.source import SourceFile
 from composer.tree import Mapping
@@ -10,19 +10,16 @@ from composer.tree import Mapping
 SYSTEM = "system"
 NODE = "node"
 
-RULE = register(
-    Rule(
-        code="RC040",
-        name="wrong-kind-of-file",
-        severity=Severity.ERROR,
-        summary="A file is neither a system nor a node type, or is the wrong one of the two.",
-        why=(
-            "The first key of a file says what it is: `system:` or `node:`. Without it, "
-            "the other keys cannot be checked."
-        ),
-        bad="nodes: {talker: {}}",
-        good="system: demo\nnodes: {talker: {}}",
-    )
+RULE = error(
+    code="RC040",
+    name="wrong-kind-of-file",
+    summary="A file is neither a system nor a node type, or is the wrong one of the two.",
+    why=(
+        "The first key of a file says what it is: `system:` or `node:`. Without it, "
+        "the other keys cannot be checked."
+    ),
+    bad="nodes: {talker: {}}",
+    good="system: demo\nnodes: {talker: {}}",
 )
 
 _WORDS = {SYSTEM: "a system", NODE: "a node type"}

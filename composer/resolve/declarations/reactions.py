@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.expressions import Expression, ExpressionError, compile_expression
 from composer.model import Event, LogLevel, Reaction, Send
 from composer.resolve.tree_values import entries, is_opaque, key, text
@@ -10,28 +10,25 @@ from composer.source import Located, Span
 from composer.templates import Template, compile_template
 from composer.tree import Entry, Mapping, Scalar, Tree
 
-RULE = register(
-    Rule(
-        code="RC440",
-        name="invalid-expression",
-        severity=Severity.ERROR,
-        summary="An expression, or a string with {...}, cannot be compiled.",
-        why=(
-            "Expressions are a small, safe language: fields of messages, numbers, comparisons, "
-            "and, or, not, and a few functions. Invalid ones are reported before anything starts, "
-            "not when a message arrives."
-        ),
-        bad="""\
+RULE = error(
+    code="RC440",
+    name="invalid-expression",
+    summary="An expression, or a string with {...}, cannot be compiled.",
+    why=(
+        "Expressions are a small, safe language: fields of messages, numbers, comparisons, "
+        "and, or, not, and a few functions. Invalid ones are reported before anything starts, "
+        "not when a message arrives."
+    ),
+    bad="""\
 system: demo
 nodes:
   robot: {timers: {tick: {rate_hz: 10, when: count >, log: tick}}}
 """,
-        good="""\
+    good="""\
 system: demo
 nodes:
   robot: {timers: {tick: {rate_hz: 10, when: count > 5, log: tick}}}
 """,
-    )
 )
 
 #: The keys of a reaction of a port, a timer or a lifecycle transition.

@@ -7,7 +7,13 @@ from dataclasses import field
 from pathlib import Path
 
 from composer.assembly import Inherited, NodeTypeFile, inherit
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, has_errors, register, shown
+from composer.diagnostics import (
+    Diagnostic,
+    Label,
+    error,
+    has_errors,
+    shown,
+)
 from composer.document import read_document
 from composer.expand import expand, missing_variables
 from composer.fast_dataclass import dataclass
@@ -20,21 +26,19 @@ from composer.schema.kinds import NODE, check_kind
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Plain, Tree, plain
 
-RULE = register(
-    Rule(
-        code="RC287",
-        name="missing-variable",
-        severity=Severity.ERROR,
-        summary="A node lacks a value for a variable of its type.",
-        why="A variable without default is required by the node type.",
-        bad="""\
+RULE = error(
+    code="RC287",
+    name="missing-variable",
+    summary="A node lacks a value for a variable of its type.",
+    why="A variable without default is required by the node type.",
+    bad="""\
 system: demo
 nodes:
   source:
     type: timer_source
     publishers: {output: {external: true}}
 """,
-        good="""\
+    good="""\
 system: demo
 nodes:
   source:
@@ -42,7 +46,6 @@ nodes:
     variables: {message_type: std_msgs/msg/String}
     publishers: {output: {external: true}}
 """,
-    )
 )
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from composer.diagnostics import Rule, Severity, register
+from composer.diagnostics import error, warning
 
-PARAMETER_FILE = register(
-    Rule(
-        code="RC043",
-        name="parameter-file",
-        severity=Severity.ERROR,
-        summary="A ROS parameter file cannot be read, or does not have the ROS format.",
-        why=(
-            "A parameter file is a map of node names, each with 'ros__parameters'. It must be in "
-            "the project: files outside it may not exist on another computer."
-        ),
-        bad="""\
+PARAMETER_FILE = error(
+    code="RC043",
+    name="parameter-file",
+    summary="A ROS parameter file cannot be read, or does not have the ROS format.",
+    why=(
+        "A parameter file is a map of node names, each with 'ros__parameters'. It must be in "
+        "the project: files outside it may not exist on another computer."
+    ),
+    bad="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -23,7 +21,7 @@ nodes:
 # file: robot.yaml
 /motor: {speed: 2.0}
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -32,16 +30,13 @@ nodes:
 # file: robot.yaml
 /motor: {ros__parameters: {speed: 2.0}}
 """,
-    )
 )
-DUPLICATE_PARAMETER = register(
-    Rule(
-        code="RC046",
-        name="duplicate-parameter",
-        severity=Severity.WARNING,
-        summary="A parameter file sets a parameter of a node twice.",
-        why="The last value takes effect, as in ROS. The other one is most likely forgotten.",
-        bad="""\
+DUPLICATE_PARAMETER = warning(
+    code="RC046",
+    name="duplicate-parameter",
+    summary="A parameter file sets a parameter of a node twice.",
+    why="The last value takes effect, as in ROS. The other one is most likely forgotten.",
+    bad="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -50,7 +45,7 @@ nodes:
 # file: robot.yaml
 /motor: {ros__parameters: {speed: 2.0, speed: 3.0}}
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -59,19 +54,16 @@ nodes:
 # file: robot.yaml
 /motor: {ros__parameters: {speed: 3.0}}
 """,
-    )
 )
-PARAMETER_SUBSTITUTION = register(
-    Rule(
-        code="RC045",
-        name="parameter-substitution",
-        severity=Severity.WARNING,
-        summary="A value in a parameter file contains a substitution, which is not replaced.",
-        why=(
-            "Only launch files replace $(...) in parameter files, on request, and variables are "
-            "for the files of the composer. The node gets the text as it is."
-        ),
-        bad="""\
+PARAMETER_SUBSTITUTION = warning(
+    code="RC045",
+    name="parameter-substitution",
+    summary="A value in a parameter file contains a substitution, which is not replaced.",
+    why=(
+        "Only launch files replace $(...) in parameter files, on request, and variables are "
+        "for the files of the composer. The node gets the text as it is."
+    ),
+    bad="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -80,7 +72,7 @@ nodes:
 # file: robot.yaml
 /mapper: {ros__parameters: {map_file: $(find-pkg-share maps)/hall.yaml}}
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -89,5 +81,4 @@ nodes:
 # file: robot.yaml
 /mapper: {ros__parameters: {map_file: maps/hall.yaml}}
 """,
-    )
 )

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import behaviors, distinct_behaviors
-from composer.diagnostics import Diagnostic, Label
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Node
 from composer.python_code.nodes.behaviors import (
     GENERAL_HANDLERS,
@@ -18,7 +18,7 @@ from composer.python_code.nodes.behaviors import (
 )
 from composer.python_code.source import BehaviorSource, Call, Function, Method
 from composer.python_code.source.trees import SCOPES, called_name, is_empty, start_span, walk
-from composer.rules.python.definitions import on_tick, warning
+from composer.rules.python.definitions import on_tick
 from composer.source import Span
 
 _COUNTING = ("self.count = 0", "while True:", "    self.count += 1")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import a
 from composer.analysis.python_nodes import behaviors, distinct_behaviors
-from composer.diagnostics import Diagnostic, Label, nearest, suggestion
+from composer.diagnostics import Diagnostic, Label, error, nearest, suggestion
 from composer.model import Node, PortKind
 from composer.python_code.nodes.behaviors import (
     GENERAL_HANDLERS,
@@ -17,7 +17,7 @@ from composer.python_code.nodes.behaviors import (
 )
 from composer.python_code.source import BehaviorSource, Method, scopes_in
 from composer.python_code.source.trees import positional_arguments, span_of
-from composer.rules.python.definitions import error, on_tick
+from composer.rules.python.definitions import on_tick
 from composer.rules.python.uses_of_nodes import HANDLER_ANNOTATION
 
 MISSING_HANDLER = error(

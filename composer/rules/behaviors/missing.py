@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import behaviors
-from composer.diagnostics import Diagnostic, Label
-from composer.rules.python.definitions import error, on_tick, rclpy_class
+from composer.diagnostics import Diagnostic, Label, error
+from composer.rules.python.definitions import on_tick, rclpy_class
 from composer.rules.python.missing import missing, unnamed
 
 _COUNTER = on_tick("pass")

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from composer.analysis.class_ports import CreatedPort, all_created_ports, created_ports
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
-from composer.diagnostics import Diagnostic, Label, nearest
+from composer.diagnostics import Diagnostic, Label, error, info, nearest, warning
 from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
 from composer.python_code.nodes.class_interfaces import declared_parameters, passes_node_on
 from composer.python_code.nodes.classes import ClassOfNode
 from composer.qos import incompatibilities
-from composer.rules.python.definitions import as_warning, error, info, rclpy_class, warning
+from composer.rules.python.definitions import as_warning, rclpy_class
 from composer.spelling import is_typo
 
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
-from composer.diagnostics import Diagnostic
+from composer.diagnostics import Diagnostic, error, warning
 from composer.model import ExecutorKind, Node, System
 from composer.model.dependencies import dependency_edges
 from composer.python_code.nodes.classes import ClassOfNode
 from composer.python_code.source import Call
 from composer.python_code.source.trees import SCOPES, is_none, span_of, walk
-from composer.rules.python.definitions import as_warning, error, rclpy_class, warning
+from composer.rules.python.definitions import as_warning, rclpy_class
 
 _IMPORT = "import rclpy\n"
 _ASKING = '\n    def ask(self):\n        return input("name: ")\n'

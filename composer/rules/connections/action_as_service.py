@@ -6,20 +6,18 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import ImplementationKind, PortKind
 
-RULE = register(
-    Rule(
-        code="RC332",
-        name="action-as-service",
-        severity=Severity.INFO,
-        summary="An action server returns its result immediately, without feedback.",
-        why=(
-            "Actions are for long-running work that reports progress and can be canceled. For an "
-            "immediate response, a service does the same with a third of the endpoints."
-        ),
-        bad="""\
+RULE = info(
+    code="RC332",
+    name="action-as-service",
+    summary="An action server returns its result immediately, without feedback.",
+    why=(
+        "Actions are for long-running work that reports progress and can be canceled. For an "
+        "immediate response, a service does the same with a third of the endpoints."
+    ),
+    bad="""\
 system: pattern
 nodes:
   navigator:
@@ -28,7 +26,7 @@ nodes:
         type: composer_interfaces/action/Navigate
         result: {success: true}
 """,
-        good="""\
+    good="""\
 system: pattern
 nodes:
   navigator:
@@ -38,7 +36,6 @@ nodes:
         feedback: {count: 10, period_ms: 100, message: {progress_percent: "{count * 10.0}"}}
         result: {success: true}
 """,
-    )
 )
 
 

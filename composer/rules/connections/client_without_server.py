@@ -12,32 +12,29 @@ from composer.analysis.endpoints.unconnected import (
     unconnected_ports,
 )
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC322",
-        name="client-without-server",
-        severity=Severity.WARNING,
-        summary="No node in the system provides the service or action that a client calls.",
-        why=(
-            "Every call times out. The usual cause is a name that differs between client and "
-            "server. If an external node provides it, set 'external: true'."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC322",
+    name="client-without-server",
+    summary="No node in the system provides the service or action that a client calls.",
+    why=(
+        "Every call times out. The usual cause is a name that differs between client and "
+        "server. If an external node provides it, set 'external: true'."
+    ),
+    bad="""\
 system: unserved
 nodes:
   operator:
     clients: {reset: {type: std_srvs/srv/Trigger}}
 """,
-        good="""\
+    good="""\
 system: unserved
 nodes:
   operator:
     clients: {reset: {type: std_srvs/srv/Trigger, external: true}}
 """,
-    )
 )
 
 

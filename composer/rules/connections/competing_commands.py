@@ -6,20 +6,18 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import ChannelKind, PortOfNode, PrimaryState
 
-RULE = register(
-    Rule(
-        code="RC328",
-        name="competing-commands",
-        severity=Severity.WARNING,
-        summary="Two nodes publish velocity commands on one topic.",
-        why=(
-            "The robot follows whichever command came last, and jerks between the two. Give "
-            "each source a topic of its own, and select one in a multiplexer."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC328",
+    name="competing-commands",
+    summary="Two nodes publish velocity commands on one topic.",
+    why=(
+        "The robot follows whichever command came last, and jerks between the two. Give "
+        "each source a topic of its own, and select one in a multiplexer."
+    ),
+    bad="""\
 system: driving
 nodes:
   joystick:
@@ -33,7 +31,7 @@ nodes:
       cmd_vel: {type: geometry_msgs/msg/Twist, qos: command, set: {x: "{message.linear.x}"}}
     state: {x: 0.0}
 """,
-        good="""\
+    good="""\
 system: driving
 nodes:
   joystick:
@@ -48,7 +46,6 @@ nodes:
       joystick: {type: geometry_msgs/msg/Twist, topic: cmd_vel_joy, qos: command, set: {x: 0.0}}
     state: {x: 0.0}
 """,
-    )
 )
 
 

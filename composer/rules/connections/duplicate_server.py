@@ -6,18 +6,16 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Channel, ChannelKind, PortOfNode
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC321",
-        name="duplicate-server",
-        severity=Severity.ERROR,
-        summary="Two ports provide the same service or action.",
-        why="Both answer every request, and the client receives whichever response arrives first.",
-        bad="""\
+RULE = error(
+    code="RC321",
+    name="duplicate-server",
+    summary="Two ports provide the same service or action.",
+    why="Both answer every request, and the client receives whichever response arrives first.",
+    bad="""\
 system: servers
 nodes:
   first:
@@ -25,7 +23,7 @@ nodes:
   second:
     services: {reset: {type: std_srvs/srv/Trigger, respond: {success: false}}}
 """,
-        good="""\
+    good="""\
 system: servers
 nodes:
   first:
@@ -34,7 +32,6 @@ nodes:
     services:
       reset: {type: std_srvs/srv/Trigger, service: ~/reset, respond: {success: false}}
 """,
-    )
 )
 
 

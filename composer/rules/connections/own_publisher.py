@@ -7,21 +7,19 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.endpoints.unconnected import name_location
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Channel, ChannelKind, Event, PortOfNode
 
-RULE = register(
-    Rule(
-        code="RC327",
-        name="own-publisher",
-        severity=Severity.WARNING,
-        summary="A node subscribes to a topic that it publishes itself.",
-        why=(
-            "The node receives each of its own messages, which is rarely meant: usually, one of "
-            "the two topics is wrong. Nodes that exchange messages on one topic, such as alarms, "
-            "are not reported."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC327",
+    name="own-publisher",
+    summary="A node subscribes to a topic that it publishes itself.",
+    why=(
+        "The node receives each of its own messages, which is rarely meant: usually, one of "
+        "the two topics is wrong. Nodes that exchange messages on one topic, such as alarms, "
+        "are not reported."
+    ),
+    bad="""\
 system: loops
 nodes:
   robot:
@@ -29,7 +27,7 @@ nodes:
     subscriptions: {order: {type: std_msgs/msg/String, qos: command, topic: reports, log: ordered}}
     timers: {tick: {period_ms: 1000, publish: {report: {data: idle}}}}
 """,
-        good="""\
+    good="""\
 system: loops
 nodes:
   robot:
@@ -41,7 +39,6 @@ nodes:
     subscriptions: {report: {type: std_msgs/msg/String, qos: command, topic: reports, log: idle}}
     timers: {tick: {period_ms: 1000, publish: {order: {data: go}}}}
 """,
-    )
 )
 
 

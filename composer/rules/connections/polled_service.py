@@ -6,34 +6,31 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, info
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC331",
-        name="polled-service",
-        severity=Severity.INFO,
-        summary="A timer calls a service more often than once a second.",
-        why=(
-            "Services are for occasional requests. For data that is needed continuously, a topic "
-            "uses half the messages, and no client has to wait."
-        ),
-        bad="""\
+RULE = info(
+    code="RC331",
+    name="polled-service",
+    summary="A timer calls a service more often than once a second.",
+    why=(
+        "Services are for occasional requests. For data that is needed continuously, a topic "
+        "uses half the messages, and no client has to wait."
+    ),
+    bad="""\
 system: polling
 nodes:
   display:
     clients: {battery: {type: std_srvs/srv/Trigger, external: true}}
     timers: {ask: {rate_hz: 10, call: {battery: {}}}}
 """,
-        good="""\
+    good="""\
 system: polling
 nodes:
   display:
     subscriptions:
       battery: {type: sensor_msgs/msg/BatteryState, qos: state, external: true, log: received}
 """,
-    )
 )
 
 SHORTEST_S = 1.0

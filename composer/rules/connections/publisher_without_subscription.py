@@ -12,32 +12,29 @@ from composer.analysis.endpoints.unconnected import (
     unconnected_ports,
 )
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC324",
-        name="publisher-without-subscription",
-        severity=Severity.INFO,
-        summary="No node in the system subscribes to a published topic.",
-        why=(
-            "If the topic is for tools or another system, set 'external: true'. Otherwise a name "
-            "is wrong on one side, or the messages are not needed."
-        ),
-        bad="""\
+RULE = info(
+    code="RC324",
+    name="publisher-without-subscription",
+    summary="No node in the system subscribes to a published topic.",
+    why=(
+        "If the topic is for tools or another system, set 'external: true'. Otherwise a name "
+        "is wrong on one side, or the messages are not needed."
+    ),
+    bad="""\
 system: unheard
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
 """,
-        good="""\
+    good="""\
 system: unheard
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
 """,
-    )
 )
 
 

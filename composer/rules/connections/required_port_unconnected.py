@@ -7,26 +7,24 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.endpoints.unconnected import COUNTERPARTS, nearest_channel, unconnected_ports
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC325",
-        name="required-port-unconnected",
-        severity=Severity.ERROR,
-        summary="A port with 'required: true' has no counterpart in the system.",
-        why=(
-            "The node declares that it cannot work without the connection: for example, a motor "
-            "without its emergency stop."
-        ),
-        bad="""\
+RULE = error(
+    code="RC325",
+    name="required-port-unconnected",
+    summary="A port with 'required: true' has no counterpart in the system.",
+    why=(
+        "The node declares that it cannot work without the connection: for example, a motor "
+        "without its emergency stop."
+    ),
+    bad="""\
 system: required
 nodes:
   motor:
     subscriptions: {stop: {type: std_msgs/msg/Bool, qos: state, required: true}}
 """,
-        good="""\
+    good="""\
 system: required
 nodes:
   button:
@@ -34,7 +32,6 @@ nodes:
   motor:
     subscriptions: {stop: {type: std_msgs/msg/Bool, qos: state, required: true}}
 """,
-    )
 )
 
 

@@ -12,21 +12,19 @@ from composer.analysis.endpoints.unconnected import (
     unconnected_ports,
 )
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC323",
-        name="subscription-without-publisher",
-        severity=Severity.WARNING,
-        summary="No node in the system publishes to a subscribed topic.",
-        why=(
-            "The node waits for messages that never arrive. The usual cause is a name that "
-            "differs between publisher and subscription. If an external node publishes the "
-            "messages, set 'external: true'; if the node works without them, 'required: false'."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC323",
+    name="subscription-without-publisher",
+    summary="No node in the system publishes to a subscribed topic.",
+    why=(
+        "The node waits for messages that never arrive. The usual cause is a name that "
+        "differs between publisher and subscription. If an external node publishes the "
+        "messages, set 'external: true'; if the node works without them, 'required: false'."
+    ),
+    bad="""\
 system: unfed
 nodes:
   talker:
@@ -34,7 +32,7 @@ nodes:
   listener:
     subscriptions: {chater: {type: std_msgs/msg/String, qos: command}}
 """,
-        good="""\
+    good="""\
 system: unfed
 nodes:
   talker:
@@ -42,7 +40,6 @@ nodes:
   listener:
     subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
 """,
-    )
 )
 
 

@@ -7,20 +7,18 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.endpoints.unconnected import diagnostic_location
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Event, Port, PortKind, PortOfNode
 
-RULE = register(
-    Rule(
-        code="RC326",
-        name="topic-loop",
-        severity=Severity.WARNING,
-        summary="Subscriptions republish messages in a cycle without a timer or condition.",
-        why=(
-            "One message circulates forever, as fast as the processor allows, and each further "
-            "message adds to the load."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC326",
+    name="topic-loop",
+    summary="Subscriptions republish messages in a cycle without a timer or condition.",
+    why=(
+        "One message circulates forever, as fast as the processor allows, and each further "
+        "message adds to the load."
+    ),
+    bad="""\
 system: loop
 nodes:
   ping:
@@ -32,7 +30,7 @@ nodes:
       in: {type: std_msgs/msg/String, qos: command, topic: ping, publish: {out: "{message}"}}
     publishers: {out: {type: std_msgs/msg/String, qos: command, topic: pong}}
 """,
-        good="""\
+    good="""\
 system: loop
 nodes:
   ping:
@@ -46,7 +44,6 @@ nodes:
       in: {type: std_msgs/msg/String, qos: command, topic: ping, publish: {out: "{message}"}}
     publishers: {out: {type: std_msgs/msg/String, qos: command, topic: pong}}
 """,
-    )
 )
 
 #: For each topic, the topics to which its messages are republished, with the subscription.

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from composer.analysis.call_settings import callback_settings
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
-from composer.diagnostics import Diagnostic
-from composer.rules.python.definitions import error, rclpy_class
+from composer.diagnostics import Diagnostic, error
+from composer.rules.python.definitions import rclpy_class
 
 _LISTENING = (
     "    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command, external: true%s}}\n"

@@ -6,32 +6,29 @@ import os
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.executables import find_program, has_package
 
-RULE = register(
-    Rule(
-        code="RC472",
-        name="executable-not-installed",
-        severity=Severity.INFO,
-        summary="The package or the program of an executable is not installed on this computer.",
-        why=(
-            "The node cannot be started on a computer without it. If it is installed where the "
-            "system runs, ignore this."
-        ),
-        bad="""\
+RULE = info(
+    code="RC472",
+    name="executable-not-installed",
+    summary="The package or the program of an executable is not installed on this computer.",
+    why=(
+        "The node cannot be started on a computer without it. If it is installed where the "
+        "system runs, ignore this."
+    ),
+    bad="""\
 system: lights
 nodes:
   lamp:
     executable: {package: lamp_driver_for_mars, name: driver}
 """,
-        good="""\
+    good="""\
 system: lights
 nodes:
   lamp:
     executable: {command: [sh, -c, "sleep 1"], kind: task}
 """,
-    )
 )
 
 

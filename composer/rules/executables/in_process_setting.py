@@ -7,22 +7,20 @@ from itertools import chain
 
 from composer.analysis.call_settings import callback_settings
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.model import Isolation, Node, Port, System
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC474",
-        name="in-process-setting",
-        severity=Severity.ERROR,
-        summary="An executable or external node has a setting for nodes of the process.",
-        why=(
-            "The composer does not call the callbacks of these nodes: it starts their processes, "
-            "drives their lifecycle and observes their ports. The setting would have no effect. "
-            "What the type of an external node declares is for where the node runs."
-        ),
-        bad="""\
+RULE = error(
+    code="RC474",
+    name="in-process-setting",
+    summary="An executable or external node has a setting for nodes of the process.",
+    why=(
+        "The composer does not call the callbacks of these nodes: it starts their processes, "
+        "drives their lifecycle and observes their ports. The setting would have no effect. "
+        "What the type of an external node declares is for where the node runs."
+    ),
+    bad="""\
 # file: system.yaml
 system: lights
 nodes:
@@ -33,7 +31,7 @@ nodes:
 # file: driver.sh
 exec driver
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: lights
 nodes:
@@ -43,7 +41,6 @@ nodes:
 # file: driver.sh
 exec driver
 """,
-    )
 )
 
 

@@ -6,24 +6,22 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import is_misspelled
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.model import Executable
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC473",
-        name="incomplete-executable",
-        severity=Severity.ERROR,
-        summary="An executable does not have exactly one of command, or package and name.",
-        why="There is no program to start, or it is not clear which one.",
-        bad="""\
+RULE = error(
+    code="RC473",
+    name="incomplete-executable",
+    summary="An executable does not have exactly one of command, or package and name.",
+    why="There is no program to start, or it is not clear which one.",
+    bad="""\
 system: maps
 nodes:
   map_server:
     executable: {name: map_server, lifecycle: managed}
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: maps
 nodes:
@@ -32,7 +30,6 @@ nodes:
 # file: driver.sh
 exec driver
 """,
-    )
 )
 
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.model import ExecutableKind, LifecycleKind
 
-RULE = register(
-    Rule(
-        code="RC475",
-        name="managed-task",
-        severity=Severity.ERROR,
-        summary="A task is managed by lifecycle services.",
-        why=(
-            "A task is done once its process has exited; a managed node runs until it is shut "
-            "down, and is driven by the services that it has while it runs."
-        ),
-        bad="""\
+RULE = error(
+    code="RC475",
+    name="managed-task",
+    summary="A task is managed by lifecycle services.",
+    why=(
+        "A task is done once its process has exited; a managed node runs until it is shut "
+        "down, and is driven by the services that it has while it runs."
+    ),
+    bad="""\
 # file: system.yaml
 system: calibration
 nodes:
@@ -27,7 +25,7 @@ nodes:
 # file: driver.sh
 exec driver
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: calibration
 nodes:
@@ -36,7 +34,6 @@ nodes:
 # file: driver.sh
 exec driver
 """,
-    )
 )
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 
-RULE = register(
-    Rule(
-        code="RC470",
-        name="several-implementations",
-        severity=Severity.ERROR,
-        summary="A node has more than one of behavior, class and executable.",
-        why="Only one of them can be the node. What each of them offers is declared by the ports.",
-        bad="""\
+RULE = error(
+    code="RC470",
+    name="several-implementations",
+    summary="A node has more than one of behavior, class and executable.",
+    why="Only one of them can be the node. What each of them offers is declared by the ports.",
+    bad="""\
 # file: system.yaml
 system: lights
 nodes:
@@ -27,7 +25,7 @@ class Lamp:
 # file: driver.sh
 exec driver
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: lights
 nodes:
@@ -36,7 +34,6 @@ nodes:
 # file: driver.sh
 exec driver
 """,
-    )
 )
 
 

@@ -7,19 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 from composer.executables import executable_names, find_executable, find_program, has_package
 from composer.model import Executable
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC471",
-        name="unknown-executable",
-        severity=Severity.ERROR,
-        summary="The executable of a node does not exist.",
-        why="The node cannot be configured: there is no program to start.",
-        bad="""\
+RULE = error(
+    code="RC471",
+    name="unknown-executable",
+    summary="The executable of a node does not exist.",
+    why="The node cannot be configured: there is no program to start.",
+    bad="""\
 # file: system.yaml
 system: scripts
 nodes:
@@ -28,7 +26,7 @@ nodes:
 # file: scripts/driver.py
 import rclpy
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: scripts
 nodes:
@@ -37,7 +35,6 @@ nodes:
 # file: scripts/driver.py
 import rclpy
 """,
-    )
 )
 
 #: Arguments with these suffixes are files, and are looked for.

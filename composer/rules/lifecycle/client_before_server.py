@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Channel, ChannelKind, PortOfNode
 from composer.model.dependencies import (
     dependency_cycles,
@@ -14,17 +14,15 @@ from composer.model.dependencies import (
     in_dependency_order,
 )
 
-RULE = register(
-    Rule(
-        code="RC403",
-        name="client-before-server",
-        severity=Severity.WARNING,
-        summary="A node that calls a service or action starts before the node that provides it.",
-        why=(
-            "By default, servers start before their clients. Here 'depends_on' reverses the "
-            "order, so the first calls find no server."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC403",
+    name="client-before-server",
+    summary="A node that calls a service or action starts before the node that provides it.",
+    why=(
+        "By default, servers start before their clients. Here 'depends_on' reverses the "
+        "order, so the first calls find no server."
+    ),
+    bad="""\
 system: order
 nodes:
   motor_controller:
@@ -33,7 +31,7 @@ nodes:
     services: {plan: {type: std_srvs/srv/Trigger, respond: {success: true}}}
     lifecycle: {depends_on: [motor_controller]}
 """,
-        good="""\
+    good="""\
 system: order
 nodes:
   motor_controller:
@@ -42,7 +40,6 @@ nodes:
   planner:
     services: {plan: {type: std_srvs/srv/Trigger, respond: {success: true}}}
 """,
-    )
 )
 
 

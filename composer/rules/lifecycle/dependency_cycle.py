@@ -5,30 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Dependency, System
 from composer.model.dependencies import dependency_cycles
 
-RULE = register(
-    Rule(
-        code="RC401",
-        name="dependency-cycle",
-        severity=Severity.ERROR,
-        summary="Nodes depend on each other in a cycle.",
-        why="None of them can start first.",
-        bad="""\
+RULE = error(
+    code="RC401",
+    name="dependency-cycle",
+    summary="Nodes depend on each other in a cycle.",
+    why="None of them can start first.",
+    bad="""\
 system: cycle
 nodes:
   planner: {lifecycle: {depends_on: [mapper]}}
   mapper: {lifecycle: {depends_on: [planner]}}
 """,
-        good="""\
+    good="""\
 system: cycle
 nodes:
   planner: {lifecycle: {depends_on: [mapper]}}
   mapper: {on_activate: {log: ready}}
 """,
-    )
 )
 
 

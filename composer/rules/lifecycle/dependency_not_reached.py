@@ -5,32 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Node, PrimaryState, System
 
-RULE = register(
-    Rule(
-        code="RC402",
-        name="dependency-not-reached",
-        severity=Severity.WARNING,
-        summary="A node depends on a state that the other node's autostart does not reach.",
-        why=(
-            "The bring-up leaves the dependent node inactive until the other node is moved to "
-            "that state manually."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC402",
+    name="dependency-not-reached",
+    summary="A node depends on a state that the other node's autostart does not reach.",
+    why=(
+        "The bring-up leaves the dependent node inactive until the other node is moved to "
+        "that state manually."
+    ),
+    bad="""\
 system: waiting
 nodes:
   planner: {lifecycle: {autostart: inactive}}
   motor_controller: {lifecycle: {depends_on: [planner]}}
 """,
-        good="""\
+    good="""\
 system: waiting
 nodes:
   planner: {lifecycle: {autostart: inactive}}
   motor_controller: {lifecycle: {depends_on: {planner: inactive}}}
 """,
-    )
 )
 
 _RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}

@@ -6,24 +6,21 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import OnFailure, RestartBudget
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC406",
-        name="endless-restart",
-        severity=Severity.WARNING,
-        summary=(
-            "The backoff of the restarts adds up to more than the window in which restarts are "
-            "counted."
-        ),
-        why=(
-            "By the last attempt, the first one is no longer counted, so a node that always fails "
-            "is restarted forever."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC406",
+    name="endless-restart",
+    summary=(
+        "The backoff of the restarts adds up to more than the window in which restarts are counted."
+    ),
+    why=(
+        "By the last attempt, the first one is no longer counted, so a node that always fails "
+        "is restarted forever."
+    ),
+    bad="""\
 system: restarting
 nodes:
   lidar:
@@ -32,7 +29,7 @@ nodes:
       on_failure: restart
       restart: {max_attempts: 5, window_ms: 10000, backoff_ms: 1000}
 """,
-        good="""\
+    good="""\
 system: restarting
 nodes:
   lidar:
@@ -41,7 +38,6 @@ nodes:
       on_failure: restart
       restart: {max_attempts: 5, window_ms: 60000, backoff_ms: 1000}
 """,
-    )
 )
 
 

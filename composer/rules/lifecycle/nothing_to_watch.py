@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC404",
-        name="nothing-to-watch",
-        severity=Severity.ERROR,
-        summary="topic_silence_ms is set for a node without publishers.",
-        why="A node without publishers is always silent, so it would fail repeatedly.",
-        bad="""\
+RULE = error(
+    code="RC404",
+    name="nothing-to-watch",
+    summary="topic_silence_ms is set for a node without publishers.",
+    why="A node without publishers is always silent, so it would fail repeatedly.",
+    bad="""\
 system: watching
 nodes:
   logger:
     subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
     lifecycle: {watch: {topic_silence_ms: 500}}
 """,
-        good="""\
+    good="""\
 system: watching
 nodes:
   logger:
     subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
     lifecycle: {watch: {callback_ms: 500}}
 """,
-    )
 )
 
 

@@ -6,34 +6,31 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC530",
-        name="restart-delay",
-        severity=Severity.WARNING,
-        summary="The first delay of restarts, 'backoff_ms', is longer than 'backoff_max_ms'.",
-        why=(
-            "The delay starts at 'backoff_ms' and doubles up to 'backoff_max_ms'. If that is "
-            "shorter, every restart waits for it, and 'backoff_ms' has no effect."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC530",
+    name="restart-delay",
+    summary="The first delay of restarts, 'backoff_ms', is longer than 'backoff_max_ms'.",
+    why=(
+        "The delay starts at 'backoff_ms' and doubles up to 'backoff_max_ms'. If that is "
+        "shorter, every restart waits for it, and 'backoff_ms' has no effect."
+    ),
+    bad="""\
 system: restarting
 nodes:
   lidar:
     on_activate: {log: started}
     lifecycle: {on_failure: restart, restart: {backoff_ms: 5000, backoff_max_ms: 1000}}
 """,
-        good="""\
+    good="""\
 system: restarting
 nodes:
   lidar:
     on_activate: {log: started}
     lifecycle: {on_failure: restart, restart: {backoff_ms: 1000, backoff_max_ms: 5000}}
 """,
-    )
 )
 
 

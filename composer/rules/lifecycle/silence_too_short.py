@@ -7,21 +7,19 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.timing.rates import timed_publishers
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Node, PortKind, PortOfNode
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC405",
-        name="silence-too-short",
-        severity=Severity.ERROR,
-        summary="topic_silence_ms is not longer than the publishing period.",
-        why=(
-            "The node would fail although it publishes on time. Timers are never exact, so allow "
-            "for several periods."
-        ),
-        bad="""\
+RULE = error(
+    code="RC405",
+    name="silence-too-short",
+    summary="topic_silence_ms is not longer than the publishing period.",
+    why=(
+        "The node would fail although it publishes on time. Timers are never exact, so allow "
+        "for several periods."
+    ),
+    bad="""\
 system: watching
 nodes:
   lidar:
@@ -29,7 +27,7 @@ nodes:
     timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
     lifecycle: {watch: {topic_silence_ms: 50}}
 """,
-        good="""\
+    good="""\
 system: watching
 nodes:
   lidar:
@@ -37,7 +35,6 @@ nodes:
     timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
     lifecycle: {watch: {topic_silence_ms: 500}}
 """,
-    )
 )
 
 

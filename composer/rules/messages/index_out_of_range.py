@@ -7,34 +7,31 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.messages.expressions import ExpressionSite, expression_sites
 from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.expressions import FieldPath
 
-RULE = register(
-    Rule(
-        code="RC308",
-        name="index-out-of-range",
-        severity=Severity.WARNING,
-        summary="An element of a list or an array parameter is read that does not exist.",
-        why=(
-            "Reading it fails, unless a parameter is set to a longer array "
-            "while the node runs. Indices count from 0."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC308",
+    name="index-out-of-range",
+    summary="An element of a list or an array parameter is read that does not exist.",
+    why=(
+        "Reading it fails, unless a parameter is set to a longer array "
+        "while the node runs. Indices count from 0."
+    ),
+    bad="""\
 system: indices
 nodes:
   robot:
     parameters: {goal: {type: double_array, default: [1.0, 2.0]}}
     on_activate: {log: "driving to y = {parameters.goal[2]}"}
 """,
-        good="""\
+    good="""\
 system: indices
 nodes:
   robot:
     parameters: {goal: {type: double_array, default: [1.0, 2.0]}}
     on_activate: {log: "driving to y = {parameters.goal[1]}"}
 """,
-    )
 )
 
 

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.interfaces.building import how_to_build
 
-RULE = register(
-    Rule(
-        code="RC307",
-        name="outdated-interface",
-        severity=Severity.ERROR,
-        summary="An interface of the project has changed since its package was built.",
-        why=(
-            "Nodes use the installed package. With other fields or types, messages cannot be "
-            "built, and nodes of other processes do not receive them."
-        ),
-        bad="nano interfaces/arm_interfaces/msg/Grip.msg  # and run, without building it again",
-        good="nano interfaces/arm_interfaces/msg/Grip.msg && colcon build",
-    )
+RULE = error(
+    code="RC307",
+    name="outdated-interface",
+    summary="An interface of the project has changed since its package was built.",
+    why=(
+        "Nodes use the installed package. With other fields or types, messages cannot be "
+        "built, and nodes of other processes do not receive them."
+    ),
+    bad="nano interfaces/arm_interfaces/msg/Grip.msg  # and run, without building it again",
+    good="nano interfaces/arm_interfaces/msg/Grip.msg && colcon build",
 )
 
 

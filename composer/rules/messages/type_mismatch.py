@@ -13,20 +13,18 @@ from composer.analysis.endpoints.type_mismatches import (
     wrong_connection,
 )
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Endpoint, PortOfNode
 
-RULE = register(
-    Rule(
-        code="RC303",
-        name="type-mismatch",
-        severity=Severity.ERROR,
-        summary="The endpoints of a topic, service or action have different types.",
-        why=(
-            "DDS does not match endpoints of different types: no data arrives, and no error is "
-            "reported."
-        ),
-        bad="""\
+RULE = error(
+    code="RC303",
+    name="type-mismatch",
+    summary="The endpoints of a topic, service or action have different types.",
+    why=(
+        "DDS does not match endpoints of different types: no data arrives, and no error is "
+        "reported."
+    ),
+    bad="""\
 system: types
 nodes:
   talker:
@@ -34,7 +32,7 @@ nodes:
   listener:
     subscriptions: {speed: {type: std_msgs/msg/Float32, qos: command}}
 """,
-        good="""\
+    good="""\
 system: types
 nodes:
   talker:
@@ -42,7 +40,6 @@ nodes:
   listener:
     subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command}}
 """,
-    )
 )
 
 #: Maximum number of further endpoints with the same wrong type to show.

@@ -6,36 +6,33 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.messages.reactions import message_templates
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.field_types import constant_problem, enumerator_problem
 from composer.interfaces import Interfaces, Message
 from composer.templates import Constant, Items, Record, Template
 
-RULE = register(
-    Rule(
-        code="RC306",
-        name="unknown-enumerator",
-        severity=Severity.WARNING,
-        summary="A field for which the message defines constants is set to another number.",
-        why=(
-            "A message that defines STATUS_IDLE and STATUS_BUSY expects one of them in its field "
-            "'status'. Subscribers cannot interpret any other number."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC306",
+    name="unknown-enumerator",
+    summary="A field for which the message defines constants is set to another number.",
+    why=(
+        "A message that defines STATUS_IDLE and STATUS_BUSY expects one of them in its field "
+        "'status'. Subscribers cannot interpret any other number."
+    ),
+    bad="""\
 system: battery
 nodes:
   battery:
     publishers: {charge: {type: sensor_msgs/msg/BatteryState, qos: state, external: true}}
     timers: {tick: {period_ms: 1000, publish: {charge: {power_supply_status: 9}}}}
 """,
-        good="""\
+    good="""\
 system: battery
 nodes:
   battery:
     publishers: {charge: {type: sensor_msgs/msg/BatteryState, qos: state, external: true}}
     timers: {tick: {period_ms: 1000, publish: {charge: {power_supply_status: 2}}}}
 """,
-    )
 )
 
 

@@ -6,30 +6,27 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.endpoints.type_mismatches import certain_field_problems
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 
-RULE = register(
-    Rule(
-        code="RC304",
-        name="unknown-field",
-        severity=Severity.ERROR,
-        summary="An expression reads, or a map sets, a field that the message does not have.",
-        why="The reaction would fail on every message.",
-        bad="""\
+RULE = error(
+    code="RC304",
+    name="unknown-field",
+    summary="An expression reads, or a map sets, a field that the message does not have.",
+    why="The reaction would fail on every message.",
+    bad="""\
 system: fields
 nodes:
   listener:
     subscriptions:
       chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.text}"}
 """,
-        good="""\
+    good="""\
 system: fields
 nodes:
   listener:
     subscriptions:
       chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
 """,
-    )
 )
 
 

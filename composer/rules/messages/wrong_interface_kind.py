@@ -6,30 +6,27 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import a
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.interfaces import Action, Message, Service
 from composer.model import ChannelKind
 
-RULE = register(
-    Rule(
-        code="RC302",
-        name="wrong-interface-kind",
-        severity=Severity.ERROR,
-        summary="A port has an interface of the wrong kind, such as a service type on a topic.",
-        why="Topics use message types; services and actions have their own kinds of type.",
-        bad="""\
+RULE = error(
+    code="RC302",
+    name="wrong-interface-kind",
+    summary="A port has an interface of the wrong kind, such as a service type on a topic.",
+    why="Topics use message types; services and actions have their own kinds of type.",
+    bad="""\
 system: kinds
 nodes:
   talker:
     publishers: {trigger: {type: std_srvs/srv/Trigger, qos: command, external: true}}
 """,
-        good="""\
+    good="""\
 system: kinds
 nodes:
   talker:
     clients: {trigger: {type: std_srvs/srv/Trigger, external: true}}
 """,
-    )
 )
 
 _EXPECTED = {

@@ -5,30 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.names import namespace_problem
 
-RULE = register(
-    Rule(
-        code="RC231",
-        name="deep-namespace",
-        severity=Severity.WARNING,
-        summary="A namespace has more than three levels.",
-        why=(
-            "Two or three levels (robot, subsystem, device) are enough to locate a node. Deeper "
-            "names are easily mistyped or remapped wrongly, and tools truncate them."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC231",
+    name="deep-namespace",
+    summary="A namespace has more than three levels.",
+    why=(
+        "Two or three levels (robot, subsystem, device) are enough to locate a node. Deeper "
+        "names are easily mistyped or remapped wrongly, and tools truncate them."
+    ),
+    bad="""\
 system: deep
 nodes:
   driver: {namespace: /robot/front/left/camera, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: deep
 nodes:
   driver: {namespace: /robot/camera_front_left, on_activate: {log: started}}
 """,
-    )
 )
 
 DEEPEST = 3

@@ -5,33 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Node
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC227",
-        name="duplicate-full-name",
-        severity=Severity.ERROR,
-        summary="Two nodes have the same name and namespace in ROS.",
-        why=(
-            "ROS starts both, with a warning. Then requests to parameter and lifecycle services "
-            "reach either node, and tools show only one of them."
-        ),
-        bad="""\
+RULE = error(
+    code="RC227",
+    name="duplicate-full-name",
+    summary="Two nodes have the same name and namespace in ROS.",
+    why=(
+        "ROS starts both, with a warning. Then requests to parameter and lifecycle services "
+        "reach either node, and tools show only one of them."
+    ),
+    bad="""\
 system: names
 nodes:
   front: {name: camera, on_activate: {log: started}}
   rear: {name: camera, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: names
 nodes:
   front: {name: camera, namespace: front, on_activate: {log: started}}
   rear: {name: camera, namespace: rear, on_activate: {log: started}}
 """,
-    )
 )
 
 

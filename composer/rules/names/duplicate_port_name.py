@@ -6,34 +6,31 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import a
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Port
 
-RULE = register(
-    Rule(
-        code="RC225",
-        name="duplicate-port-name",
-        severity=Severity.ERROR,
-        summary="Two ports of different kinds have the same name in one node.",
-        why=(
-            "Connections refer to 'node.port' and handlers bind by name, so a name must identify "
-            "one port. The two ports can still share a topic: set it with 'topic:'."
-        ),
-        bad="""\
+RULE = error(
+    code="RC225",
+    name="duplicate-port-name",
+    summary="Two ports of different kinds have the same name in one node.",
+    why=(
+        "Connections refer to 'node.port' and handlers bind by name, so a name must identify "
+        "one port. The two ports can still share a topic: set it with 'topic:'."
+    ),
+    bad="""\
 system: ports
 nodes:
   relay:
     subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command, external: true}}
     publishers: {speed: {type: std_msgs/msg/Float64, qos: command, topic: ~/speed, external: true}}
 """,
-        good="""\
+    good="""\
 system: ports
 nodes:
   relay:
     subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command, external: true}}
     publishers: {limited: {type: std_msgs/msg/Float64, qos: command, external: true}}
 """,
-    )
 )
 
 

@@ -5,33 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.names import is_hidden, topic_name_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC232",
-        name="hidden-name",
-        severity=Severity.INFO,
-        summary="A part of a name starts with an underscore, so ROS tools hide it.",
-        why=(
-            "ROS reserves a leading underscore for hidden names. 'ros2 topic list', rqt and "
-            "rosbag omit them by default, so they are easily overlooked."
-        ),
-        bad="""\
+RULE = info(
+    code="RC232",
+    name="hidden-name",
+    summary="A part of a name starts with an underscore, so ROS tools hide it.",
+    why=(
+        "ROS reserves a leading underscore for hidden names. 'ros2 topic list', rqt and "
+        "rosbag omit them by default, so they are easily overlooked."
+    ),
+    bad="""\
 system: hidden
 nodes:
   talker:
     publishers: {_status: {type: std_msgs/msg/String, qos: state, external: true}}
 """,
-        good="""\
+    good="""\
 system: hidden
 nodes:
   talker:
     publishers: {status: {type: std_msgs/msg/String, qos: state, external: true}}
 """,
-    )
 )
 
 

@@ -6,33 +6,30 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import safe_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.model import System
 from composer.names import join, namespace_problem, node_name_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC222",
-        name="invalid-namespace",
-        severity=Severity.ERROR,
-        summary="A namespace is not valid in ROS.",
-        why=(
-            "The parts of a namespace consist of letters, digits and underscores, do not start "
-            "with a digit, and are separated by single slashes (rmw_validate_namespace). The name "
-            "of a system is such a part: its manager node is /<system>/manager."
-        ),
-        bad="""\
+RULE = error(
+    code="RC222",
+    name="invalid-namespace",
+    summary="A namespace is not valid in ROS.",
+    why=(
+        "The parts of a namespace consist of letters, digits and underscores, do not start "
+        "with a digit, and are separated by single slashes (rmw_validate_namespace). The name "
+        "of a system is such a part: its manager node is /<system>/manager."
+    ),
+    bad="""\
 system: names
 nodes:
   camera: {namespace: robot 1, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: names
 nodes:
   camera: {namespace: robot_1, on_activate: {log: started}}
 """,
-    )
 )
 
 

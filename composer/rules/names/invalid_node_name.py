@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import free_name, safe_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.names import node_name_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC221",
-        name="invalid-node-name",
-        severity=Severity.ERROR,
-        summary="A node name is not valid in ROS.",
-        why=(
-            "Node names consist of letters, digits and underscores and do not start with a digit "
-            "(rmw_validate_node_name). rclpy refuses to create a node with any other name."
-        ),
-        bad="""\
+RULE = error(
+    code="RC221",
+    name="invalid-node-name",
+    summary="A node name is not valid in ROS.",
+    why=(
+        "Node names consist of letters, digits and underscores and do not start with a digit "
+        "(rmw_validate_node_name). rclpy refuses to create a node with any other name."
+    ),
+    bad="""\
 system: names
 nodes:
   front-camera: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: names
 nodes:
   front_camera: {on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -6,32 +6,29 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import free_name, safe_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.names import parameter_name_problem
 
-RULE = register(
-    Rule(
-        code="RC224",
-        name="invalid-parameter-name",
-        severity=Severity.ERROR,
-        summary="A parameter name does not consist of words separated by dots.",
-        why=(
-            "Parameter files, the command line and expressions can refer only to names that "
-            "consist of letters, digits and underscores, separated by dots."
-        ),
-        bad="""\
+RULE = error(
+    code="RC224",
+    name="invalid-parameter-name",
+    summary="A parameter name does not consist of words separated by dots.",
+    why=(
+        "Parameter files, the command line and expressions can refer only to names that "
+        "consist of letters, digits and underscores, separated by dots."
+    ),
+    bad="""\
 system: names
 nodes:
   motor:
     parameters: {max velocity: {type: double, default: 1.0}}
 """,
-        good="""\
+    good="""\
 system: names
 nodes:
   motor:
     parameters: {max_velocity: {type: double, default: 1.0}}
 """,
-    )
 )
 
 

@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.names import remapped_name, topic_name_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC223",
-        name="invalid-ros-name",
-        severity=Severity.ERROR,
-        summary="The name of a topic, service or action is not valid in ROS.",
-        why=(
-            "The parts of a name consist of letters, digits and underscores, do not start with a "
-            "digit, and are separated by single slashes; '~' is allowed only at the start "
-            "(rcl_validate_topic_name). rclpy refuses any other name."
-        ),
-        bad="""\
+RULE = error(
+    code="RC223",
+    name="invalid-ros-name",
+    summary="The name of a topic, service or action is not valid in ROS.",
+    why=(
+        "The parts of a name consist of letters, digits and underscores, do not start with a "
+        "digit, and are separated by single slashes; '~' is allowed only at the start "
+        "(rcl_validate_topic_name). rclpy refuses any other name."
+    ),
+    bad="""\
 system: names
 nodes:
   talker:
@@ -28,14 +26,13 @@ nodes:
       chatter:
         {type: std_msgs/msg/String, qos: command, topic: /news//today, external: true}
 """,
-        good="""\
+    good="""\
 system: names
 nodes:
   talker:
     publishers:
       chatter: {type: std_msgs/msg/String, qos: command, topic: /news/today, external: true}
 """,
-    )
 )
 
 

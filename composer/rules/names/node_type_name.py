@@ -6,32 +6,29 @@ from collections.abc import Iterator
 from pathlib import PurePath
 
 from composer.analysis.context import Context, is_unresolved, location
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC215",
-        name="node-type-name",
-        severity=Severity.WARNING,
-        summary="A node type has another name than its file.",
-        why=(
-            "Systems refer to a node type by the name of its file, so 'node' is never found "
-            "under its own name."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC215",
+    name="node-type-name",
+    summary="A node type has another name than its file.",
+    why=(
+        "Systems refer to a node type by the name of its file, so 'node' is never found "
+        "under its own name."
+    ),
+    bad="""\
 # file: nodes/talker.yaml
 node: taker
 publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
 timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
 """,
-        good="""\
+    good="""\
 # file: nodes/talker.yaml
 node: talker
 publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
 timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
 """,
-    )
 )
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 
-RULE = register(
-    Rule(
-        code="RC233",
-        name="private-connection-name",
-        severity=Severity.ERROR,
-        summary="A connection has a private name, but does not belong to a single node.",
-        why="'~' stands for the node that uses the name, and a connection has no such node.",
-        bad="""\
+RULE = error(
+    code="RC233",
+    name="private-connection-name",
+    summary="A connection has a private name, but does not belong to a single node.",
+    why="'~' stands for the node that uses the name, and a connection has no such node.",
+    bad="""\
 system: private
 nodes:
   talker:
@@ -24,7 +22,7 @@ nodes:
 connections:
   - {topic: ~/chatter, from: talker.chatter, to: listener.chatter}
 """,
-        good="""\
+    good="""\
 system: private
 nodes:
   talker:
@@ -34,7 +32,6 @@ nodes:
 connections:
   - {topic: /talker/chatter, from: talker.chatter, to: listener.chatter}
 """,
-    )
 )
 
 

@@ -7,20 +7,18 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.endpoints.references import matched_ports, own_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Node, Port, PortKind, Remapping
 
-RULE = register(
-    Rule(
-        code="RC226",
-        name="remapping-collision",
-        severity=Severity.WARNING,
-        summary="A remapping gives a port a name that another port of the node already has.",
-        why=(
-            "Two streams of the node become one, and subscribers cannot distinguish the messages "
-            "of the two ports."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC226",
+    name="remapping-collision",
+    summary="A remapping gives a port a name that another port of the node already has.",
+    why=(
+        "Two streams of the node become one, and subscribers cannot distinguish the messages "
+        "of the two ports."
+    ),
+    bad="""\
 system: collision
 nodes:
   camera:
@@ -29,7 +27,7 @@ nodes:
       right: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
     remappings: {left: right}
 """,
-        good="""\
+    good="""\
 system: collision
 nodes:
   camera:
@@ -38,7 +36,6 @@ nodes:
       right: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
     remappings: {left: left_eye}
 """,
-    )
 )
 
 

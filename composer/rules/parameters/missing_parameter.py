@@ -6,28 +6,25 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, nearest, register
+from composer.diagnostics import Diagnostic, Label, error, nearest
 
-RULE = register(
-    Rule(
-        code="RC424",
-        name="missing-parameter",
-        severity=Severity.ERROR,
-        summary="A parameter without a default has no value.",
-        why="A parameter without a default is required: the node cannot run without a value.",
-        bad="""\
+RULE = error(
+    code="RC424",
+    name="missing-parameter",
+    summary="A parameter without a default has no value.",
+    why="A parameter without a default is required: the node cannot run without a value.",
+    bad="""\
 system: parameters
 nodes:
   camera:
     parameters: {serial_number: {type: string}}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   camera:
     parameters: {serial_number: {type: string, default: A-1047}}
 """,
-    )
 )
 
 

@@ -6,28 +6,25 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.parameters import ReportedValues, describe, valid_values
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC423",
-        name="parameter-choice",
-        severity=Severity.ERROR,
-        summary="A parameter's value is not one of the declared choices.",
-        why="The node refuses the value at startup.",
-        bad="""\
+RULE = error(
+    code="RC423",
+    name="parameter-choice",
+    summary="A parameter's value is not one of the declared choices.",
+    why="The node refuses the value at startup.",
+    bad="""\
 system: parameters
 nodes:
   motor:
     parameters: {mode: {type: string, default: fats, choices: [slow, fast]}}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   motor:
     parameters: {mode: {type: string, default: fast, choices: [slow, fast]}}
 """,
-    )
 )
 
 

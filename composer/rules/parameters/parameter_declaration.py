@@ -7,32 +7,29 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import and_others
 from composer.analysis.parameters import KNOWN_TYPES, describe, wrong_choices
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import USE_SIM_TIME, Parameter, ParameterType
 
-RULE = register(
-    Rule(
-        code="RC425",
-        name="parameter-declaration",
-        severity=Severity.ERROR,
-        summary="A parameter's declaration contradicts itself.",
-        why=(
-            "A minimum above the maximum leaves no valid value, a range applies only to numbers, "
-            "and a choice of another type can never be selected."
-        ),
-        bad="""\
+RULE = error(
+    code="RC425",
+    name="parameter-declaration",
+    summary="A parameter's declaration contradicts itself.",
+    why=(
+        "A minimum above the maximum leaves no valid value, a range applies only to numbers, "
+        "and a choice of another type can never be selected."
+    ),
+    bad="""\
 system: parameters
 nodes:
   motor:
     parameters: {max_velocity: {type: double, default: 3.0, minimum: 5.0, maximum: 1.0}}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   motor:
     parameters: {max_velocity: {type: double, default: 3.0, minimum: 1.0, maximum: 5.0}}
 """,
-    )
 )
 
 _WITH_RANGE = frozenset(

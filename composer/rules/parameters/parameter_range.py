@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.parameters import ReportedValues, range_problem, valid_values
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Parameter
 
-RULE = register(
-    Rule(
-        code="RC422",
-        name="parameter-range",
-        severity=Severity.ERROR,
-        summary="A parameter's value violates the declared minimum, maximum or step.",
-        why="The node refuses the value at startup.",
-        bad="""\
+RULE = error(
+    code="RC422",
+    name="parameter-range",
+    summary="A parameter's value violates the declared minimum, maximum or step.",
+    why="The node refuses the value at startup.",
+    bad="""\
 system: parameters
 nodes:
   motor:
     parameters:
       max_velocity: {type: double, default: 9.0, minimum: 0.0, maximum: 5.0, unit: m/s}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   motor:
     parameters:
       max_velocity: {type: double, default: 5.0, minimum: 0.0, maximum: 5.0, unit: m/s}
 """,
-    )
 )
 
 

@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.parameters import ReportedValues, is_wrong_choice, known_values, type_problem
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 
-RULE = register(
-    Rule(
-        code="RC421",
-        name="parameter-type",
-        severity=Severity.ERROR,
-        summary="A parameter's value does not have the declared type.",
-        why=(
-            "ROS parameters are typed, so the node refuses the value at startup. An integer is "
-            "accepted for a double; nothing else is converted."
-        ),
-        bad="""\
+RULE = error(
+    code="RC421",
+    name="parameter-type",
+    summary="A parameter's value does not have the declared type.",
+    why=(
+        "ROS parameters are typed, so the node refuses the value at startup. An integer is "
+        "accepted for a double; nothing else is converted."
+    ),
+    bad="""\
 system: parameters
 nodes:
   motor:
     parameters: {max_velocity: {type: double, default: fast}}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   motor:
     parameters: {max_velocity: {type: double, default: 1.0}}
 """,
-    )
 )
 
 

@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.parameters import describe
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 
-RULE = register(
-    Rule(
-        code="RC426",
-        name="parameter-without-type",
-        severity=Severity.ERROR,
-        summary="A parameter is declared with a value from which its type cannot be inferred.",
-        why=(
-            "ROS parameters are typed. Most values determine the type, but an empty list fits "
-            "every array type, and a list of mixed types fits none."
-        ),
-        bad="""\
+RULE = error(
+    code="RC426",
+    name="parameter-without-type",
+    summary="A parameter is declared with a value from which its type cannot be inferred.",
+    why=(
+        "ROS parameters are typed. Most values determine the type, but an empty list fits "
+        "every array type, and a list of mixed types fits none."
+    ),
+    bad="""\
 system: parameters
 nodes:
   driver:
     parameters: {waypoints: []}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   driver:
     parameters: {waypoints: {type: double_array, default: []}}
 """,
-    )
 )
 
 

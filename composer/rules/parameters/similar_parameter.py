@@ -8,21 +8,19 @@ from pathlib import PurePath
 from composer.analysis.context import Context
 from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.python_nodes import behaviors
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Node, Parameter
 from composer.spelling import is_typo
 
-RULE = register(
-    Rule(
-        code="RC216",
-        name="similar-parameter",
-        severity=Severity.WARNING,
-        summary="A derived node type declares an unused parameter, named like one of its base.",
-        why=(
-            "A value in 'parameters' sets a parameter of the base type, or declares a new one. "
-            "If the name is misspelled, the real parameter silently keeps its default."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC216",
+    name="similar-parameter",
+    summary="A derived node type declares an unused parameter, named like one of its base.",
+    why=(
+        "A value in 'parameters' sets a parameter of the base type, or declares a new one. "
+        "If the name is misspelled, the real parameter silently keeps its default."
+    ),
+    bad="""\
 # file: nodes/fast.yaml
 node: fast
 extends: base
@@ -32,7 +30,7 @@ node: base
 parameters: {speed: 1.0}
 on_activate: {log: "at {parameters.speed} m/s"}
 """,
-        good="""\
+    good="""\
 # file: nodes/fast.yaml
 node: fast
 extends: base
@@ -42,7 +40,6 @@ node: base
 parameters: {speed: 1.0}
 on_activate: {log: "at {parameters.speed} m/s"}
 """,
-    )
 )
 
 

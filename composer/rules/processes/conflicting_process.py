@@ -6,35 +6,32 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.names import topic_name_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC479",
-        name="conflicting-process",
-        severity=Severity.ERROR,
-        summary="A node is in two processes, or a process has no node or no valid name.",
-        why=(
-            "Two processes with the same node would publish everything twice. A process is part of "
-            "names in ROS, and one without nodes does nothing."
-        ),
-        bad="""\
+RULE = error(
+    code="RC479",
+    name="conflicting-process",
+    summary="A node is in two processes, or a process has no node or no valid name.",
+    why=(
+        "Two processes with the same node would publish everything twice. A process is part of "
+        "names in ROS, and one without nodes does nothing."
+    ),
+    bad="""\
 system: robot
 processes: {vision: {nodes: [camera]}, control: {nodes: ["*"]}}
 nodes:
   camera: {on_activate: {log: started}}
   arm: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 processes: {vision: {nodes: [camera]}, control: {nodes: [arm]}}
 nodes:
   camera: {on_activate: {log: started}}
   arm: {on_activate: {log: started}}
 """,
-    )
 )
 
 

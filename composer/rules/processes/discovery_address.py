@@ -5,33 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model.discovery import interface_problem, peer_problem, server_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC497",
-        name="discovery-address",
-        severity=Severity.ERROR,
-        summary="An address or an interface of discovery is not valid, or is repeated.",
-        why=(
-            "Fast DDS ignores what it cannot read: nodes would start, and never discover each "
-            "other. The position of a server in the list is part of its identity."
-        ),
-        bad="""\
+RULE = error(
+    code="RC497",
+    name="discovery-address",
+    summary="An address or an interface of discovery is not valid, or is repeated.",
+    why=(
+        "Fast DDS ignores what it cannot read: nodes would start, and never discover each "
+        "other. The position of a server in the list is part of its identity."
+    ),
+    bad="""\
 system: lights
 discovery: {kind: server, address: "192.168.1.10:118110"}
 nodes:
   lamp: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: lights
 discovery: {kind: server, address: "192.168.1.10:11811"}
 nodes:
   lamp: {on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -6,33 +6,30 @@ from collections.abc import Iterator, Sequence
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import is_misspelled
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import DiscoveryKind
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC496",
-        name="discovery-setting",
-        severity=Severity.ERROR,
-        summary="A setting of discovery is missing, or has no effect with its kind.",
-        why=(
-            "Processes that look for each other in different ways do not find each other. A server "
-            "without an address cannot be found either."
-        ),
-        bad="""\
+RULE = error(
+    code="RC496",
+    name="discovery-setting",
+    summary="A setting of discovery is missing, or has no effect with its kind.",
+    why=(
+        "Processes that look for each other in different ways do not find each other. A server "
+        "without an address cannot be found either."
+    ),
+    bad="""\
 system: lights
 discovery: {kind: multicast, address: 192.168.1.10}
 nodes:
   lamp: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: lights
 discovery: {kind: server, address: 192.168.1.10}
 nodes:
   lamp: {on_activate: {log: started}}
 """,
-    )
 )
 _NEEDED = {DiscoveryKind.SERVER: "address", DiscoveryKind.PEERS: "peers"}
 _KIND_OF_KEY = {

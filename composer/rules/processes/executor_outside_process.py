@@ -5,33 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 
-RULE = register(
-    Rule(
-        code="RC481",
-        name="executor-outside-process",
-        severity=Severity.WARNING,
-        summary="An executor runs on CPUs that are not among those of its process.",
-        why=(
-            "The CPUs of an executor take precedence, so its threads run where the process was not "
-            "meant to run."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC481",
+    name="executor-outside-process",
+    summary="An executor runs on CPUs that are not among those of its process.",
+    why=(
+        "The CPUs of an executor take precedence, so its threads run where the process was not "
+        "meant to run."
+    ),
+    bad="""\
 system: robot
 processes: {control: {nodes: [arm], cpus: [1]}}
 executors: {motion: {kind: events, cpus: [2]}}
 nodes:
   arm: {executor: motion, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 processes: {control: {nodes: [arm], cpus: [1, 2]}}
 executors: {motion: {kind: events, cpus: [2]}}
 nodes:
   arm: {executor: motion, on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -5,36 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.model import Host
 from composer.model.hosts import domain_problem, login_problem, workspace_problem
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC492",
-        name="invalid-host",
-        severity=Severity.ERROR,
-        summary="A host has an invalid address, user or ROS domain, or an unsafe workspace.",
-        why=(
-            "'compose sync' copies the project to the workspace and may delete other files there, "
-            "so it must be a folder of its own. Addresses and users are words of command lines."
-        ),
-        bad="""\
+RULE = error(
+    code="RC492",
+    name="invalid-host",
+    summary="A host has an invalid address, user or ROS domain, or an unsafe workspace.",
+    why=(
+        "'compose sync' copies the project to the workspace and may delete other files there, "
+        "so it must be a folder of its own. Addresses and users are words of command lines."
+    ),
+    bad="""\
 system: robot
 hosts: {jetson: {user: robot, workspace: /home}}
 processes: {vision: {nodes: [camera], host: jetson}}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 hosts: {jetson: {user: robot, workspace: /home/robot/vision}}
 processes: {vision: {nodes: [camera], host: jetson}}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-    )
 )
 _WORKSPACE_HINT = "name a folder that only holds this project, such as ~/robot"
 

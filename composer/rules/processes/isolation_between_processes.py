@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import Channel
 
-RULE = register(
-    Rule(
-        code="RC541",
-        name="isolation-between-processes",
-        severity=Severity.INFO,
-        summary="A connection whose ports are in different processes has 'isolation'.",
-        why=(
-            "Between processes, messages go through DDS: each receiver has an object of its own, "
-            "and none is shared. The setting has no effect. With 'share', the nodes were probably "
-            "meant to be in one process, for example to exchange images without copies."
-        ),
-        bad="""\
+RULE = info(
+    code="RC541",
+    name="isolation-between-processes",
+    summary="A connection whose ports are in different processes has 'isolation'.",
+    why=(
+        "Between processes, messages go through DDS: each receiver has an object of its own, "
+        "and none is shared. The setting has no effect. With 'share', the nodes were probably "
+        "meant to be in one process, for example to exchange images without copies."
+    ),
+    bad="""\
 system: robot
 processes: {vision: {nodes: [camera]}}
 nodes:
@@ -31,7 +29,7 @@ nodes:
 connections:
   - {topic: /image, from: camera.image, to: detector.image, isolation: share}
 """,
-        good="""\
+    good="""\
 system: robot
 processes: {vision: {nodes: [camera, detector]}}
 nodes:
@@ -43,7 +41,6 @@ nodes:
 connections:
   - {topic: /image, from: camera.image, to: detector.image, isolation: share}
 """,
-    )
 )
 
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model.discovery import host_of, is_loopback
 
-RULE = register(
-    Rule(
-        code="RC498",
-        name="local-discovery",
-        severity=Severity.ERROR,
-        summary="Processes of other computers are to use a local address for discovery.",
-        why=(
-            "For each computer, 127.0.0.1 and localhost are the computer itself, so its processes "
-            "would look for the server, or for their peers, in the wrong place."
-        ),
-        bad="""\
+RULE = error(
+    code="RC498",
+    name="local-discovery",
+    summary="Processes of other computers are to use a local address for discovery.",
+    why=(
+        "For each computer, 127.0.0.1 and localhost are the computer itself, so its processes "
+        "would look for the server, or for their peers, in the wrong place."
+    ),
+    bad="""\
 system: robot
 discovery: {kind: server, address: localhost, start: true}
 hosts: {jetson: {workspace: ~/robot}}
@@ -27,7 +25,7 @@ nodes:
   camera: {on_activate: {log: started}}
   arm: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 discovery: {kind: server, address: 192.168.1.10, start: true}
 hosts: {jetson: {workspace: ~/robot}}
@@ -36,7 +34,6 @@ nodes:
   camera: {on_activate: {log: started}}
   arm: {on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -5,33 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 
-RULE = register(
-    Rule(
-        code="RC482",
-        name="separate-process",
-        severity=Severity.ERROR,
-        summary="The environment of a process separates it from the other processes.",
-        why=(
-            "A process in another ROS domain, or without discovery, cannot be brought up, and its "
-            "nodes receive nothing from the others."
-        ),
-        bad="""\
+RULE = error(
+    code="RC482",
+    name="separate-process",
+    summary="The environment of a process separates it from the other processes.",
+    why=(
+        "A process in another ROS domain, or without discovery, cannot be brought up, and its "
+        "nodes receive nothing from the others."
+    ),
+    bad="""\
 system: robot
 processes:
   vision: {nodes: [camera], environment: {ROS_DOMAIN_ID: "7"}}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 processes:
   vision: {nodes: [camera], environment: {OMP_NUM_THREADS: "2"}}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-    )
 )
 _DOMAIN, _RANGE = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, info
 from composer.model import DEFAULT_EXECUTOR, Node
 
-RULE = register(
-    Rule(
-        code="RC480",
-        name="split-executor",
-        severity=Severity.INFO,
-        summary="Nodes of several processes run on the same executor.",
-        why=(
-            "Each process has an executor of its own with these settings. The nodes of different "
-            "processes do not share its threads, and their callbacks may run at the same time."
-        ),
-        bad="""\
+RULE = info(
+    code="RC480",
+    name="split-executor",
+    summary="Nodes of several processes run on the same executor.",
+    why=(
+        "Each process has an executor of its own with these settings. The nodes of different "
+        "processes do not share its threads, and their callbacks may run at the same time."
+    ),
+    bad="""\
 system: robot
 processes: {control: {nodes: [arm]}}
 executors: {motion: {kind: events, priority: 50}}
@@ -26,7 +24,7 @@ nodes:
   arm: {executor: motion, on_activate: {log: started}}
   base: {executor: motion, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 processes: {control: {nodes: [arm, base]}}
 executors: {motion: {kind: events, priority: 50}}
@@ -34,7 +32,6 @@ nodes:
   arm: {executor: motion, on_activate: {log: started}}
   base: {executor: motion, on_activate: {log: started}}
 """,
-    )
 )
 
 

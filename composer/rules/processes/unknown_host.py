@@ -5,30 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC490",
-        name="unknown-host",
-        severity=Severity.ERROR,
-        summary="A process names an unknown host.",
-        why="Nothing would start the process, and the system would wait for it.",
-        bad="""\
+RULE = error(
+    code="RC490",
+    name="unknown-host",
+    summary="A process names an unknown host.",
+    why="Nothing would start the process, and the system would wait for it.",
+    bad="""\
 system: robot
 hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
 processes: {vision: {host: jetsom}}
 nodes:
   camera: {process: vision, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
 processes: {vision: {host: jetson}}
 nodes:
   camera: {process: vision, on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -5,30 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC478",
-        name="unknown-process",
-        severity=Severity.ERROR,
-        summary="A node names an unknown process, or a process an unknown node.",
-        why="No process would run the node.",
-        bad="""\
+RULE = error(
+    code="RC478",
+    name="unknown-process",
+    summary="A node names an unknown process, or a process an unknown node.",
+    why="No process would run the node.",
+    bad="""\
 system: robot
 processes: {vision: {nodes: [camra]}}
 nodes:
   camera: {on_activate: {log: started}}
   detector: {process: vison, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 processes: {vision: {nodes: [camera]}}
 nodes:
   camera: {on_activate: {log: started}}
   detector: {process: vision, on_activate: {log: started}}
 """,
-    )
 )
 
 

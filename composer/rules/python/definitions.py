@@ -1,12 +1,10 @@
-"""Definitions of the rules on Python, and what their examples have in common."""
+"""Examples of the rules on Python, and rules that are warnings at some places."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
-from typing import TypedDict, Unpack
 
-from composer.diagnostics import Rule, Severity, register
+from composer.diagnostics import Rule, Severity
 
 _TIMER = "timers: {tick: {period_ms: 100}}"
 
@@ -47,27 +45,6 @@ def rclpy_class(*statements: str, keys: str = "", head: str = "", methods: str =
     )
 
 
-class Texts(TypedDict):
-    """What a rule says of itself, as in :class:`composer.diagnostics.Rule`."""
-
-    code: str
-    name: str
-    summary: str
-    why: str
-    bad: str
-    good: str
-
-
 def as_warning(rule: Rule, *, unless: bool = False) -> Rule:
     """Return a rule as a warning, unless its problem certainly keeps a system from running."""
     return rule if unless else replace(rule, severity=Severity.WARNING)
-
-
-def _rule(severity: Severity, **texts: Unpack[Texts]) -> Rule:
-    return register(Rule(severity=severity, **texts))
-
-
-#: These register a rule: errors keep a system from running, infos are only worth knowing.
-error = partial(_rule, Severity.ERROR)
-warning = partial(_rule, Severity.WARNING)
-info = partial(_rule, Severity.INFO)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from composer.rules.python.definitions import error, info, on_tick, warning
+from composer.diagnostics import error, info, warning
+from composer.rules.python.definitions import on_tick
 
 _FAILING = on_tick(
     'raise TransitionFailed("why")', head="from composer.behavior import TransitionFailed"

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from composer.rules.python.definitions import (
-    behavior,
-    error,
-    on_tick,
-    on_total,
-    rclpy_class,
-    warning,
-)
+from composer.diagnostics import error, warning
+from composer.rules.python.definitions import behavior, on_tick, on_total, rclpy_class
 
 _RESET = "services: {reset: {type: std_srvs/srv/Trigger}}"
 _ON_RESET = "class Counter:\n    def on_reset(self, request, response):\n        "

@@ -7,16 +7,14 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.timing.rates import timed_publishers
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 
-RULE = register(
-    Rule(
-        code="RC312",
-        name="deadline-too-short",
-        severity=Severity.WARNING,
-        summary="A publisher's deadline is shorter than its publishing period.",
-        why="Every message is late, and every subscription reports a missed deadline.",
-        bad="""\
+RULE = warning(
+    code="RC312",
+    name="deadline-too-short",
+    summary="A publisher's deadline is shorter than its publishing period.",
+    why="Every message is late, and every subscription reports a missed deadline.",
+    bad="""\
 system: deadline
 nodes:
   robot:
@@ -24,7 +22,7 @@ nodes:
       pose: {type: geometry_msgs/msg/Pose, qos: {deadline_ms: 50}, external: true}
     timers: {step: {period_ms: 100, publish: {pose: {}}}}
 """,
-        good="""\
+    good="""\
 system: deadline
 nodes:
   robot:
@@ -32,7 +30,6 @@ nodes:
       pose: {type: geometry_msgs/msg/Pose, qos: {deadline_ms: 150}, external: true}
     timers: {step: {period_ms: 100, publish: {pose: {}}}}
 """,
-    )
 )
 
 

@@ -5,35 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import ChannelKind
 from composer.qos import History
 
-RULE = register(
-    Rule(
-        code="RC314",
-        name="keep-all",
-        severity=Severity.INFO,
-        summary="A publisher or subscription keeps all messages.",
-        why=(
-            "If a subscription is slower than its publisher, the queue grows until memory runs "
-            "out, or a reliable publisher blocks. Set a depth instead."
-        ),
-        bad="""\
+RULE = info(
+    code="RC314",
+    name="keep-all",
+    summary="A publisher or subscription keeps all messages.",
+    why=(
+        "If a subscription is slower than its publisher, the queue grows until memory runs "
+        "out, or a reliable publisher blocks. Set a depth instead."
+    ),
+    bad="""\
 system: queues
 nodes:
   talker:
     publishers:
       chatter: {type: std_msgs/msg/String, qos: {history: keep_all}, external: true}
 """,
-        good="""\
+    good="""\
 system: queues
 nodes:
   talker:
     publishers:
       chatter: {type: std_msgs/msg/String, qos: {history: keep_last, depth: 100}, external: true}
 """,
-    )
 )
 
 

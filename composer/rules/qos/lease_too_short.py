@@ -7,21 +7,19 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.timing.rates import timed_publishers
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.qos import Liveliness
 
-RULE = register(
-    Rule(
-        code="RC319",
-        name="lease-too-short",
-        severity=Severity.WARNING,
-        summary="A publisher's liveliness lease is shorter than its publishing period.",
-        why=(
-            "With 'liveliness: manual_by_topic', each message renews the lease. If it ends "
-            "before the next message, every subscription reports that the publisher is not "
-            "alive."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC319",
+    name="lease-too-short",
+    summary="A publisher's liveliness lease is shorter than its publishing period.",
+    why=(
+        "With 'liveliness: manual_by_topic', each message renews the lease. If it ends "
+        "before the next message, every subscription reports that the publisher is not "
+        "alive."
+    ),
+    bad="""\
 system: liveliness
 nodes:
   robot:
@@ -32,7 +30,7 @@ nodes:
         external: true
     timers: {step: {period_ms: 100, publish: {pose: {}}}}
 """,
-        good="""\
+    good="""\
 system: liveliness
 nodes:
   robot:
@@ -43,7 +41,6 @@ nodes:
         external: true
     timers: {step: {period_ms: 100, publish: {pose: {}}}}
 """,
-    )
 )
 
 

@@ -7,19 +7,17 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.timing.rates import timed_publishers
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 
-RULE = register(
-    Rule(
-        code="RC313",
-        name="lifespan-too-short",
-        severity=Severity.WARNING,
-        summary="A publisher's lifespan is shorter than its publishing period.",
-        why=(
-            "Between an expired message and the next one there is no message: a late joiner or a "
-            "slow subscription receives nothing."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC313",
+    name="lifespan-too-short",
+    summary="A publisher's lifespan is shorter than its publishing period.",
+    why=(
+        "Between an expired message and the next one there is no message: a late joiner or a "
+        "slow subscription receives nothing."
+    ),
+    bad="""\
 system: lifespan
 nodes:
   robot:
@@ -27,7 +25,7 @@ nodes:
       pose: {type: geometry_msgs/msg/Pose, qos: {lifespan_ms: 50}, external: true}
     timers: {step: {period_ms: 100, publish: {pose: {}}}}
 """,
-        good="""\
+    good="""\
 system: lifespan
 nodes:
   robot:
@@ -35,7 +33,6 @@ nodes:
       pose: {type: geometry_msgs/msg/Pose, qos: {lifespan_ms: 200}, external: true}
     timers: {step: {period_ms: 100, publish: {pose: {}}}}
 """,
-    )
 )
 
 

@@ -6,22 +6,20 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import listed
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import ChannelKind, Node, Port
 from composer.qos import QosProfile
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC531",
-        name="outside-qos",
-        severity=Severity.WARNING,
-        summary="A connection sets another QoS than a port of a program or external node declares.",
-        why=(
-            "The composer cannot set the QoS of nodes outside its process. They keep their own, so "
-            "the other ports of the connection may not match them."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC531",
+    name="outside-qos",
+    summary="A connection sets another QoS than a port of a program or external node declares.",
+    why=(
+        "The composer cannot set the QoS of nodes outside its process. They keep their own, so "
+        "the other ports of the connection may not match them."
+    ),
+    bad="""\
 system: lidar
 nodes:
   lidar:
@@ -32,7 +30,7 @@ nodes:
 connections:
   - {topic: /scan, from: lidar.scan, to: mapper.scan, qos: command}
 """,
-        good="""\
+    good="""\
 system: lidar
 nodes:
   lidar:
@@ -43,7 +41,6 @@ nodes:
 connections:
   - {topic: /scan, from: lidar.scan, to: mapper.scan, qos: sensor_data}
 """,
-    )
 )
 
 #: The policies that decide whether two endpoints match.

@@ -6,33 +6,30 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import ChannelKind
 
-RULE = register(
-    Rule(
-        code="RC501",
-        name="qos-implicit",
-        severity=Severity.INFO,
-        summary="A publisher or subscription does not set its QoS profile.",
-        why=(
-            "It gets rclpy's default: reliable, volatile, keep last 10. That suits commands, but "
-            "neither sensor streams nor states that late joiners need. An explicit profile shows "
-            "that the choice is deliberate."
-        ),
-        bad="""\
+RULE = info(
+    code="RC501",
+    name="qos-implicit",
+    summary="A publisher or subscription does not set its QoS profile.",
+    why=(
+        "It gets rclpy's default: reliable, volatile, keep last 10. That suits commands, but "
+        "neither sensor streams nor states that late joiners need. An explicit profile shows "
+        "that the choice is deliberate."
+    ),
+    bad="""\
 system: implicit
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, external: true}}
 """,
-        good="""\
+    good="""\
 system: implicit
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
 """,
-    )
 )
 
 

@@ -7,23 +7,21 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, location
 from composer.analysis.endpoints.qos_conflicts import QosConflict, qos_conflicts
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Channel
 
-RULE = register(
-    Rule(
-        code="RC311",
-        name="qos-incompatible",
-        severity=Severity.ERROR,
-        summary="One endpoint of a topic or service requests more than the other offers.",
-        why=(
-            "A subscription requests, a publisher offers, and they match only if the offer is at "
-            "least as strong as the request: a best-effort publisher never reaches a reliable "
-            "subscription, while a reliable publisher does reach a best-effort one. Requests and "
-            "responses of services follow the same rule in both directions. Endpoints that do not "
-            "match exchange no data, and ROS logs a warning at most."
-        ),
-        bad="""\
+RULE = error(
+    code="RC311",
+    name="qos-incompatible",
+    summary="One endpoint of a topic or service requests more than the other offers.",
+    why=(
+        "A subscription requests, a publisher offers, and they match only if the offer is at "
+        "least as strong as the request: a best-effort publisher never reaches a reliable "
+        "subscription, while a reliable publisher does reach a best-effort one. Requests and "
+        "responses of services follow the same rule in both directions. Endpoints that do not "
+        "match exchange no data, and ROS logs a warning at most."
+    ),
+    bad="""\
 system: quality
 nodes:
   lidar:
@@ -31,7 +29,7 @@ nodes:
   mapper:
     subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: command}}
 """,
-        good="""\
+    good="""\
 system: quality
 nodes:
   lidar:
@@ -39,7 +37,6 @@ nodes:
   mapper:
     subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
 """,
-    )
 )
 
 #: Maximum number of further endpoints to show for one problem.

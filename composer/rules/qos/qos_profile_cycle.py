@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import NamedQos
 
-RULE = register(
-    Rule(
-        code="RC318",
-        name="qos-profile-cycle",
-        severity=Severity.ERROR,
-        summary="QoS profiles extend each other in a cycle.",
-        why="None of them has a base to start from.",
-        bad="""\
+RULE = error(
+    code="RC318",
+    name="qos-profile-cycle",
+    summary="QoS profiles extend each other in a cycle.",
+    why="None of them has a base to start from.",
+    bad="""\
 system: profiles
 qos_profiles:
   odometry: {extends: pose, depth: 1}
@@ -23,7 +21,7 @@ qos_profiles:
 nodes:
   robot: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: profiles
 qos_profiles:
   odometry: {extends: sensor_data, depth: 1}
@@ -32,7 +30,6 @@ nodes:
   robot:
     publishers: {pose: {type: geometry_msgs/msg/Pose, qos: pose, external: true}}
 """,
-    )
 )
 
 

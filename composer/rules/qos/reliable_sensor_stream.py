@@ -7,35 +7,32 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number, port_name
 from composer.analysis.timing.rates import rates
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, info
 from composer.model import ChannelKind, Port, PortOfNode
 from composer.qos import Reliability
 
-RULE = register(
-    Rule(
-        code="RC317",
-        name="reliable-sensor-stream",
-        severity=Severity.INFO,
-        summary="High-rate sensor data is published reliably.",
-        why=(
-            "Resending a lost image delays all that follow, and the old image is no longer "
-            "needed. The 'sensor_data' preset is best effort."
-        ),
-        bad="""\
+RULE = info(
+    code="RC317",
+    name="reliable-sensor-stream",
+    summary="High-rate sensor data is published reliably.",
+    why=(
+        "Resending a lost image delays all that follow, and the old image is no longer "
+        "needed. The 'sensor_data' preset is best effort."
+    ),
+    bad="""\
 system: stream
 nodes:
   camera:
     publishers: {image: {type: sensor_msgs/msg/Image, qos: command, external: true}}
     timers: {frame: {rate_hz: 30, publish: {image: {}}}}
 """,
-        good="""\
+    good="""\
 system: stream
 nodes:
   camera:
     publishers: {image: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}}
     timers: {frame: {rate_hz: 30, publish: {image: {}}}}
 """,
-    )
 )
 
 FAST_HZ = 10.0

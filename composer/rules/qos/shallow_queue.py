@@ -7,22 +7,20 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.timing.rates import rates
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import ChannelKind
 from composer.qos import Durability, History, QosProfile, Reliability
 
-RULE = register(
-    Rule(
-        code="RC315",
-        name="shallow-queue",
-        severity=Severity.WARNING,
-        summary="A reliable topic with a high rate has a queue depth of 1.",
-        why=(
-            "Reliable delivery loses no message in transit, but a queue of depth 1 replaces each "
-            "message that is not taken before the next one arrives. If only the latest value "
-            "matters, use best effort or transient local."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC315",
+    name="shallow-queue",
+    summary="A reliable topic with a high rate has a queue depth of 1.",
+    why=(
+        "Reliable delivery loses no message in transit, but a queue of depth 1 replaces each "
+        "message that is not taken before the next one arrives. If only the latest value "
+        "matters, use best effort or transient local."
+    ),
+    bad="""\
 system: queues
 nodes:
   robot:
@@ -30,7 +28,7 @@ nodes:
       order: {type: std_msgs/msg/String, qos: {extends: command, depth: 1}, external: true}
     timers: {step: {rate_hz: 50, publish: {order: {data: go}}}}
 """,
-        good="""\
+    good="""\
 system: queues
 nodes:
   robot:
@@ -38,7 +36,6 @@ nodes:
       order: {type: std_msgs/msg/String, qos: {extends: command, depth: 10}, external: true}
     timers: {step: {rate_hz: 50, publish: {order: {data: go}}}}
 """,
-    )
 )
 
 #: In hertz; on slower topics a message is taken before the next one arrives.

@@ -6,35 +6,32 @@ import re
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import PortKind
 from composer.qos import Reliability
 
-RULE = register(
-    Rule(
-        code="RC316",
-        name="unreliable-command",
-        severity=Severity.INFO,
-        summary="A topic whose name suggests commands is best effort.",
-        why=(
-            "A lost reading is followed by the next one; a lost command is never executed. The "
-            "'command' preset is reliable."
-        ),
-        bad="""\
+RULE = info(
+    code="RC316",
+    name="unreliable-command",
+    summary="A topic whose name suggests commands is best effort.",
+    why=(
+        "A lost reading is followed by the next one; a lost command is never executed. The "
+        "'command' preset is reliable."
+    ),
+    bad="""\
 system: orders
 nodes:
   planner:
     publishers:
       motor_commands: {type: geometry_msgs/msg/Twist, qos: sensor_data, external: true}
 """,
-        good="""\
+    good="""\
 system: orders
 nodes:
   planner:
     publishers:
       motor_commands: {type: geometry_msgs/msg/Twist, qos: command, external: true}
 """,
-    )
 )
 
 _COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved, location
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import Connection, Endpoint
 
-RULE = register(
-    Rule(
-        code="RC212",
-        name="port-connected-twice",
-        severity=Severity.ERROR,
-        summary="A port is twice in a connection, or in two with different names or QoS profiles.",
-        why=(
-            "A port has one name and one QoS profile in ROS, so one of the connections would have "
-            "no effect."
-        ),
-        bad="""\
+RULE = error(
+    code="RC212",
+    name="port-connected-twice",
+    summary="A port is twice in a connection, or in two with different names or QoS profiles.",
+    why=(
+        "A port has one name and one QoS profile in ROS, so one of the connections would have "
+        "no effect."
+    ),
+    bad="""\
 system: split
 nodes:
   talker:
@@ -31,7 +29,7 @@ connections:
   - {topic: /left/chatter, from: talker.chatter, to: left.chatter}
   - {topic: /right/chatter, from: talker.chatter, to: right.chatter}
 """,
-        good="""\
+    good="""\
 system: split
 nodes:
   talker:
@@ -43,7 +41,6 @@ nodes:
 connections:
   - {topic: /chatter, from: talker.chatter, to: [left.chatter, right.chatter]}
 """,
-    )
 )
 
 

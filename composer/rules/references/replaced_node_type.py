@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.node_types import replaced_built_in_type
 from composer.project import SETTINGS_FILE, Project
 from composer.source import shown_path
 
-RULE = register(
-    Rule(
-        code="RC214",
-        name="replaced-node-type",
-        severity=Severity.WARNING,
-        summary="A nodes folder that no settings declare replaces a built-in node type.",
-        why=(
-            "Without settings, the nearest folder named nodes in any parent folder is used. It may "
-            "have nothing to do with the system."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC214",
+    name="replaced-node-type",
+    summary="A nodes folder that no settings declare replaces a built-in node type.",
+    why=(
+        "Without settings, the nearest folder named nodes in any parent folder is used. It may "
+        "have nothing to do with the system."
+    ),
+    bad="""\
 # file: system.yaml
 system: demo
 nodes:
@@ -29,7 +27,7 @@ nodes:
 node: relay
 on_activate: {log: started}
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: demo
 nodes:
@@ -40,7 +38,6 @@ on_activate: {log: started}
 # file: composer.yaml
 nodes: [nodes]
 """,
-    )
 )
 
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 from composer.model import DEFAULT_EXECUTOR
 
-RULE = register(
-    Rule(
-        code="RC207",
-        name="unknown-executor",
-        severity=Severity.ERROR,
-        summary="A node runs on an executor that is not declared under executors.",
-        why="The callbacks of the node would never run.",
-        bad="""\
+RULE = error(
+    code="RC207",
+    name="unknown-executor",
+    summary="A node runs on an executor that is not declared under executors.",
+    why="The callbacks of the node would never run.",
+    bad="""\
 system: threads
 executors:
   perception: {kind: multi_threaded, threads: 4}
@@ -23,7 +21,7 @@ nodes:
   camera: {executor: percepton, on_activate: {log: started}}
   detector: {executor: perception, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: threads
 executors:
   perception: {kind: multi_threaded, threads: 4}
@@ -31,7 +29,6 @@ nodes:
   camera: {executor: perception, on_activate: {log: started}}
   detector: {executor: perception, on_activate: {log: started}}
 """,
-    )
 )
 
 

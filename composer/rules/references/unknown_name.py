@@ -7,34 +7,31 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.messages.expressions import EVENT_NAMES, ExpressionSite, expression_sites
 from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC209",
-        name="unknown-name",
-        severity=Severity.ERROR,
-        summary="An expression uses a name that is not in scope.",
-        why=(
-            "The available names depend on the event: 'message' in a subscription, 'request' in a "
-            "service, 'response' in on_response, and so on. 'parameters', 'state', 'count', 'now' "
-            "and 'node' are always available."
-        ),
-        bad="""\
+RULE = error(
+    code="RC209",
+    name="unknown-name",
+    summary="An expression uses a name that is not in scope.",
+    why=(
+        "The available names depend on the event: 'message' in a subscription, 'request' in a "
+        "service, 'response' in on_response, and so on. 'parameters', 'state', 'count', 'now' "
+        "and 'node' are always available."
+    ),
+    bad="""\
 system: names
 nodes:
   listener:
     subscriptions:
       chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{msg.data}"}
 """,
-        good="""\
+    good="""\
 system: names
 nodes:
   listener:
     subscriptions:
       chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
 """,
-    )
 )
 
 

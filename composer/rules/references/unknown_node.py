@@ -7,29 +7,26 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.endpoints.references import endpoints
 from composer.analysis.spans import part_of
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 from composer.model import Endpoint, Node
 
-RULE = register(
-    Rule(
-        code="RC202",
-        name="unknown-node",
-        severity=Severity.ERROR,
-        summary="A connection, a dependency or --set names a node that is not in this system.",
-        why="The connection would have no effect, and the dependency could never be met.",
-        bad="""\
+RULE = error(
+    code="RC202",
+    name="unknown-node",
+    summary="A connection, a dependency or --set names a node that is not in this system.",
+    why="The connection would have no effect, and the dependency could never be met.",
+    bad="""\
 system: dependency
 nodes:
   planner: {on_activate: {log: ready}}
   motor_controller: {lifecycle: {depends_on: [planer]}}
 """,
-        good="""\
+    good="""\
 system: dependency
 nodes:
   planner: {on_activate: {log: ready}}
   motor_controller: {lifecycle: {depends_on: [planner]}}
 """,
-    )
 )
 
 

@@ -5,30 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC201",
-        name="unknown-node-type",
-        severity=Severity.ERROR,
-        summary="A node's type is neither in the project's nodes/ folder nor built in.",
-        why="Without the type, the ports and the behavior of the node are unknown.",
-        bad="""\
+RULE = error(
+    code="RC201",
+    name="unknown-node-type",
+    summary="A node's type is neither in the project's nodes/ folder nor built in.",
+    why="Without the type, the ports and the behavior of the node are unknown.",
+    bad="""\
 system: stubs
 nodes:
   planner:
     type: servce_stub
     variables: {service_type: std_srvs/srv/Trigger}
 """,
-        good="""\
+    good="""\
 system: stubs
 nodes:
   planner:
     type: service_stub
     variables: {service_type: std_srvs/srv/Trigger}
 """,
-    )
 )
 
 

@@ -9,24 +9,22 @@ from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, Severity, error, suggestion
 from composer.model import Node
 from composer.source import Span
 from composer.spelling import is_typo
 
-RULE = register(
-    Rule(
-        code="RC206",
-        name="unknown-parameter",
-        severity=Severity.ERROR,
-        summary="A parameter that is not declared is set, or read by an expression.",
-        why=(
-            "A misspelled parameter leaves the real one at its default, which goes unnoticed "
-            "until the robot moves at the wrong speed. A class, an executable or an external node "
-            "may have parameters that it does not declare: without 'only_declared', only a "
-            "probable misspelling is reported, as an info."
-        ),
-        bad="""\
+RULE = error(
+    code="RC206",
+    name="unknown-parameter",
+    summary="A parameter that is not declared is set, or read by an expression.",
+    why=(
+        "A misspelled parameter leaves the real one at its default, which goes unnoticed "
+        "until the robot moves at the wrong speed. A class, an executable or an external node "
+        "may have parameters that it does not declare: without 'only_declared', only a "
+        "probable misspelling is reported, as an info."
+    ),
+    bad="""\
 system: parameters
 nodes:
   source:
@@ -35,7 +33,7 @@ nodes:
     publishers: {output: {external: true}}
     parameters: {rate: 2.0}
 """,
-        good="""\
+    good="""\
 system: parameters
 nodes:
   source:
@@ -44,7 +42,6 @@ nodes:
     publishers: {output: {external: true}}
     parameters: {rate_hz: 2.0}
 """,
-    )
 )
 
 

@@ -9,31 +9,28 @@ from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.analysis.endpoints.references import endpoints
 from composer.analysis.messages.reactions import sends
 from composer.analysis.spans import part_of
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 from composer.model import Endpoint, Node, PortKind
 
-RULE = register(
-    Rule(
-        code="RC203",
-        name="unknown-port",
-        severity=Severity.ERROR,
-        summary="A connection, a reaction or a node with a type names a port that does not exist.",
-        why="No data would flow: a port must be declared by the node or by its type.",
-        bad="""\
+RULE = error(
+    code="RC203",
+    name="unknown-port",
+    summary="A connection, a reaction or a node with a type names a port that does not exist.",
+    why="No data would flow: a port must be declared by the node or by its type.",
+    bad="""\
 system: ports
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     timers: {tick: {period_ms: 1000, publish: {chattter: {data: hello}}}}
 """,
-        good="""\
+    good="""\
 system: ports
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
 """,
-    )
 )
 
 _SECTIONS = frozenset(kind.section for kind in PortKind)

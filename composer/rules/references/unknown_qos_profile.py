@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.endpoints.references import known_profiles, unknown_profiles
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC205",
-        name="unknown-qos-profile",
-        severity=Severity.ERROR,
-        summary="A QoS profile is neither declared under qos_profiles nor a preset.",
-        why=(
-            "Falling back to another profile could create endpoints that never match, without an "
-            "error at run time."
-        ),
-        bad="""\
+RULE = error(
+    code="RC205",
+    name="unknown-qos-profile",
+    summary="A QoS profile is neither declared under qos_profiles nor a preset.",
+    why=(
+        "Falling back to another profile could create endpoints that never match, without an "
+        "error at run time."
+    ),
+    bad="""\
 system: profile
 nodes:
   talker:
     publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_dada, external: true}}
 """,
-        good="""\
+    good="""\
 system: profile
 nodes:
   talker:
     publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
 """,
-    )
 )
 
 

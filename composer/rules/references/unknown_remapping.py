@@ -7,38 +7,35 @@ from dataclasses import replace
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.endpoints.references import matched_ports, own_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Severity, error, suggestion
 from composer.model import Node, Remapping
 from composer.names import topic_name_problem
 from composer.source import Located
 from composer.spelling import is_typo
 
-RULE = register(
-    Rule(
-        code="RC208",
-        name="unknown-remapping",
-        severity=Severity.ERROR,
-        summary="A remapping names a topic, service or action that no port of the node uses.",
-        why=(
-            "ROS ignores such a remapping silently, and the port keeps its name. A class, an "
-            "executable or an external node may use names that it does not declare: without "
-            "'only_declared', only a probable misspelling is reported, as an info."
-        ),
-        bad="""\
+RULE = error(
+    code="RC208",
+    name="unknown-remapping",
+    summary="A remapping names a topic, service or action that no port of the node uses.",
+    why=(
+        "ROS ignores such a remapping silently, and the port keeps its name. A class, an "
+        "executable or an external node may use names that it does not declare: without "
+        "'only_declared', only a probable misspelling is reported, as an info."
+    ),
+    bad="""\
 system: renamed
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     remappings: {chater: news}
 """,
-        good="""\
+    good="""\
 system: renamed
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
     remappings: {chatter: news}
 """,
-    )
 )
 
 _RULE_IF_PASSED_ON = replace(RULE, severity=Severity.INFO)

@@ -9,32 +9,29 @@ from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.messages.expressions import expression_sites
 from composer.analysis.messages.reactions import reactions
 from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import Node
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC210",
-        name="unknown-state",
-        severity=Severity.ERROR,
-        summary="A reaction uses or sets a state variable that the node does not declare.",
-        why="State variables are declared with their initial value, so that they always have one.",
-        bad="""\
+RULE = error(
+    code="RC210",
+    name="unknown-state",
+    summary="A reaction uses or sets a state variable that the node does not declare.",
+    why="State variables are declared with their initial value, so that they always have one.",
+    bad="""\
 system: memory
 nodes:
   counter:
     state: {last: 0.0}
     timers: {tick: {period_ms: 100, set: {lost: "{now}"}}}
 """,
-        good="""\
+    good="""\
 system: memory
 nodes:
   counter:
     state: {last: 0.0}
     timers: {tick: {period_ms: 100, set: {last: "{now}"}}}
 """,
-    )
 )
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 
-RULE = register(
-    Rule(
-        code="RC204",
-        name="unknown-timer",
-        severity=Severity.ERROR,
-        summary="A node overrides a timer that its node type does not have.",
-        why="A node has only the timers of its type, so the override would have no effect.",
-        bad="""\
+RULE = error(
+    code="RC204",
+    name="unknown-timer",
+    summary="A node overrides a timer that its node type does not have.",
+    why="A node has only the timers of its type, so the override would have no effect.",
+    bad="""\
 system: source
 nodes:
   source:
@@ -23,7 +21,7 @@ nodes:
     publishers: {output: {external: true}}
     timers: {tock: {rate_hz: 2}}
 """,
-        good="""\
+    good="""\
 system: source
 nodes:
   source:
@@ -32,7 +30,6 @@ nodes:
     publishers: {output: {external: true}}
     timers: {tick: {rate_hz: 2}}
 """,
-    )
 )
 
 

@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
-from composer.diagnostics import Diagnostic, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, error, suggestion
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC213",
-        name="unknown-watched-publisher",
-        severity=Severity.ERROR,
-        summary="topic_silence_ms names a publisher that the node does not have.",
-        why="The publisher would not be monitored, and its silence would go unnoticed.",
-        bad="""\
+RULE = error(
+    code="RC213",
+    name="unknown-watched-publisher",
+    summary="topic_silence_ms names a publisher that the node does not have.",
+    why="The publisher would not be monitored, and its silence would go unnoticed.",
+    bad="""\
 system: watching
 nodes:
   lidar:
     publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
     lifecycle: {watch: {topic_silence_ms: {scans: 500}}}
 """,
-        good="""\
+    good="""\
 system: watching
 nodes:
   lidar:
     publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
     lifecycle: {watch: {topic_silence_ms: {scan: 500}}}
 """,
-    )
 )
 
 

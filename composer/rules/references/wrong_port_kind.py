@@ -7,21 +7,19 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import a, either
 from composer.analysis.messages.reactions import sends
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
 
-RULE = register(
-    Rule(
-        code="RC211",
-        name="wrong-port-kind",
-        severity=Severity.ERROR,
-        summary="A port is used where a port of another kind is required.",
-        why=(
-            "Messages go from publishers to subscriptions, requests from clients to services. In "
-            "the other direction, no data can flow."
-        ),
-        bad="""\
+RULE = error(
+    code="RC211",
+    name="wrong-port-kind",
+    summary="A port is used where a port of another kind is required.",
+    why=(
+        "Messages go from publishers to subscriptions, requests from clients to services. In "
+        "the other direction, no data can flow."
+    ),
+    bad="""\
 system: swapped
 nodes:
   talker:
@@ -31,7 +29,7 @@ nodes:
 connections:
   - {topic: /chatter, from: talker.chatter, to: talker.chatter}
 """,
-        good="""\
+    good="""\
 system: swapped
 nodes:
   talker:
@@ -41,7 +39,6 @@ nodes:
 connections:
   - {topic: /chatter, from: talker.chatter, to: listener.chatter}
 """,
-    )
 )
 
 #: For each kind of channel, the keys of a connection and the kinds of port they accept.

@@ -7,17 +7,15 @@ from itertools import pairwise
 
 from composer.analysis.context import Context
 from composer.analysis.timing.chains import input_ports
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC416",
-        name="broken-chain",
-        severity=Severity.ERROR,
-        summary="A node of a chain does not subscribe to the topic of the previous publisher.",
-        why="No data flows through the chain, so its latency is meaningless.",
-        bad="""\
+RULE = error(
+    code="RC416",
+    name="broken-chain",
+    summary="A node of a chain does not subscribe to the topic of the previous publisher.",
+    why="No data flows through the chain, so its latency is meaningless.",
+    bad="""\
 system: chain
 nodes:
   lidar:
@@ -27,7 +25,7 @@ nodes:
 chains:
   stop: {through: [lidar.scan, brake.force], latency_ms: 50}
 """,
-        good="""\
+    good="""\
 system: chain
 nodes:
   lidar:
@@ -39,7 +37,6 @@ nodes:
 chains:
   stop: {through: [lidar.scan, brake.force], latency_ms: 50}
 """,
-    )
 )
 
 

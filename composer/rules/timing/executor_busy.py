@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.timing.executor_load import executor_loads
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 
-RULE = register(
-    Rule(
-        code="RC414",
-        name="executor-busy",
-        severity=Severity.WARNING,
-        summary="The callbacks of an executor may use more than 70 % of its time.",
-        why=(
-            "Above that, callbacks that are due together wait for each other, and there is no "
-            "margin for unexpected load."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC414",
+    name="executor-busy",
+    summary="The callbacks of an executor may use more than 70 % of its time.",
+    why=(
+        "Above that, callbacks that are due together wait for each other, and there is no "
+        "margin for unexpected load."
+    ),
+    bad="""\
 system: load
 nodes:
   motor:
     timers: {control: {rate_hz: 100, budget_ms: 8, log: control}}
 """,
-        good="""\
+    good="""\
 system: load
 nodes:
   motor:
     timers: {control: {rate_hz: 100, budget_ms: 5, log: control}}
 """,
-    )
 )
 
 BUSY = 0.7

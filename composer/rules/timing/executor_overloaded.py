@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.timing.executor_load import executor_loads
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 
-RULE = register(
-    Rule(
-        code="RC413",
-        name="executor-overloaded",
-        severity=Severity.ERROR,
-        summary="The callbacks of an executor may need more time than it has.",
-        why=(
-            "The sum of rate times 'budget_ms' over the callbacks of an executor exceeds the "
-            "capacity of its threads: timers fire later and later, and queues overflow."
-        ),
-        bad="""\
+RULE = error(
+    code="RC413",
+    name="executor-overloaded",
+    summary="The callbacks of an executor may need more time than it has.",
+    why=(
+        "The sum of rate times 'budget_ms' over the callbacks of an executor exceeds the "
+        "capacity of its threads: timers fire later and later, and queues overflow."
+    ),
+    bad="""\
 system: load
 nodes:
   motor:
@@ -26,7 +24,7 @@ nodes:
   camera:
     timers: {frame: {rate_hz: 30, budget_ms: 10, log: frame}}
 """,
-        good="""\
+    good="""\
 system: load
 executors:
   perception: {kind: single_threaded}
@@ -37,7 +35,6 @@ nodes:
     executor: perception
     timers: {frame: {rate_hz: 30, budget_ms: 10, log: frame}}
 """,
-    )
 )
 
 

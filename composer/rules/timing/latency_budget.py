@@ -7,19 +7,17 @@ from collections.abc import Iterable, Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.timing.chains import ChainDelay, chain_delays
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 
-RULE = register(
-    Rule(
-        code="RC415",
-        name="latency-budget",
-        severity=Severity.ERROR,
-        summary="The periods and budgets along a chain add up to more than its latency.",
-        why=(
-            "A node that publishes from a timer delays its input by up to one period. No "
-            "processor can make up for delays that the periods cause."
-        ),
-        bad="""\
+RULE = error(
+    code="RC415",
+    name="latency-budget",
+    summary="The periods and budgets along a chain add up to more than its latency.",
+    why=(
+        "A node that publishes from a timer delays its input by up to one period. No "
+        "processor can make up for delays that the periods cause."
+    ),
+    bad="""\
 system: chain
 nodes:
   lidar:
@@ -33,7 +31,7 @@ nodes:
 chains:
   stop: {through: [lidar.scan, brake.force], latency_ms: 50}
 """,
-        good="""\
+    good="""\
 system: chain
 nodes:
   lidar:
@@ -45,7 +43,6 @@ nodes:
 chains:
   stop: {through: [lidar.scan, brake.force], latency_ms: 50}
 """,
-    )
 )
 
 

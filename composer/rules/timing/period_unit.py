@@ -6,32 +6,29 @@ import ast
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, warning
 from composer.expressions import Expression
 from composer.model import Node, Parameter, PeriodUnit, Timer
 
-RULE = register(
-    Rule(
-        code="RC535",
-        name="period-unit",
-        severity=Severity.WARNING,
-        summary="A period in milliseconds, or a rate in hertz, is a parameter in another unit.",
-        why="The timer fires at another rate than the parameter says: 20 Hz is not 20 ms.",
-        bad="""\
+RULE = warning(
+    code="RC535",
+    name="period-unit",
+    summary="A period in milliseconds, or a rate in hertz, is a parameter in another unit.",
+    why="The timer fires at another rate than the parameter says: 20 Hz is not 20 ms.",
+    bad="""\
 system: units
 nodes:
   motor:
     parameters: {rate_hz: 20.0}
     timers: {step: {period_ms: "{parameters.rate_hz}", log: step}}
 """,
-        good="""\
+    good="""\
 system: units
 nodes:
   motor:
     parameters: {rate_hz: 20.0}
     timers: {step: {rate_hz: "{parameters.rate_hz}", log: step}}
 """,
-    )
 )
 
 #: Units of time and rate, as parameters declare them or end with.

@@ -5,32 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import Executor, ExecutorKind
 
-RULE = register(
-    Rule(
-        code="RC417",
-        name="single-thread",
-        severity=Severity.WARNING,
-        summary="An executor has one thread, but is declared as if it had several.",
-        why=(
-            "With one thread, callbacks never run at the same time. A multi_threaded executor with "
-            "one thread still costs the locking of several; the other kinds ignore 'threads'."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC417",
+    name="single-thread",
+    summary="An executor has one thread, but is declared as if it had several.",
+    why=(
+        "With one thread, callbacks never run at the same time. A multi_threaded executor with "
+        "one thread still costs the locking of several; the other kinds ignore 'threads'."
+    ),
+    bad="""\
 system: threads
 executors: {perception: {kind: multi_threaded, threads: 1}}
 nodes:
   camera: {executor: perception, on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: threads
 executors: {perception: {kind: multi_threaded, threads: 2}}
 nodes:
   camera: {executor: perception, on_activate: {log: started}}
 """,
-    )
 )
 
 

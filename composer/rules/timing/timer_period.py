@@ -7,33 +7,30 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.expressions import Expression
 from composer.model import Node, PeriodError, PeriodUnit, Timer
 
-RULE = register(
-    Rule(
-        code="RC411",
-        name="timer-period",
-        severity=Severity.ERROR,
-        summary="A timer's period is not positive, or outside the practical range.",
-        why=(
-            "rcl refuses periods that are not positive. Periods under 0.1 ms are too short for "
-            "Python; periods over one day are almost always a unit error."
-        ),
-        bad="""\
+RULE = error(
+    code="RC411",
+    name="timer-period",
+    summary="A timer's period is not positive, or outside the practical range.",
+    why=(
+        "rcl refuses periods that are not positive. Periods under 0.1 ms are too short for "
+        "Python; periods over one day are almost always a unit error."
+    ),
+    bad="""\
 system: timing
 nodes:
   clock:
     timers: {tick: {period_ms: 0.001, log: tick}}
 """,
-        good="""\
+    good="""\
 system: timing
 nodes:
   clock:
     timers: {tick: {period_ms: 1.0, log: tick}}
 """,
-    )
 )
 
 SHORTEST_S = 0.0001

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import PortKind
 
-RULE = register(
-    Rule(
-        code="RC477",
-        name="unmeasured-chain",
-        severity=Severity.WARNING,
-        summary="A chain passes through an executable or external node, or several processes.",
-        why=(
-            "The latency of a chain is measured within one process of the system. What another one "
-            "makes of a message cannot be followed, so the chain is checked statically only."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC477",
+    name="unmeasured-chain",
+    summary="A chain passes through an executable or external node, or several processes.",
+    why=(
+        "The latency of a chain is measured within one process of the system. What another one "
+        "makes of a message cannot be followed, so the chain is checked statically only."
+    ),
+    bad="""\
 system: brake
 nodes:
   lidar:
@@ -31,7 +29,7 @@ nodes:
 chains:
   stop: {through: [lidar.scan, brake.commands], latency_ms: 50}
 """,
-        good="""\
+    good="""\
 system: brake
 nodes:
   lidar:
@@ -44,7 +42,6 @@ nodes:
 chains:
   stop: {through: [lidar.scan, brake.commands], latency_ms: 50}
 """,
-    )
 )
 
 

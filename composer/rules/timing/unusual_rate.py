@@ -6,35 +6,32 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import Node, Timer
 
-RULE = register(
-    Rule(
-        code="RC412",
-        name="unusual-rate",
-        severity=Severity.INFO,
-        summary="A control or perception node runs at an unusual rate.",
-        why=(
-            "Control loops usually run at 50 to 500 Hz: slower loops are unstable, faster ones "
-            "need a real-time system. Perception runs at 10 to 30 Hz, limited by sensors and "
-            "processing. The namespace of a node shows which of the two it is."
-        ),
-        bad="""\
+RULE = info(
+    code="RC412",
+    name="unusual-rate",
+    summary="A control or perception node runs at an unusual rate.",
+    why=(
+        "Control loops usually run at 50 to 500 Hz: slower loops are unstable, faster ones "
+        "need a real-time system. Perception runs at 10 to 30 Hz, limited by sensors and "
+        "processing. The namespace of a node shows which of the two it is."
+    ),
+    bad="""\
 system: rates
 nodes:
   motor_controller:
     namespace: control
     timers: {step: {rate_hz: 5, log: step}}
 """,
-        good="""\
+    good="""\
 system: rates
 nodes:
   motor_controller:
     namespace: control
     timers: {step: {rate_hz: 100, log: step}}
 """,
-    )
 )
 
 #: Lowest and highest usual rate in hertz, by a level of the namespace.

@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.frames import Broadcast, frame_trees, place
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 
-RULE = register(
-    Rule(
-        code="RC510",
-        name="conflicting-transforms",
-        severity=Severity.ERROR,
-        summary="A frame has several parents, or several nodes broadcast it.",
-        why=(
-            "A frame has one parent and one broadcaster (REP 105). With several, tf2 uses the last "
-            "message, and the frame jumps back and forth."
-        ),
-        bad="""\
+RULE = error(
+    code="RC510",
+    name="conflicting-transforms",
+    summary="A frame has several parents, or several nodes broadcast it.",
+    why=(
+        "A frame has one parent and one broadcaster (REP 105). With several, tf2 uses the last "
+        "message, and the frame jumps back and forth."
+    ),
+    bad="""\
 system: rover
 nodes:
   mounts:
@@ -28,7 +26,7 @@ nodes:
     transforms:
       static: {laser: {parent: mast, translation_m: {z: 0.1}}}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
@@ -38,7 +36,6 @@ nodes:
     transforms:
       static: {laser: {parent: mast, translation_m: {z: 0.1}}}
 """,
-    )
 )
 
 

@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.frames import Broadcast, cycles, frame_trees, place
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 
-RULE = register(
-    Rule(
-        code="RC511",
-        name="frame-cycle",
-        severity=Severity.ERROR,
-        summary="Frames are parents of each other in a cycle.",
-        why=(
-            "Frames form a tree. In a cycle, tf2 finds no transform, and reports that a frame is "
-            "its own parent."
-        ),
-        bad="""\
+RULE = error(
+    code="RC511",
+    name="frame-cycle",
+    summary="Frames are parents of each other in a cycle.",
+    why=(
+        "Frames form a tree. In a cycle, tf2 finds no transform, and reports that a frame is "
+        "its own parent."
+    ),
+    bad="""\
 system: rover
 nodes:
   mounts:
@@ -27,7 +25,7 @@ nodes:
         laser: {parent: mast, translation_m: {z: 0.1}}
         mast: {parent: laser, translation_m: {z: 0.2}}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
@@ -36,7 +34,6 @@ nodes:
         laser: {parent: mast, translation_m: {z: 0.1}}
         mast: {parent: base_link, translation_m: {z: 0.2}}
 """,
-    )
 )
 
 

@@ -7,36 +7,33 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.frames import uses_of_behaviors
 from composer.analysis.messages.reactions import message_templates
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import Transforms
 from composer.source import Located, Span
 from composer.templates import Constant, Items, Record, Template, Text
 
-RULE = register(
-    Rule(
-        code="RC309",
-        name="frame-id-slash",
-        severity=Severity.WARNING,
-        summary="A frame ID begins with a slash.",
-        why=(
-            "tf2 refuses frame IDs with a leading slash: every lookup of the frame fails. Frame "
-            "IDs are not in the namespace of a node."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC309",
+    name="frame-id-slash",
+    summary="A frame ID begins with a slash.",
+    why=(
+        "tf2 refuses frame IDs with a leading slash: every lookup of the frame fails. Frame "
+        "IDs are not in the namespace of a node."
+    ),
+    bad="""\
 system: frames
 nodes:
   robot:
     publishers: {header: {type: std_msgs/msg/Header, qos: command, external: true}}
     timers: {tick: {period_ms: 100, publish: {header: {frame_id: /odom}}}}
 """,
-        good="""\
+    good="""\
 system: frames
 nodes:
   robot:
     publishers: {header: {type: std_msgs/msg/Header, qos: command, external: true}}
     timers: {tick: {period_ms: 100, publish: {header: {frame_id: odom}}}}
 """,
-    )
 )
 
 

@@ -5,31 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, error
 from composer.geometry import is_unit, normalized
 
-RULE = register(
-    Rule(
-        code="RC516",
-        name="invalid-quaternion",
-        severity=Severity.ERROR,
-        summary="A quaternion is not of length 1.",
-        why=("Only unit quaternions are rotations. tf2 ignores transforms with others."),
-        bad="""\
+RULE = error(
+    code="RC516",
+    name="invalid-quaternion",
+    summary="A quaternion is not of length 1.",
+    why=("Only unit quaternions are rotations. tf2 ignores transforms with others."),
+    bad="""\
 system: rover
 nodes:
   mounts:
     transforms:
       static: {laser: {parent: base_link, quaternion: {z: 1.0, w: 1.0}}}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
     transforms:
       static: {laser: {parent: base_link, quaternion: {z: 0.70711, w: 0.70711}}}
 """,
-    )
 )
 
 

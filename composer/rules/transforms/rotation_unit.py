@@ -7,33 +7,30 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 
 _FULL_TURN = 2.0 * math.pi
 _TOLERANCE = 1.001
 
-RULE = register(
-    Rule(
-        code="RC533",
-        name="rotation-unit",
-        severity=Severity.WARNING,
-        summary="An angle in 'rotation_rad' is more than a full turn.",
-        why="Such angles are usually degrees, and the frame then points somewhere else.",
-        bad="""\
+RULE = warning(
+    code="RC533",
+    name="rotation-unit",
+    summary="An angle in 'rotation_rad' is more than a full turn.",
+    why="Such angles are usually degrees, and the frame then points somewhere else.",
+    bad="""\
 system: rover
 nodes:
   mounts:
     transforms:
       static: {laser: {parent: base_link, rotation_rad: {yaw: 180}}}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
     transforms:
       static: {laser: {parent: base_link, rotation_deg: {yaw: 180}}}
 """,
-    )
 )
 
 

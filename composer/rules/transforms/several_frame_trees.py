@@ -7,23 +7,21 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import listed
 from composer.analysis.frames import FrameTree, complete_trees, cycles, gaps, nearest_parent, place
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.spelling import is_typo
 
 _PAIR = 2  # of trees
 
-RULE = register(
-    Rule(
-        code="RC514",
-        name="several-frame-trees",
-        severity=Severity.WARNING,
-        summary="The frames of the system form several trees.",
-        why=(
-            "There is no transform between frames of different trees. Often the name of a parent "
-            "is misspelled, or a transform is missing. Robots that share nothing can have topics "
-            "of their own: remap /tf and /tf_static."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC514",
+    name="several-frame-trees",
+    summary="The frames of the system form several trees.",
+    why=(
+        "There is no transform between frames of different trees. Often the name of a parent "
+        "is misspelled, or a transform is missing. Robots that share nothing can have topics "
+        "of their own: remap /tf and /tf_static."
+    ),
+    bad="""\
 system: rover
 nodes:
   mounts:
@@ -32,7 +30,7 @@ nodes:
         laser: {parent: base_link, translation_m: {z: 0.3}}
         camera: {parent: base_lnk, translation_m: {x: 0.1}}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
@@ -41,7 +39,6 @@ nodes:
         laser: {parent: base_link, translation_m: {z: 0.3}}
         camera: {parent: base_link, translation_m: {x: 0.1}}
 """,
-    )
 )
 
 

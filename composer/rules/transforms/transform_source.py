@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import (
     POSE_TYPES,
     DynamicTransform,
@@ -16,17 +16,15 @@ from composer.model import (
     StaticTransform,
 )
 
-RULE = register(
-    Rule(
-        code="RC515",
-        name="transform-source",
-        severity=Severity.ERROR,
-        summary="Nothing broadcasts a declared transform.",
-        why=(
-            "A dynamic transform comes from a subscription with poses. Without it, or for a static "
-            "transform with 'from_code', the node needs code that broadcasts it."
-        ),
-        bad="""\
+RULE = error(
+    code="RC515",
+    name="transform-source",
+    summary="Nothing broadcasts a declared transform.",
+    why=(
+        "A dynamic transform comes from a subscription with poses. Without it, or for a static "
+        "transform with 'from_code', the node needs code that broadcasts it."
+    ),
+    bad="""\
 system: rover
 nodes:
   localization:
@@ -34,7 +32,7 @@ nodes:
     transforms:
       dynamic: {base_link: {parent: odom, from: odometri}}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   localization:
@@ -42,7 +40,6 @@ nodes:
     transforms:
       dynamic: {base_link: {parent: odom, from: odometry}}
 """,
-    )
 )
 
 

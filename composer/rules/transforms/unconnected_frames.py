@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.frames import FrameTree, Gap, complete_trees, gaps, nearest_parent, place
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register
+from composer.diagnostics import Diagnostic, Label, error
 
-RULE = register(
-    Rule(
-        code="RC513",
-        name="unconnected-frames",
-        severity=Severity.ERROR,
-        summary="A node looks up frames that no chain of transforms connects.",
-        why=(
-            "There is a transform between two frames only if they have a common ancestor. Every "
-            "lookup between these frames fails."
-        ),
-        bad="""\
+RULE = error(
+    code="RC513",
+    name="unconnected-frames",
+    summary="A node looks up frames that no chain of transforms connects.",
+    why=(
+        "There is a transform between two frames only if they have a common ancestor. Every "
+        "lookup between these frames fails."
+    ),
+    bad="""\
 system: rover
 nodes:
   mounts:
@@ -30,7 +28,7 @@ nodes:
     external: true
     transforms: {lookup: [laser, camera]}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
@@ -42,7 +40,6 @@ nodes:
     external: true
     transforms: {lookup: [laser, camera]}
 """,
-    )
 )
 
 

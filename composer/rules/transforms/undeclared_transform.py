@@ -8,21 +8,19 @@ from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.frame_uses import BROADCAST, FrameUse
 from composer.analysis.frames import place, uses_of_behaviors
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, suggestion
+from composer.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import DynamicTransform, Node, StaticTransform
 from composer.source import Located
 
-RULE = register(
-    Rule(
-        code="RC517",
-        name="undeclared-transform",
-        severity=Severity.ERROR,
-        summary="A behavior looks up or broadcasts transforms that its node does not declare.",
-        why=(
-            "The node listens to /tf only if it declares 'lookup', and broadcasts only the frames "
-            "that it declares. Otherwise these could not be checked."
-        ),
-        bad="""\
+RULE = error(
+    code="RC517",
+    name="undeclared-transform",
+    summary="A behavior looks up or broadcasts transforms that its node does not declare.",
+    why=(
+        "The node listens to /tf only if it declares 'lookup', and broadcasts only the frames "
+        "that it declares. Otherwise these could not be checked."
+    ),
+    bad="""\
 # file: system.yaml
 system: rover
 nodes:
@@ -38,7 +36,7 @@ class Mount:
     def on_tick(self):
         self.transforms.broadcast("griper", Transform())
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: rover
 nodes:
@@ -54,7 +52,6 @@ class Mount:
     def on_tick(self):
         self.transforms.broadcast("gripper", Transform())
 """,
-    )
 )
 
 

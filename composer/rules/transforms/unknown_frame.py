@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.frames import complete_trees, cycles, place
-from composer.diagnostics import Diagnostic, Rule, Severity, nearest, register
+from composer.diagnostics import Diagnostic, error, nearest
 
-RULE = register(
-    Rule(
-        code="RC512",
-        name="unknown-frame",
-        severity=Severity.ERROR,
-        summary="A node looks up a frame that no node broadcasts.",
-        why=(
-            "Every lookup of the frame fails. Frames of external nodes are declared as well: in "
-            "the 'transforms' of the external node or executable that broadcasts them."
-        ),
-        bad="""\
+RULE = error(
+    code="RC512",
+    name="unknown-frame",
+    summary="A node looks up a frame that no node broadcasts.",
+    why=(
+        "Every lookup of the frame fails. Frames of external nodes are declared as well: in "
+        "the 'transforms' of the external node or executable that broadcasts them."
+    ),
+    bad="""\
 system: rover
 nodes:
   mounts:
@@ -28,7 +26,7 @@ nodes:
     external: true
     transforms: {lookup: [base_link, lasr]}
 """,
-        good="""\
+    good="""\
 system: rover
 nodes:
   mounts:
@@ -38,7 +36,6 @@ nodes:
     external: true
     transforms: {lookup: [base_link, laser]}
 """,
-    )
 )
 
 

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic
+from composer.diagnostics import Diagnostic, warning
 from composer.model import ImplementationKind, Node, PortKind
 from composer.python_code.nodes.behaviors import handlers
-from composer.rules.python.definitions import warning
 
 _IDLE = """\
 system: idle

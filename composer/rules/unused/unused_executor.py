@@ -6,31 +6,28 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import DEFAULT_EXECUTOR
 
-RULE = register(
-    Rule(
-        code="RC245",
-        name="unused-executor",
-        severity=Severity.INFO,
-        summary="No node runs on a declared executor.",
-        why="The executor is left over, or a node that was meant for it runs on another one.",
-        bad="""\
+RULE = info(
+    code="RC245",
+    name="unused-executor",
+    summary="No node runs on a declared executor.",
+    why="The executor is left over, or a node that was meant for it runs on another one.",
+    bad="""\
 system: threads
 executors:
   perception: {kind: multi_threaded, threads: 4}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: threads
 executors:
   perception: {kind: multi_threaded, threads: 4}
 nodes:
   camera: {executor: perception, on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -5,29 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 
-RULE = register(
-    Rule(
-        code="RC491",
-        name="unused-host",
-        severity=Severity.WARNING,
-        summary="A host has no process.",
-        why="Nothing of the system runs on it.",
-        bad="""\
+RULE = warning(
+    code="RC491",
+    name="unused-host",
+    summary="A host has no process.",
+    why="Nothing of the system runs on it.",
+    bad="""\
 system: robot
 hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: robot
 hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
 processes: {vision: {nodes: [camera], host: jetson}}
 nodes:
   camera: {on_activate: {log: started}}
 """,
-    )
 )
 
 

@@ -17,39 +17,36 @@ from composer.diagnostics import (
     Rule,
     Severity,
     nearest,
-    register,
     registered_rules,
     shown,
+    warning,
 )
 from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
-RULE = register(
-    Rule(
-        code="RC502",
-        name="unused-ignore",
-        severity=Severity.WARNING,
-        summary="An ignore comment suppresses no diagnostic.",
-        why=(
-            "The problem has been fixed, or the rule's name is misspelled. If the comment stays, "
-            "it hides the next problem on that line. Errors cannot be ignored, because a system "
-            "with errors does not run."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC502",
+    name="unused-ignore",
+    summary="An ignore comment suppresses no diagnostic.",
+    why=(
+        "The problem has been fixed, or the rule's name is misspelled. If the comment stays, "
+        "it hides the next problem on that line. Errors cannot be ignored, because a system "
+        "with errors does not run."
+    ),
+    bad="""\
 system: silence
 nodes:
   talker:
     # compose: ignore[publisher-without-subscription]
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
 """,
-        good="""\
+    good="""\
 system: silence
 nodes:
   talker:
     # compose: ignore[publisher-without-subscription] read with ros2 topic echo
     publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
 """,
-    )
 )
 
 _MARK = "compose:"

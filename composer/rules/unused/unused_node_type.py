@@ -5,30 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import System
 from composer.resolve.tree_values import is_opaque
 
-RULE = register(
-    Rule(
-        code="RC244",
-        name="unused-node-type",
-        severity=Severity.INFO,
-        summary="No validated system uses a validated node type.",
-        why=(
-            "The node type is left over, or a system uses another one instead. Reported only if "
-            "systems and node types are validated together."
-        ),
-        bad="""\
+RULE = info(
+    code="RC244",
+    name="unused-node-type",
+    summary="No validated system uses a validated node type.",
+    why=(
+        "The node type is left over, or a system uses another one instead. Reported only if "
+        "systems and node types are validated together."
+    ),
+    bad="""\
 nodes/planner.yaml
 nodes/old_planner.yaml
 systems/pipeline.yaml    # uses planner only
 """,
-        good="""\
+    good="""\
 nodes/planner.yaml
 systems/pipeline.yaml    # uses planner
 """,
-    )
 )
 
 

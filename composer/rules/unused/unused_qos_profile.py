@@ -7,26 +7,24 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.endpoints.references import unknown_profiles
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 
-RULE = register(
-    Rule(
-        code="RC242",
-        name="unused-qos-profile",
-        severity=Severity.INFO,
-        summary="A declared QoS profile is not used by any port, connection or other profile.",
-        why=(
-            "The profile is left over, or a port that should use it has a different QoS profile "
-            "than intended."
-        ),
-        bad="""\
+RULE = info(
+    code="RC242",
+    name="unused-qos-profile",
+    summary="A declared QoS profile is not used by any port, connection or other profile.",
+    why=(
+        "The profile is left over, or a port that should use it has a different QoS profile "
+        "than intended."
+    ),
+    bad="""\
 system: profiles
 qos_profiles:
   odometry: {extends: sensor_data, depth: 1}
 nodes:
   talker: {on_activate: {log: started}}
 """,
-        good="""\
+    good="""\
 system: profiles
 qos_profiles:
   odometry: {extends: sensor_data, depth: 1}
@@ -34,7 +32,6 @@ nodes:
   robot:
     publishers: {odometry: {type: nav_msgs/msg/Odometry, qos: odometry, external: true}}
 """,
-    )
 )
 
 

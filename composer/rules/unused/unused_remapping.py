@@ -6,20 +6,18 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.endpoints.references import matched_ports, own_name
-from composer.diagnostics import Diagnostic, Rule, Severity, register, shown
+from composer.diagnostics import Diagnostic, shown, warning
 from composer.model import ImplementationKind, Node, Port, Remapping
 
-RULE = register(
-    Rule(
-        code="RC241",
-        name="unused-remapping",
-        severity=Severity.WARNING,
-        summary="A remapping, or the name of a port, has no effect because of a connection.",
-        why=(
-            "The name in a connection takes precedence over a remapping, so the port does not "
-            "have the name that the remapping suggests."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC241",
+    name="unused-remapping",
+    summary="A remapping, or the name of a port, has no effect because of a connection.",
+    why=(
+        "The name in a connection takes precedence over a remapping, so the port does not "
+        "have the name that the remapping suggests."
+    ),
+    bad="""\
 system: renamed
 nodes:
   talker:
@@ -30,7 +28,7 @@ nodes:
 connections:
   - {topic: /chatter, from: talker.chatter, to: listener.chatter}
 """,
-        good="""\
+    good="""\
 system: renamed
 nodes:
   talker:
@@ -40,7 +38,6 @@ nodes:
 connections:
   - {topic: /chatter, from: talker.chatter, to: listener.chatter}
 """,
-    )
 )
 
 _NAMES_IN_CODE = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE)

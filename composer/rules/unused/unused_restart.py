@@ -5,32 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import OnFailure, Supervision
 from composer.source import Span
 
-RULE = register(
-    Rule(
-        code="RC407",
-        name="unused-restart",
-        severity=Severity.WARNING,
-        summary="restart is set, but failed nodes are not restarted.",
-        why="Without 'on_failure: restart', a failed node stays down, and 'restart' has no effect.",
-        bad="""\
+RULE = warning(
+    code="RC407",
+    name="unused-restart",
+    summary="restart is set, but failed nodes are not restarted.",
+    why="Without 'on_failure: restart', a failed node stays down, and 'restart' has no effect.",
+    bad="""\
 system: restarting
 nodes:
   lidar:
     on_activate: {log: started}
     lifecycle: {restart: {max_attempts: 3}}
 """,
-        good="""\
+    good="""\
 system: restarting
 nodes:
   lidar:
     on_activate: {log: started}
     lifecycle: {on_failure: restart, restart: {max_attempts: 3}}
 """,
-    )
 )
 
 
