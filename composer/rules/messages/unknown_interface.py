@@ -5,35 +5,32 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown
+from composer.diagnostics import Diagnostic, Label, error, shown
 from composer.interfaces import Interfaces, InvalidDefinition
 from composer.interfaces.index import similar_interface
 from composer.interfaces.sources import FOLDERS
 from composer.model import Port
 from composer.source import shown_path
 
-RULE = register(
-    Rule(
-        code="RC301",
-        name="unknown-interface",
-        severity=Severity.ERROR,
-        summary=(
-            "A port's type is neither installed nor defined in an interface package of the project."
-        ),
-        why="Without the definition, the port cannot be created, and its uses cannot be checked.",
-        bad="""\
+RULE = error(
+    code="RC301",
+    name="unknown-interface",
+    summary=(
+        "A port's type is neither installed nor defined in an interface package of the project."
+    ),
+    why="Without the definition, the port cannot be created, and its uses cannot be checked.",
+    bad="""\
 system: types
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/Strin, qos: command, external: true}}
 """,
-        good="""\
+    good="""\
 system: types
 nodes:
   talker:
     publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
 """,
-    )
 )
 
 
