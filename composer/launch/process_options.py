@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from launch import LaunchContext
@@ -19,59 +20,47 @@ def process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
 
     Times are in seconds. ``left_out`` are options that a system does not have.
     """
-    options = _Options(node, context)
-    found: dict[str, Any] = {"left_out": list(options.left_out())}
-    if options.respawns:
-        delay = options.attribute("respawn_delay")
-        found["respawn_delay"] = 0.0 if delay is None else float(options.text(delay))
-        found["respawn_max_retries"] = int(options.attribute("respawn_max_retries") or -1)
+    given = _attribute(node, "on_exit")
+    on_exit = list(given) if isinstance(given, list | tuple) else [given] if given else []
+    found: dict[str, Any] = {
+        "cwd": text_of(node.cwd, context) if node.cwd else None,
+        "ends_launch": any(map(_is_shutdown, on_exit)),
+        "left_out": list(_left_out(node, context, on_exit)),
+    }
+    if perform_typed_substitution(context, _attribute(node, "respawn") or False, bool):
+        delay = _attribute(node, "respawn_delay")
+        found["respawn_delay"] = 0.0 if delay is None else float(text_of(delay, context))
+        found["respawn_max_retries"] = int(_attribute(node, "respawn_max_retries") or -1)
     for name in ("sigterm_timeout", "sigkill_timeout"):
-        timeout_s = float(options.text(options.attribute(name) or str(_SIGNAL_TIMEOUT_S)))
+        timeout_s = float(text_of(_attribute(node, name), context) or _SIGNAL_TIMEOUT_S)
         if timeout_s != _SIGNAL_TIMEOUT_S:
             found[name] = timeout_s
-    found["cwd"] = options.text(node.cwd) if node.cwd else None
-    found["ends_launch"] = any(map(_is_shutdown, options.on_exit))
     return found
 
 
-class _Options:
-    """The attributes of ExecuteLocal, which are private."""
+def text_of(value: Any, context: LaunchContext) -> str:
+    """Return a text, a number or substitutions as a text."""
+    if isinstance(value, int | float):
+        return str(value)
+    return str(perform_substitutions(context, normalize_to_list_of_substitutions(value or "")))
 
-    def __init__(self, node: Any, context: LaunchContext) -> None:
-        self._node = node
-        self._context = context
 
-    @property
-    def respawns(self) -> bool:
-        return bool(
-            perform_typed_substitution(self._context, self.attribute("respawn") or False, bool)
-        )
+def _attribute(node: Any, name: str) -> Any:
+    """Return what ExecuteLocal has been given; it has no public attribute for that."""
+    return getattr(node, f"_ExecuteLocal__{name}", None)
 
-    @property
-    def on_exit(self) -> list[Any]:
-        given = self.attribute("on_exit")
-        return list(given) if isinstance(given, list | tuple) else [given] if given else []
 
-    def attribute(self, name: str) -> Any:
-        return getattr(self._node, f"_ExecuteLocal__{name}", None)
-
-    def text(self, value: Any) -> str:
-        if isinstance(value, int | float):
-            return str(value)
-        return str(perform_substitutions(self._context, normalize_to_list_of_substitutions(value)))
-
-    def left_out(self) -> list[str]:
-        found = []
-        prefix = self.text(self._node.process_description.prefix)
-        if prefix:
-            found.append(f"prefix: {prefix}")
-        if perform_typed_substitution(self._context, self._node.shell, bool):
-            found.append("shell: the program runs without a shell")
-        if self._node.env:
-            found.append("env: the variables are added to the others, and do not replace them")
-        others = (item for item in self.on_exit if not _is_shutdown(item))
-        found += (f"on_exit: {getattr(item, '__name__', type(item).__name__)}" for item in others)
-        return found
+def _left_out(node: Any, context: LaunchContext, on_exit: Iterable[Any]) -> Iterator[str]:
+    prefix = text_of(node.process_description.prefix, context)
+    if prefix:
+        yield f"prefix: {prefix}"
+    if perform_typed_substitution(context, node.shell, bool):
+        yield "shell: the program runs without a shell"
+    if node.env:
+        yield "env: the variables are added to the others, and do not replace them"
+    for item in on_exit:
+        if not _is_shutdown(item):
+            yield f"on_exit: {getattr(item, '__name__', type(item).__name__)}"
 
 
 def _is_shutdown(item: Any) -> bool:

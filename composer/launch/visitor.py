@@ -25,11 +25,10 @@ from launch.actions import (
     TimerAction,
 )
 from launch.launch_description_sources import AnyLaunchDescriptionSource
-from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 from launch_ros.actions import LifecycleNode, LoadComposableNodes, Node
 
 from composer.launch.parameter_values import parameter_values
-from composer.launch.process_options import process_options
+from composer.launch.process_options import process_options, text_of
 from composer.source import shown_path
 
 _UNKNOWN_NAME = "<node_name_unspecified>"
@@ -136,9 +135,7 @@ class Visitor:
         return " ".join(self._text(word) for word in entity.cmd)
 
     def _text(self, value: Any) -> str:
-        if isinstance(value, int | float):
-            return str(value)
-        return str(perform_substitutions(self._context, normalize_to_list_of_substitutions(value)))
+        return text_of(value, self._context)
 
 
 def _cause(error: BaseException) -> str:
