@@ -19,7 +19,7 @@ class CodeIndex:
 
     ``assignments`` are the targets with their values. ``alternatives`` are names that
     several imports or classes bind, of which a condition may select one. ``passed_on`` are names
-    that calls pass.
+    that calls pass, ``tested`` those of which ``hasattr`` asks for an attribute.
     """
 
     def __init__(self, module: Module) -> None:
@@ -30,6 +30,7 @@ class CodeIndex:
         self.names: set[str] = set()
         self.alternatives = {*module.alternatives}
         self.passed_on: set[str] = set()
+        self.tested: set[str] = set()
         self._expressions: dict[int, list[ast.expr]] = defaultdict(list)
         self._guarded: list[ast.Try] = []
         for node in ast.walk(module.tree):
@@ -45,6 +46,8 @@ class CodeIndex:
         elif isinstance(node, ast.Call):
             values = (*node.args, *(keyword.value for keyword in node.keywords))
             self.passed_on.update(dotted(value) for value in values)
+            if dotted(node.func) == "hasattr" and node.args:
+                self.tested.add(dotted(node.args[0]))
 
     def _add_statement(self, node: ast.AST) -> None:
         match node:

@@ -130,6 +130,8 @@ class Relevance:
         if name == "property":
             return False  # of a class instead of a message, which is reported where it is sent
         if isinstance(node, ast.Attribute):
+            if dotted(node.value) in self.code.tested - {"", "self"}:
+                return False  # its class may depend on the version of a package
             if node.attr.startswith("_") and not node.attr.startswith("__"):
                 return name in self.classes and node.attr not in self.attributes
             if name in self.classes or name.startswith("Self@"):

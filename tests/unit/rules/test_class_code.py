@@ -266,6 +266,7 @@ RIGHT = [
     ("init", "self.create_subscription(String, 'x', lambda message, info: None, 10)"),
     ("init", "self.create_subscription(String, 'x', print, 10, raw=True)"),
     ("init", "self.create_timer(1, lambda: self.count_up())"),
+    ("tick", "now = Time()\nif hasattr(now, 'sec'):\n    pass\nelse:\n    now.to_sec()"),
     ("init", "self.get_parameter('use_sim_time')"),
     ("init", "self.rate = self.get_parameter('speed').value * 2.0"),
     ("init", "self.get_logger().info('x', once=True)"),
