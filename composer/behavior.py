@@ -20,6 +20,7 @@ checkers the types of the ports and parameters of node type ``planner``; see ``c
 Every handler may be ``async def``. Lifecycle handlers return nothing. An exception makes the
 transition fail: :class:`TransitionFailed` refuses it, and the node keeps its state; any other
 exception is an error, which calls the node's ``on_error`` and leaves the node unconfigured.
+``self.fail(reason)`` in any handler reports that the node has failed.
 """
 
 from __future__ import annotations
@@ -200,6 +201,17 @@ class Logger(Protocol):
         """Log a fatal error."""
 
 
+class Fail(Protocol):
+    """Reports that the node has failed, from any handler or thread."""
+
+    def __call__(self, reason: str) -> None:
+        """Let the `on_failure` of the node apply, and return.
+
+        During a transition, the transition ends in an error. Messages and the state of the node do
+        not change before the handler returns.
+        """
+
+
 class Clock(Protocol):
     """The node's clock."""
 
@@ -269,6 +281,7 @@ class Behavior:
         "action_clients",
         "clients",
         "clock",
+        "fail",
         "log",
         "name",
         "node",
@@ -285,6 +298,7 @@ class Behavior:
     log: Logger
     clock: Clock
     transforms: Transforms  # only if the node has `transforms`
+    fail: Fail  # self.fail("no device"): `on_failure` of the node applies
     node: Node  # an rclpy Node for libraries that need one; what it creates follows the lifecycle
 
 

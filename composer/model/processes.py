@@ -7,9 +7,11 @@ from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 from composer.fast_dataclass import dataclass
+from composer.model.supervision import OnFailure
 from composer.source import Located, Span
 
 if TYPE_CHECKING:
+    from composer.model.supervision import Supervision
     from composer.model.system import Node, PrimaryState, System
 
 #: ROS reads from it in which enclave a process is.
@@ -42,8 +44,9 @@ def member_system(
 
     The process that runs the whole system coordinates it: it decides when nodes of this part are
     brought up, and how their failures are handled. So they have no dependencies here, stay
-    unconfigured at first, and are only taken down if they fail. ``goals`` are the states in which
-    nodes of the whole system start: the highest that the coordinating process brings them to.
+    unconfigured at first, and are only taken down if they fail, unless that is to be ignored.
+    ``goals`` are the states in which nodes of the whole system start: the highest that the
+    coordinating process brings them to.
     """
     limits = goals or {}
     nodes = tuple(
@@ -52,7 +55,8 @@ def member_system(
             process=None,
             depends_on=(),
             autostart=_located(node, limits.get(node.name.value)),
-            supervision=replace(node.supervision, on_failure=None),
+            supervision=replace(node.supervision, on_failure=_ignored(node.supervision)),
+            required=True,
         )
         for node in system.nodes
         if node.process is not None and node.process.value == process
@@ -80,3 +84,7 @@ def own_enclave(environment: Mapping[str, str], full_name: str) -> dict[str, str
 
 def _located(node: Node, goal: PrimaryState | None) -> Located[PrimaryState] | None:
     return None if goal is None else node.name.map(lambda _: goal)
+
+
+def _ignored(supervision: Supervision) -> Located[OnFailure] | None:
+    return supervision.on_failure if supervision.policy is OnFailure.IGNORE else None

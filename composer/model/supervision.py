@@ -18,6 +18,7 @@ class OnFailure(StrEnum):
     RESTART = "restart"
     ISOLATE = "isolate"  # take it and its dependents down, keep the others running
     SHUTDOWN = "shutdown"  # shut down the whole system
+    IGNORE = "ignore"  # report it, and move no node
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +26,14 @@ class RestartBudget:
     """How often a node is restarted, and with which backoff.
 
     The first restart within ``window_ms`` waits ``backoff_ms``, each further one twice as long as
-    the one before, at most ``backoff_max_ms``. If a node fails again after ``max_attempts``
-    restarts, the system shuts down. ``span`` is the location of the declaration, ``backoff_span``
-    that of the backoff; ``has_window``: it sets ``window_ms``.
+    the one before, at most ``backoff_max_ms``. A node that fails again after ``max_attempts``
+    restarts is given up, and ``then`` is what happens: isolate or shutdown. ``span`` is the
+    location of the declaration, ``backoff_span`` that of the backoff; ``has_window``: it sets
+    ``window_ms``.
     """
 
     max_attempts: int = 5
+    then: OnFailure = OnFailure.ISOLATE
     window_ms: float = 60_000.0
     backoff_ms: float = 500.0
     backoff_max_ms: float = 10_000.0
@@ -67,6 +70,12 @@ class Supervision:
     on_failure: Located[OnFailure] | None = None  # not set: isolate
     restart: RestartBudget = RestartBudget()
     watch: Watch = Watch()
+
+    @property
+    def can_end_system(self) -> bool:
+        """Whether a failure of the node may shut down the system."""
+        gives_up = self.policy is OnFailure.RESTART and self.restart.then is OnFailure.SHUTDOWN
+        return gives_up or self.policy is OnFailure.SHUTDOWN
 
     @property
     def policy(self) -> OnFailure:

@@ -147,6 +147,7 @@ class Node:
     executor: Located[str] | None = None
     process: Located[str] | None = None  # not set: that of the system
     log_level: Located[LogLevel] | None = None  # None: that of the run
+    required: bool = True  # False: the system is up without it
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None
     supervision: Supervision = DEFAULT_SUPERVISION

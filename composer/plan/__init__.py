@@ -6,12 +6,16 @@ move at the same time. :mod:`composer.model.dependencies` defines the dependenci
 """
 
 from composer.plan.bringup import bring_up, start_causes, start_goals, tear_down
-from composer.plan.desired_state import DesiredState, Fault, FaultKind, Restart
+from composer.plan.decision import Decision, decide
+from composer.plan.desired_state import Condition, DesiredState, Fault, FaultKind, Restart
 from composer.plan.reconciliation import (
-    Decision,
+    STARTING,
     blocked_nodes,
-    decide,
+    conditions,
     desired_states,
+    is_nothing_left,
+    is_settled,
+    optional_nodes,
     reconcile,
 )
 from composer.plan.steps import Plan, Step, TransitionName
@@ -19,7 +23,9 @@ from composer.plan.system_goals import STOPPED, SystemGoals, parse_goals, system
 from composer.plan.transitions import plan_transitions
 
 __all__ = [
+    "STARTING",
     "STOPPED",
+    "Condition",
     "Decision",
     "DesiredState",
     "Fault",
@@ -31,8 +37,12 @@ __all__ = [
     "TransitionName",
     "blocked_nodes",
     "bring_up",
+    "conditions",
     "decide",
     "desired_states",
+    "is_nothing_left",
+    "is_settled",
+    "optional_nodes",
     "parse_goals",
     "plan_transitions",
     "reconcile",

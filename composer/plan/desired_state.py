@@ -8,7 +8,7 @@ externally after that, the step or the fault is outdated: the later of two chang
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from enum import StrEnum
 from typing import TypeVar
@@ -27,9 +27,20 @@ class FaultKind(StrEnum):
     SILENCE = "silence"
     CALLBACK = "callback"  # took too long and was interrupted
     ERRORS = "errors"  # too many of them
+    REPORTED = "reported"  # by the node itself
     ENDED = "ended"  # a process or an external node, by itself
-    ABSENT = "absent"  # ended, and only what has started it can start it again
+    ABSENT = "absent"  # not there, and only something else can start it
     LOST = "lost"  # a callback does not return and cannot be interrupted
+
+
+class Condition(StrEnum):
+    """What becomes of a failed node, in the words that users see."""
+
+    RESTARTING = "restarting"  # a restart is scheduled
+    ISOLATED = "isolated"  # down until a command or a tool brings it up
+    GIVEN_UP = "given up"  # the same, after too many restarts
+    ABSENT = "absent"  # down until something else starts it
+    IGNORED = "failure ignored"  # not down: no node is moved
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +70,11 @@ class DesiredState:
     """The desired state of each node, by its key.
 
     ``goals`` are the states requested for the nodes, ``down`` the reasons why failed nodes are kept
-    down anyway. ``scheduled`` are the restarts to come, ``restarts`` the times of earlier ones,
-    oldest first, in seconds of the caller's clock. ``unhandled`` are the nodes with a failed
-    transition whose fault has not been handled, with the serial number of the fault.
+    down anyway, and ``conditions`` what becomes of these. ``ignored`` are the reasons of failures
+    that are ignored: nodes that depend on such a node do without it. ``scheduled`` are the restarts
+    to come, ``restarts`` the times of earlier ones, oldest first, in seconds of the caller's clock.
+    ``unhandled`` are the nodes with a failed transition whose fault has not been handled, with the
+    serial number of the fault.
 
     ``serial`` is the number of the last external transition or failure; ``moved`` and ``failed``
     are the numbers of the last external transition of each node, and of the failure that keeps it
@@ -70,6 +83,8 @@ class DesiredState:
 
     goals: Mapping[str, PrimaryState]
     down: Mapping[str, str] = field(default_factory=dict)
+    conditions: Mapping[str, Condition] = field(default_factory=dict)
+    ignored: Mapping[str, str] = field(default_factory=dict)
     restarts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     scheduled: Mapping[str, Restart] = field(default_factory=dict)
     unhandled: Mapping[str, int] = field(default_factory=dict)
@@ -140,7 +155,7 @@ class DesiredState:
             return self
         return replace(self, unhandled=_without(self.unhandled, fault.node))
 
-    def fail(self, fault: Fault) -> DesiredState:
+    def fail(self, fault: Fault, condition: Condition = Condition.ISOLATED) -> DesiredState:
         """Return a copy that keeps the node of ``fault`` down, unless the fault is outdated."""
         node = fault.node
         handled = self.ignore(fault)
@@ -149,9 +164,18 @@ class DesiredState:
         return replace(
             handled,
             down={**self.down, node: fault.text},
+            conditions={**self.conditions, node: condition},
+            ignored=_without(self.ignored, node),
             serial=self.serial + 1,
             failed={**self.failed, node: self.serial + 1},
         )
+
+    def tolerate(self, fault: Fault) -> DesiredState:
+        """Return a copy in which no other node minds the failure, unless the fault is outdated."""
+        handled = self.ignore(fault)
+        if self.is_outdated(fault):
+            return handled
+        return replace(handled, ignored={**self.ignored, fault.node: fault.text})
 
     def is_outdated(self, fault: Fault) -> bool:
         """Return whether an external transition has moved the node since the fault.
@@ -174,12 +198,20 @@ class DesiredState:
     def release(self, node: str) -> DesiredState:
         """Return a copy that no longer keeps the node down, without a restart to come."""
         return replace(
-            self, down=_without(self.down, node), scheduled=_without(self.scheduled, node)
+            self,
+            down=_without(self.down, node),
+            conditions=_without(self.conditions, node),
+            ignored=_without(self.ignored, node),
+            scheduled=_without(self.scheduled, node),
         )
 
-    def forget_failures(self) -> DesiredState:
-        """Return a copy without failures and restarts."""
-        return replace(self, down={}, restarts={}, scheduled={})
+    def forget_failures(self, nodes: Iterable[str] | None = None) -> DesiredState:
+        """Return a copy without the failures and restarts of nodes, by default of all."""
+        forgotten = self
+        for node in {*self.down, *self.ignored, *self.restarts} if nodes is None else nodes:
+            released = forgotten.release(node)
+            forgotten = replace(released, restarts=_without(released.restarts, node))
+        return forgotten
 
 
 def _without(items: Mapping[str, T], name: str) -> Mapping[str, T]:

@@ -1,4 +1,4 @@
-"""Decide how to handle failed nodes, and plan the transitions from observed to desired states.
+"""Plan the transitions from observed to desired states, with failed nodes kept down.
 
 The desired state of a failed node is unconfigured, that of the nodes that depend on it at most
 inactive unless they are moved externally after it; all others keep theirs. The plan leads from the
@@ -8,53 +8,76 @@ failed node after a backoff.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
-from composer.fast_dataclass import dataclass
-from composer.model import OnFailure, PrimaryState, System
+from composer.model import PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
-from composer.plan.desired_state import DesiredState, Fault, FaultKind
-from composer.plan.steps import Plan, rank
+from composer.plan.desired_state import Condition, DesiredState
+from composer.plan.steps import Plan, nodes_of, rank
 from composer.plan.transitions import plan_transitions
 
+#: The condition of a node that takes its time.
+STARTING = "starting"
 
-@dataclass(frozen=True, slots=True)
-class Decision:
-    """How to handle a fault.
 
-    For ``restart``, the node is taken down now and brought up after ``wait_s``, as attempt number
-    ``attempt`` within the window of its restart policy.
+def conditions(
+    system: System,
+    desired: DesiredState,
+    states: Mapping[str, PrimaryState],
+    moving: Collection[str],
+) -> Mapping[str, str]:
+    """Return what users need to know of nodes that are not where they should be, in words.
+
+    ``moving`` are the nodes in a transition.
     """
+    words: dict[str, str] = {}
+    goals = desired_states(system, desired)
+    for name, needs in _needs(system, desired):
+        if name in desired.down:
+            words[name] = desired.conditions.get(name, Condition.ISOLATED).value
+        elif name in desired.ignored:
+            words[name] = Condition.IGNORED.value
+        elif name in moving:
+            words[name] = STARTING
+        elif states.get(name) is not desired.goals.get(name):
+            missing = (edge.on for edge in needs if not _is_met(edge, states, goals))
+            others = [node.full_name for node in nodes_of(system, missing)]
+            if others:
+                words[name] = f"waiting for {', '.join(others)}"
+    return words
 
-    action: OnFailure
-    reason: str
-    wait_s: float = 0.0
-    attempt: int = 0
 
+def is_settled(system: System, desired: DesiredState, moving: Collection[str]) -> bool:
+    """Return whether a start is over: no required node is on its way up.
 
-def decide(system: System, desired: DesiredState, fault: Fault, now_s: float) -> Decision | None:
-    """Return how to handle ``fault``; None if the node is unknown or already kept down.
-
-    An absent node cannot be restarted, and is isolated until it returns.
+    ``moving`` are the nodes in a transition. A node that has had all of its restarts is not waited
+    for, even if the window in which they count is over: it may fail forever.
     """
-    node = system.node(fault.node)
-    if node is None or fault.node in desired.down:
-        return None
-    policy = node.supervision.policy
-    if policy is not OnFailure.RESTART:
-        return Decision(policy, fault.text)
-    if fault.kind is FaultKind.ABSENT:
-        return Decision(OnFailure.ISOLATE, fault.text)
-    if fault.kind is FaultKind.LOST:
-        return Decision(OnFailure.SHUTDOWN, f"{fault.text}; it cannot be restarted")
-    restart = node.supervision.restart
-    since_s = now_s - restart.window_ms / 1000.0
-    attempts = sum(at_s > since_s for at_s in desired.restarts.get(fault.node, ()))
-    if attempts >= restart.max_attempts:
-        times = "once" if attempts == 1 else f"{attempts} times"
-        within = f"within {restart.window_ms / 1000.0:g} s"
-        return Decision(OnFailure.SHUTDOWN, f"{fault.text}; restarted {times} {within} before")
-    return Decision(OnFailure.RESTART, fault.text, restart.backoff_s(attempts), attempts + 1)
+    for name in {*desired.scheduled, *desired.unhandled, *moving}:
+        node = system.node(name)
+        attempts = len(desired.restarts.get(name, ()))
+        if node and node.required and attempts < node.supervision.restart.max_attempts:
+            return False
+    return True
+
+
+def is_nothing_left(system: System, desired: DesiredState) -> bool:
+    """Return whether every node is isolated or given up, or depends on such a node."""
+    final = (Condition.ISOLATED, Condition.GIVEN_UP)
+    lost = {name for name in desired.down if desired.conditions.get(name) in final}
+    blocked = blocked_nodes(system, desired)
+    names = (node.name.value for node in system.nodes)
+    return bool(lost) and all(name in lost or blocked.get(name) in lost for name in names)
+
+
+def optional_nodes(system: System) -> frozenset[str]:
+    """Return the nodes that are not required, and those that depend on them."""
+    optional: set[str] = set()
+    for name, needs in _needs(system):
+        node = system.node(name)
+        if (node and not node.required) or any(edge.on in optional for edge in needs):
+            optional.add(name)
+    return frozenset(optional)
 
 
 def desired_states(system: System, desired: DesiredState) -> Mapping[str, PrimaryState]:
@@ -79,7 +102,7 @@ def blocked_nodes(system: System, desired: DesiredState) -> Mapping[str, str]:
     blocked: dict[str, str] = {}
     if not desired.down:
         return blocked
-    for name, needs in _needs(system):
+    for name, needs in _needs(system, desired):
         for edge in needs:
             if name in desired.down or name in blocked:
                 break
@@ -105,33 +128,53 @@ def reconcile(
     causes = {node.name.value: why for node in system.nodes}
     causes |= {name: f"it needs {failed}, which is down" for name, failed in blocked.items()}
     causes |= desired.down
-    return plan_transitions(system, states, _reachable(system, states, goals), causes)
+    return plan_transitions(system, states, _reachable(system, desired, states), causes)
 
 
 def _reachable(
-    system: System, states: Mapping[str, PrimaryState], goals: Mapping[str, PrimaryState]
+    system: System, desired: DesiredState, states: Mapping[str, PrimaryState]
 ) -> Mapping[str, PrimaryState]:
     """Return the goals without those that would activate a node before what it depends on.
 
     A dependency that a user keeps down takes no node down, but no node is activated without it, nor
-    before one without a state, which is in a transition or has failed.
+    before one without a state, which is in a transition or has failed. A node whose failure is
+    ignored is not brought up again.
     """
-    reachable = dict(goals)
-    for name, needs in _needs(system):
+    reachable = dict(desired_states(system, desired))
+    for name, needs in _needs(system, desired):
         if name not in states:
             reachable[name] = PrimaryState.UNCONFIGURED
-        elif reachable.get(name) is PrimaryState.ACTIVE and any(
+            continue
+        if name in desired.ignored:
+            reachable[name] = min(reachable.get(name, states[name]), states[name], key=rank)
+        if reachable.get(name) is PrimaryState.ACTIVE and any(
             rank(reachable.get(edge.on, edge.state)) < rank(edge.state) for edge in needs
         ):
             reachable[name] = max(states[name], PrimaryState.INACTIVE, key=rank)
     return reachable
 
 
-def _needs(system: System) -> Iterator[tuple[str, tuple[DependencyEdge, ...]]]:
-    """Yield every node in dependency order, with its dependencies."""
+def _is_met(
+    edge: DependencyEdge,
+    states: Mapping[str, PrimaryState],
+    goals: Mapping[str, PrimaryState],
+) -> bool:
+    at = states.get(edge.on)
+    return at is not None and rank(min(at, goals.get(edge.on, at), key=rank)) >= rank(edge.state)
+
+
+def _needs(
+    system: System, desired: DesiredState | None = None
+) -> Iterator[tuple[str, tuple[DependencyEdge, ...]]]:
+    """Yield every node in dependency order, with its dependencies.
+
+    Without those on nodes whose failure is ignored.
+    """
+    ignored = {} if desired is None else desired.ignored
     edges = dependency_edges(system)
     needs: dict[str, list[DependencyEdge]] = {}
     for edge in edges:
-        needs.setdefault(edge.node, []).append(edge)
+        if edge.on not in ignored:
+            needs.setdefault(edge.node, []).append(edge)
     for name in in_dependency_order(system, edges):
         yield name, tuple(needs.get(name, ()))

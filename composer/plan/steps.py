@@ -13,11 +13,16 @@ from composer.model.dependencies import DependencyEdge
 TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
 
 
+_UPWARD = ("configure", "activate")
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """One transition of one node. ``number`` counts from 1; ``node`` is its key in the system.
 
-    ``after`` are the numbers of the steps of the same phase that have to finish first.
+    ``after`` are the numbers of the steps of the same phase that have to finish first. Without
+    ``is_awaited``, only these nodes wait for the step: its node is not required, or something
+    outside the system has to happen for it.
     """
 
     number: int
@@ -26,6 +31,12 @@ class Step:
     full_name: str
     cause: str
     after: tuple[int, ...] = ()
+    is_awaited: bool = True
+
+    @property
+    def is_upward(self) -> bool:
+        """Whether it needs what the node depends on."""
+        return self.transition in _UPWARD
 
     def __str__(self) -> str:
         after = f" after {' '.join(f'#{number}' for number in self.after)}" if self.after else ""
@@ -99,9 +110,21 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
                     node.full_name,
                     causes[name],
                     tuple(sorted(after)),
+                    _is_awaited(phase.transition, node),
                 )
             )
     return Plan(tuple(steps))
+
+
+def _is_awaited(transition: TransitionName, node: Node) -> bool:
+    """Return whether a plan waits for a transition.
+
+    External nodes have to appear. An executable has to create its ports once it is active.
+    """
+    if transition not in _UPWARD:
+        return True
+    is_started = node.executable is not None and node.process is None and transition == "activate"
+    return node.required and node.external is None and not is_started
 
 
 def upward(edges: Iterable[DependencyEdge], state: PrimaryState) -> Iterable[tuple[str, str]]:

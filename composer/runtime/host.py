@@ -111,19 +111,29 @@ class Host:
                 namespace=join(system.namespace, system.name.value),
                 member_command=self._options.member_command,
                 write_log=self._reporter.log,
+                together=self._main_queue.together,
             ),
         )
         self._supervisor = Supervisor(
             system, self._node_set, self._main_queue, self._status, self._reporter
         )
-        self._start = SystemStart(
-            system, up, self._node_set, self._supervisor, self._main_queue, self._reporter
-        )
         self._commands = Commands(system, self._node_set, self._supervisor, self._status)
+        self._start = SystemStart(
+            system,
+            up,
+            self._node_set,
+            self._supervisor,
+            self._main_queue,
+            self._reporter,
+            self._status,
+            self._run_command,
+            self._options.all_or_nothing,
+        )
         self._failed = False
         self._is_end_limited = False  # the time to the end of the process
         self._is_created = False
         self._summary: tuple[NodeSummary, ...] = ()
+        self._remarks: tuple[str, ...] = ()
         self._shutdown_commands: list[Command] = []
         self._tear_down_end_s = math.inf
         self._is_left_to_exit = False  # only the end of the process removes all nodes
@@ -221,9 +231,13 @@ class Host:
         self._limit(phase_s + _HANGS_AFTER_S if math.isfinite(phase_s) else None)
 
     def _longest_bring_up_s(self) -> float:
-        """Return how long it may take, one step after the other, and the same for a roll-back."""
+        """Return how long it may take, one step after the other, and the same for a roll-back.
+
+        Unless it is all or nothing, nodes that fail are restarted, as often as their policies say.
+        """
         steps_s = sum(self._node_set.timeout_s(step.node) for step in self._up.steps)
-        return min(steps_s, self._options.bring_up_within_s) + steps_s
+        once_s = steps_s if self._options.all_or_nothing else math.inf
+        return min(once_s, self._options.bring_up_within_s) + steps_s
 
     def _limit(self, limit_s: float | None) -> None:
         """End the process after this time, unless the time to its end is limited already."""
@@ -333,6 +347,10 @@ class Host:
             self._main_queue.request_stop("unrecoverable error")
         self._failed = self._failed or self._supervisor.has_failed_nodes
         self._status.set_activity("stopping")
+        remarks = self._status.snapshot().remarks
+        # The reason says that of the node that has ended the system.
+        ended_by = self._stop_reason.partition(" failed")[0]
+        self._remarks = tuple(text for text in remarks if not text.startswith(f"{ended_by} is "))
         self._reporter.report(events.Stopping(self._reporter.elapsed_s, self._stop_reason))
         self._keep_entities()
         stop_within_s = self._options.stop_within_s
@@ -383,6 +401,7 @@ class Host:
             elapsed_s=self._reporter.elapsed_s,
             nodes=self._summary,
             hung=self._is_left_to_exit,
+            remarks=self._remarks,
             callbacks=(*self._node_set.callbacks(), *others.callbacks()),
             chains=merged_chains(self._node_set.chains(), others.chains()),
         )

@@ -14,7 +14,8 @@ class HostOptions:
     """How a system is run.
 
     ``run_for_s`` is how long it runs, ``bring_up_within_s`` the limit of the whole bring-up,
-    ``stop_within_s`` that of the tear-down. ``transition_timeout_s`` overrides the system's.
+    ``stop_within_s`` that of the tear-down. With ``all_or_nothing``, a node that fails during
+    bring-up ends the run, whatever its policy. ``transition_timeout_s`` overrides the system's.
     ``tracing`` records callback timings, also of callbacks without a ``budget_ms``;
     ``check_mutation`` checks after each callback whether it has modified a message.
     ``fail_on_error`` makes errors of user code and failed calls a failure of the run.
@@ -36,6 +37,7 @@ class HostOptions:
     run_for_s: float | None = None
     log_level: LogLevel = LogLevel.INFO
     bring_up_within_s: float = math.inf
+    all_or_nothing: bool = False
     transition_timeout_s: float | None = None
     stop_within_s: float = 1.7
     grace_s: float = 10.0

@@ -1,4 +1,4 @@
-"""External transitions, faults and plans in any order: the supervisor undoes nothing.
+"""External transitions, faults and plans in any order: a failure stays where it is.
 
 The supervisor, the plan executor and the listeners are the real ones. The nodes are simulated,
 without ROS and threads: wherever another thread could run, some external requests come first.
@@ -10,19 +10,26 @@ from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from composer.model import Node, PrimaryState
 from composer.model.dependencies import dependency_edges, in_dependency_order
-from composer.plan import Fault, FaultKind, bring_up, reconcile
+from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Reporter
-from composer.runtime.supervision.main_queue import Command, Item, MainQueue, NodeEvent
+from composer.runtime.supervision.main_queue import (
+    Command,
+    Item,
+    MainQueue,
+    NodeEvent,
+    NodeReturned,
+    StepEnded,
+)
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
@@ -32,16 +39,23 @@ from tests.unit.support.resolving import system_of
 if TYPE_CHECKING:
     from composer.runtime.supervision.node_set import NodeSet
 
+T = TypeVar("T")
+
 ROBOT = """
 system: robot
 lifecycle:
   on_failure: restart
-  restart: {max_attempts: 1000, backoff_ms: 1}
+  restart: {max_attempts: 1000, backoff_ms: 1, backoff_max_ms: 1}
 nodes:
   logger: {lifecycle: {depends_on: {planner: inactive}}}
   motor: {lifecycle: {depends_on: [planner]}}
   planner: {lifecycle: {depends_on: [sensor], on_failure: isolate}}
   sensor: {}
+  arm: {lifecycle: {restart: {max_attempts: 2}}}
+  camera: {lifecycle: {on_failure: ignore}}
+  viewer: {lifecycle: {depends_on: [camera], on_failure: isolate}}
+  operator: {external: true, required: false, lifecycle: {on_failure: shutdown}}
+  teleop: {lifecycle: {depends_on: [operator]}}
 """
 #: The nodes, and those that depend on them.
 DEPENDENTS = {
@@ -49,7 +63,13 @@ DEPENDENTS = {
     "planner": ("motor", "logger"),
     "motor": (),
     "logger": (),
+    "arm": (),
+    "camera": ("viewer",),
+    "viewer": (),
+    "operator": ("teleop",),
+    "teleop": (),
 }
+EXTERNAL = "operator"
 NAMES = tuple(DEPENDENTS)
 GOALS = {
     "configure": "inactive",
@@ -95,7 +115,10 @@ class SimulatedNode:
     transition_started_s = 0.0
 
     def __init__(self, model: Node, world: World, listener: SupervisionListener) -> None:
+        self.model = model
         self.full_name = model.full_name
+        self.is_absent = False  # an external node is awaited by its activation
+        self.awaited: Future[TransitionOutcome] | None = None
         self.state = "unconfigured"
         self.loop = self.lifecycle = self
         self.breaks = False
@@ -113,16 +136,32 @@ class SimulatedNode:
     def is_moving(self) -> bool:
         return bool(self._running)
 
-    def run_task(self, work: Coroutine[Any, Any, TransitionOutcome]) -> Future[TransitionOutcome]:
+    def run_task(
+        self, work: Coroutine[Any, Any, TransitionOutcome | None]
+    ) -> Future[TransitionOutcome]:
         future: Future[TransitionOutcome] = Future()
         try:
             work.send(None)
         except StopIteration as end:
-            future.set_result(end.value)
+            if end.value is None:
+                self.awaited = future
+            else:
+                future.set_result(end.value)
         return future
 
-    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
-        """Wait for an external transition, then run the step as the lifecycle does."""
+    def end_awaited(self, ending: str) -> None:
+        """End the step in which an external node is awaited."""
+        future, self.awaited = self.awaited, None
+        if future is not None:
+            future.set_result(self._finish(ending, external=False))
+
+    async def run_step(
+        self, transition: str, is_outdated: Callable[[], bool]
+    ) -> TransitionOutcome | None:
+        """Wait for an external transition, then run the step as the lifecycle does.
+
+        Return None if an external node is awaited.
+        """
         self._world.interleave()
         self.end("success")
         if is_outdated():
@@ -131,6 +170,9 @@ class SimulatedNode:
             return TransitionOutcome(transition, self.state, False, "refused", external=False)
         self._world.on_step(self._name, transition)
         self._running, self._start = transition, self.state
+        if self.is_absent and transition == "activate":
+            self.state = "activating"
+            return None
         outcome = self._finish("error" if self.breaks else "success", external=False)
         self.breaks = False
         self._world.interleave()
@@ -138,6 +180,8 @@ class SimulatedNode:
 
     def request(self, request: Request) -> None:
         """Run, begin or end an external transition."""
+        if self.awaited is not None:
+            return
         if self._running:
             self.end(request.ending)
         elif self.available:
@@ -148,7 +192,7 @@ class SimulatedNode:
 
     def end(self, ending: str) -> None:
         """End the external transition that runs, if any."""
-        if self._running:
+        if self._running and self.awaited is None:
             self._finish(ending, external=True)
 
     def _finish(self, ending: str, *, external: bool) -> TransitionOutcome:
@@ -184,6 +228,7 @@ class World:
         self._script: Iterator[Request | None] = iter(())
         self._clock = 0
         self.moved_at = dict.fromkeys(NAMES, 0)
+        self.broken: set[str] = set()  # the last step of these nodes has failed
         #: The nodes that the supervisor may move: it had a reason since they were moved externally.
         self.may_move = set(NAMES)
         #: The states that external transitions ended in, of the other nodes.
@@ -201,8 +246,15 @@ class World:
 
     def on_step(self, name: str, transition: str) -> None:
         assert name in self.may_move, f"'{transition}' of {name} undoes an external transition"
+        if transition == "activate":  # what follows a failure is decided before
+            edges = [edge for edge in dependency_edges(SYSTEM) if edge.node == name]
+            missing = [edge.on for edge in edges if edge.on in self.broken]
+            assert not missing, f"{name} is activated without {missing}"
 
     def on_end(self, name: str, outcome: TransitionOutcome) -> None:
+        self.broken.discard(name)
+        if outcome.reason == "error" and not outcome.external and name != "camera":
+            self.broken.add(name)
         if not outcome.external or outcome.reason == "failure":
             return
         self._clock += 1
@@ -243,8 +295,8 @@ class World:
     def is_lost(self, _: str) -> bool:
         return False
 
-    def is_absent(self, _: str) -> bool:
-        return False
+    def is_absent(self, name: str) -> bool:
+        return self.nodes[name].is_absent
 
     def timeout_s(self, _: str) -> float:
         return 10.0
@@ -265,10 +317,28 @@ class NotedQueue(MainQueue[Item]):
         self._world = world
         self.length = 0
         self.noticed: dict[int, int] = {}
+        self.taken: list[Item] = []  # keeps their ids unique
 
     def get(self, until_s: float = 0.0) -> Item | None:
-        self.length -= 1
-        return super().get(until_s)
+        item = super().get(until_s)
+        if item is not None:
+            self._on_taken([item])
+        return item
+
+    def take_next(self, kind: type[T]) -> list[T]:
+        items = super().take_next(kind)
+        self._on_taken(cast("list[Item]", items))
+        return items
+
+    def _on_taken(self, items: Sequence[Item]) -> None:
+        self.length -= len(items)
+        self.taken += items
+        for item in items:
+            if isinstance(item, Fault) and self.noticed[id(item)] < self._world.moved_at[item.node]:
+                continue  # it is outdated
+            # An ignored failure moves no node.
+            if isinstance(item, Fault | StepEnded | NodeReturned) and item.node != "camera":
+                self._world.allow(item.node)
 
     def put(self, item: Item) -> None:
         self.length += 1
@@ -289,30 +359,34 @@ class Supervision(RuleBasedStateMachine):
         node_set = cast("NodeSet", self.world)
         self.supervisor = Supervisor(self.system, node_set, self.queue, status, reporter)
         self.commands = Commands(self.system, node_set, self.supervisor, status)
+        listener_of: dict[str, SupervisionListener] = {}
         for model in self.system.nodes:
             listener = SupervisionListener(
                 model, self.supervisor.shared, self.queue, status, reporter
             )
+            listener_of[model.name.value] = listener
             self.world.nodes[model.name.value] = SimulatedNode(model, self.world, listener)
-        assert self.supervisor.bring_up(bring_up(self.system), 0) is None
-        self.supervisor.set_goals(self.world.states(), 0)
-        self.world.may_move.clear()
-        self.handled: list[NodeEvent] = []  # keeps their ids unique
+        self.listener = listener_of[EXTERNAL]
+        self.external = self.world.nodes[EXTERNAL]
         self.is_reconciled = True
+
+    @initialize(failing=st.sets(st.sampled_from(NAMES)), is_absent=st.booleans())
+    def start(self, failing: set[str], is_absent: bool) -> None:
+        """Bring the system up; some nodes fail, and the external one may not be there."""
+        for name in failing:
+            self.world.nodes[name].breaks = True
+        self.external.is_absent = is_absent
+        goals = dict.fromkeys(NAMES, PrimaryState.ACTIVE)
+        assert self.supervisor.bring_up(goals, lambda _: None, 0, 10.0) is None
+        self.world.may_move -= set(self.active)
 
     @property
     def active(self) -> list[str]:
         return [name for name, node in self.world.nodes.items() if node.state == "active"]
 
-    def is_outdated(self, fault: Fault) -> bool:
-        return self.queue.noticed[id(fault)] < self.world.moved_at[fault.node]
-
     def handle(self) -> None:
         event = cast("NodeEvent", self.queue.get())
-        self.handled.append(event)
         self.is_reconciled = True
-        if isinstance(event, Fault) and not self.is_outdated(event):
-            self.world.allow(event.node)
         self.supervisor.handle(event)
 
     @rule(request=REQUESTS)
@@ -354,7 +428,26 @@ class Supervision(RuleBasedStateMachine):
         _, restart = min(self.supervisor.desired.scheduled.items())
         self.world.allow(restart.node)
         self.world.play(script)
-        self.supervisor.restart(restart)
+        self.supervisor.restart([restart])
+
+    @precondition(lambda self: not self.external.is_absent and not self.external.is_moving)
+    @rule()
+    def the_external_node_disappears(self) -> None:
+        self.external.is_absent = True
+        if self.external.state in ("inactive", "active"):
+            self.external.state = "unconfigured"
+            self.world.allow(EXTERNAL)
+            self.listener.on_ended("it has disappeared", "unconfigured", is_awaited=True)
+
+    @precondition(lambda self: self.external.is_absent)
+    @rule(is_late=st.booleans())
+    def the_external_node_appears(self, is_late: bool) -> None:
+        """It appears while it is awaited, or after that has failed."""
+        if is_late:
+            self.external.end_awaited("failure")
+        self.external.is_absent = False
+        self.external.end_awaited("success")
+        self.listener.on_returned()
 
     @rule(name=st.sampled_from(("startup", "startup", "pause", "resume", "reset")), script=SCRIPTS)
     def command(self, name: str, script: Script) -> None:
@@ -378,7 +471,50 @@ class Supervision(RuleBasedStateMachine):
             assert desired.scheduled.keys() <= desired.down.keys()
             self.world.play([])
             plan = reconcile(self.system, desired, self.world.states(), "")
-            assert not [step for step in plan.steps if not self.world.nodes[step.node].is_moving]
+            left = [step for step in plan.steps if not self.world.nodes[step.node].is_moving]
+            assert not [step for step in left if step.node not in absent(desired)]
+
+    @invariant()
+    def a_failure_stays_where_it_is(self) -> None:
+        """Only nodes that fail, and those that depend on them, are not where they should be."""
+        if self.queue.length or not self.is_reconciled:
+            return
+        desired, nodes = self.supervisor.desired, self.world.nodes
+        failed = {*desired.down, *desired.ignored}
+        for edge in dependency_edges(self.system):
+            if edge.on in desired.down and desired.failed_after_move_of(edge.node, edge.on):
+                assert nodes[edge.node].state != "active", f"{edge.node} without {edge.on}"
+        for name, goal in desired.goals.items():
+            if goal is not PrimaryState.ACTIVE or nodes[name].state == "active":
+                continue
+            edges = [edge for edge in dependency_edges(self.system) if edge.node == name]
+            missing = [edge.on for edge in edges if edge.on not in desired.ignored]
+            missing = [on for on in missing if nodes[on].state != "active"]
+            is_moving = any(nodes[other].is_moving for other in (name, *missing))
+            assert name in failed or missing or is_moving, f"{name} is {nodes[name].state}"
+
+    @invariant()
+    def each_failure_is_handled_by_its_policy(self) -> None:
+        desired = self.supervisor.desired
+        assert self.queue.stop_reason is None, "no node may end the system"
+        assert desired.ignored.keys() <= {"camera"}
+        assert "camera" not in desired.down
+        for name, condition in desired.conditions.items():
+            expected = {
+                "arm": {Condition.RESTARTING, Condition.GIVEN_UP},
+                "planner": {Condition.ISOLATED},
+                "viewer": {Condition.ISOLATED},
+                EXTERNAL: {Condition.ISOLATED, Condition.ABSENT},
+            }
+            assert condition in expected.get(name, {Condition.RESTARTING})
+            assert (condition is Condition.RESTARTING) == (name in desired.scheduled)
+            if condition is Condition.GIVEN_UP:
+                assert len(desired.restarts[name]) >= 2
+
+
+def absent(desired: DesiredState) -> list[str]:
+    """Return the nodes that are left as they are until they return."""
+    return [name for name, item in desired.conditions.items() if item is Condition.ABSENT]
 
 
 SYSTEM = system_of(ROBOT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,9 @@ from composer.behavior import Behavior
 class Planner(Behavior):
     pass
 """
+
+
+TOGETHER = HostOptions(all_or_nothing=True)
 
 
 def test_up_in_dependency_order_and_down_in_reverse(tmp_path: Path, peer: Peer) -> None:
@@ -95,7 +99,7 @@ def test_a_failing_bring_up_is_rolled_back_in_reverse(
         def {handler}(self):
             {body}
     """
-    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), HostOptions(), None)
+    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), TOGETHER, None)
     outcome = system.end()
     transition = "configure" if handler == "__init__" else handler.removeprefix("on_")
     assert outcome.exit_code == 1
@@ -115,7 +119,7 @@ def test_a_failing_bring_up_is_rolled_back_in_reverse(
 
 def test_a_behavior_that_cannot_be_imported_fails_the_bring_up(tmp_path: Path) -> None:
     module = "import no_such_module"
-    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), HostOptions(), None)
+    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), TOGETHER, None)
     assert system.end().exit_code == 1
     assert "ModuleNotFoundError" in system.reported(RollingBack)[0].reason
 
@@ -188,7 +192,7 @@ def test_a_stuck_node_is_reported_before_it_continues(tmp_path: Path) -> None:
 def test_a_hanging_transition_fails_the_bring_up(tmp_path: Path) -> None:
     text = HANGING.replace("KIND", "events")
     module = HANG.format(handler="on_configure")
-    options = HostOptions(transition_timeout_s=1.0)
+    options = replace(TOGETHER, transition_timeout_s=1.0)
     system = RunningSystem(system_of(text, tmp_path, planner=module), options, None)
     outcome = system.end()
     assert (outcome.exit_code, outcome.hung) == (1, True)

@@ -119,6 +119,14 @@ LogLevelOption = Annotated[
     typer.Option("--log-level", help="Minimum severity of log messages.", show_default="info"),
 ]
 
+AllOrNothing = Annotated[
+    bool,
+    typer.Option(
+        "--all-or-nothing",
+        help="Undo the bring-up if a node fails, whatever its 'on_failure'.",
+    ),
+]
+
 
 def options_of_run(
     settings: Sequence[str],

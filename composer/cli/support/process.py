@@ -20,6 +20,8 @@ from composer.cli.support.output.line_format import CONSOLE_FORMAT_VARIABLE, fil
 
 #: Holds the file descriptor on which a background process reports that the system is up.
 READY_VARIABLE = "COMPOSE_READY_FD"
+#: The beginning of a report that not all nodes are up.
+_INCOMPLETE = "incomplete: "
 _LOG_TAIL_LINES = 20
 _READ_BYTES = 4096
 _MIN_DELAY_S = 0.001
@@ -38,7 +40,8 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
 
     Its output goes to a file in the ROS log folder. Raises CommandError with the last lines of that
     file if the process ends first. After ``limit_s`` seconds without a report the process is
-    killed.
+    killed. If a node is not up that the system needs, the process runs on, and CommandError is
+    raised as well.
     """
     log = _log_path(system)
     output = _new_file(log)
@@ -73,7 +76,11 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     if not report:
         process.wait()
         raise _start_error(f"the system did not come up (exit code {process.returncode}):", log)
-    return f"{report} (process {process.pid}, log {log})"
+    text = report.removeprefix(_INCOMPLETE)
+    if text != report:
+        hint = "the others run; end them with 'compose down', or use --all-or-nothing"
+        raise CommandError(f"{text} (process {process.pid}, log {log})", hint=hint)
+    return f"{text} (process {process.pid}, log {log})"
 
 
 def is_in_background() -> bool:
@@ -89,11 +96,14 @@ def take_ready_descriptor() -> str | None:
     return os.environ.pop(READY_VARIABLE, None)
 
 
-def report_ready(descriptor: str | None, text: str) -> None:
-    """Report to the command that started this process in the background that the system is up."""
+def report_ready(descriptor: str | None, text: str, *, is_complete: bool = True) -> None:
+    """Report to the command that started this process in the background that the system is up.
+
+    Without ``is_complete``, a node is not up that the system needs.
+    """
     if descriptor is not None:
         with os.fdopen(int(descriptor), "w", encoding="utf-8") as pipe:
-            pipe.write(text)
+            pipe.write(text if is_complete else f"{_INCOMPLETE}{text}")
 
 
 def end_within(limit_s: float | None) -> None:

@@ -231,6 +231,7 @@ def _state(node: NodeReport) -> dict[str, Any]:
         "errors": node.errors,
         "restarts": node.restarts,
         "held_down": node.held_down,
+        "condition": node.condition,
         "last_error": node.last_error,
         "pid": node.pid,
         "host": node.host,

@@ -34,9 +34,9 @@ _TRANSITIONS = {
 }
 #: What is shown of a report. Counts of messages by topic are for the graph.
 _SHOWN = (
-    *("state", "desired", "since_s", "restarts", "errors", "last_error", "held_down", "sent_hz"),
-    *("received_hz", "busy", "slowest", "overruns", "queue_drops", "qos_events", "depends_on"),
-    *("process", "host", "pid"),
+    *("state", "desired", "since_s", "restarts", "errors", "last_error", "held_down", "condition"),
+    *("sent_hz", "received_hz", "busy", "slowest", "overruns", "queue_drops", "qos_events"),
+    *("depends_on", "process", "host", "pid"),
 )
 
 
@@ -79,7 +79,7 @@ class NodesFeed(Feed):
             for node in report.nodes
         }
         states = dict.fromkeys(observed.topology().visible, "") | observed.states()
-        held_down = [node.held_down for _, node in managed.values()]
+        held_down = [(node.held_down, node.condition) for _, node in managed.values()]
         activities = [(name, report and report.activity) for name, report in reports.items()]
         now_s = time.monotonic()
         if (states, held_down, activities) == self._last and now_s < self._due_s:

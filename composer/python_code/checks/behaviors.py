@@ -15,7 +15,9 @@ from composer.python_code.source.trees import SCOPES, argument, dotted, span_of,
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
 
 #: The attributes that the composer sets after the constructor.
-_SET_LATER = frozenset({"clock", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES})
+_SET_LATER = frozenset(
+    {"clock", "fail", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES}
+)
 #: Texts that show that a file may run an event loop of asyncio, such as in a thread.
 _RUNS_ASYNCIO = ("asyncio.run", "run_until_complete", "run_forever", "asyncio.Runner")
 

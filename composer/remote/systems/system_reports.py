@@ -25,10 +25,12 @@ class NodeReport:
     """A node as its manager reports it. ``since_s`` is in seconds since 1970.
 
     ``depends_on`` are the states that the nodes it depends on must have, by their full names.
-    Rates and ``busy`` are None if they are not known, as of an executable. ``sent``, ``received``
-    and ``dropped`` count messages by topic; the last is without zeros. ``process`` is the process
-    of the system that it runs in, empty for the one that reports. ``host`` and ``pid`` are those of
-    the operating system's process; ``pid`` is empty while none runs or it is not known.
+    ``held_down`` is why it is kept down; ``condition`` says in words what becomes of it, or what it
+    waits for. Rates and ``busy`` are None if they are not known, as of an executable. ``sent``,
+    ``received`` and ``dropped`` count messages by topic; the last is without zeros. ``process`` is
+    the process of the system that it runs in, empty for the one that reports. ``host`` and ``pid``
+    are those of the operating system's process; ``pid`` is empty while none runs or it is not
+    known.
     """
 
     node: str
@@ -39,6 +41,7 @@ class NodeReport:
     errors: int
     last_error: str
     held_down: str
+    condition: str
     sent_hz: float | None
     received_hz: float | None
     busy: float | None
@@ -233,6 +236,7 @@ def _node_report(status_name: str, values: Mapping[str, str], host: str) -> Node
         errors=whole(values["errors"]),
         last_error=values["last_error"],
         held_down=values["held_down"],
+        condition=values["condition"],
         sent_hz=optional(values["sent_hz"]),
         received_hz=optional(values["received_hz"]),
         busy=optional(values["busy"]),

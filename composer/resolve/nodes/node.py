@@ -47,6 +47,7 @@ from composer.resolve.source_folders import SourceFolders
 from composer.resolve.tree_values import (
     choice,
     entries,
+    flag,
     is_opaque,
     key,
     plain_text,
@@ -144,6 +145,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         executor=text(tree.get("executor")),
         process=text(tree.get("process")) or context.processes.get(entry.name),
         log_level=choice(tree.get("log_level"), LogLevel),
+        required=flag(tree.get("required"), default=True),
         depends_on=_dependencies(lifecycle.get("depends_on")),
         autostart=state(lifecycle.get("autostart")),
         supervision=read_supervision(lifecycle, context.supervision),

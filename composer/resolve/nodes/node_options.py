@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 from composer.model import Introspection, OnFailure, RestartBudget, Supervision, Watch
-from composer.resolve.tree_values import entries, flag, integer, key, number, text
-from composer.source import Located
+from composer.resolve.tree_values import choice, entries, flag, integer, key, number
 from composer.tree import Entry, Mapping, Tree
 
 
@@ -17,17 +16,10 @@ def read_supervision(lifecycle: Tree | None, default: Supervision) -> Supervisio
     timeout_ms = number(lifecycle.get("timeout_ms"))
     return Supervision(
         timeout_ms=default.timeout_ms if timeout_ms is None else timeout_ms.value,
-        on_failure=_on_failure(lifecycle.get("on_failure")) or default.on_failure,
+        on_failure=choice(lifecycle.get("on_failure"), OnFailure) or default.on_failure,
         restart=_restart(lifecycle.entry("restart"), default.restart),
         watch=_watch(lifecycle.get("watch"), default.watch),
     )
-
-
-def _on_failure(tree: Tree | None) -> Located[OnFailure] | None:
-    written = text(tree)
-    if written is None or written.value not in {item.value for item in OnFailure}:
-        return None
-    return written.map(OnFailure)
 
 
 def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
@@ -35,6 +27,7 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
         return default
     tree = entry.value
     attempts = integer(tree.get("max_attempts"))
+    then = choice(tree.get("then"), OnFailure)
     backoff = tree.get("backoff_ms") or tree.get("backoff_max_ms")
 
     def milliseconds(name: str, fallback: float) -> float:
@@ -43,6 +36,7 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
 
     return RestartBudget(
         max_attempts=default.max_attempts if attempts is None else attempts.value,
+        then=default.then if then is None else then.value,
         window_ms=milliseconds("window_ms", default.window_ms),
         backoff_ms=milliseconds("backoff_ms", default.backoff_ms),
         backoff_max_ms=milliseconds("backoff_max_ms", default.backoff_max_ms),

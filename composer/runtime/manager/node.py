@@ -1,7 +1,8 @@
 """The manager node of a system: its commands as services, and its status as topics.
 
 The services (std_srvs/srv/Trigger) are named as those of nav2's lifecycle manager: ``startup``,
-``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. ``restart`` restarts the nodes
+``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. ``startup_all_or_nothing`` and
+``resume_all_or_nothing`` undo everything if a node fails. ``restart`` restarts the nodes
 whose full names are in the parameter ``nodes`` (rcl_interfaces/srv/SetParametersAtomically).
 
 The node publishes the states of all nodes on ``/diagnostics`` (REP 107) and, latched, on ``state``:
@@ -54,6 +55,7 @@ from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.ros.diagnostic_arrays import Status as Diagnostic
 from composer.runtime.ros.diagnostic_arrays import write_array
 from composer.runtime.ros.manager_protocol import (
+    ALL_OR_NOTHING,
     CALLBACKS_QOS,
     CALLBACKS_TOPIC,
     IS_ACTIVE,
@@ -68,7 +70,10 @@ from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.transforms.listener import TransformListeners
 
-COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
+COMMANDS = (
+    *("startup", "pause", "resume", "reset", "shutdown"),
+    *(f"{name}{ALL_OR_NOTHING}" for name in ("startup", "resume")),
+)
 _DIAGNOSTICS = "/diagnostics"
 _PERIOD_S = 1.0
 #: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
@@ -248,7 +253,8 @@ class ManagerNode:
         def answer(success: bool, message: str) -> None:
             self._loop.call_soon(lambda: reply(Trigger.Response(success=success, message=message)))
 
-        self._host.on_command(Command(name, answer))
+        command, all_or_nothing, _ = name.partition(ALL_OR_NOTHING)
+        self._host.on_command(Command(command, answer, all_or_nothing=bool(all_or_nothing)))
 
     def _on_restart(self, request: SetParametersAtomically.Request, reply: Reply) -> None:
         def answer(success: bool, message: str) -> None:

@@ -62,8 +62,11 @@ def _of_node(system: str, node: NodeStatus) -> Status:
     level = Level.OK
     message = node.state
     if node.held_down:
-        level = Level.ERROR
-        message = f"{node.state}: {node.held_down}"
+        level = Level.ERROR if node.is_required else Level.WARN
+        message = f"{node.state} ({node.condition or 'failed'}): {node.held_down}"
+    elif node.condition:
+        level = Level.WARN
+        message = f"{node.state} ({node.condition})"
     elif node.state != "active":
         level = Level.WARN
     values = {
@@ -79,6 +82,7 @@ def _of_node(system: str, node: NodeStatus) -> Status:
         "errors": str(node.errors),
         "last_error": node.last_error,
         "held_down": node.held_down,
+        "condition": node.condition,
         "sent_hz": optional_text(node.sent_hz, 1),
         "received_hz": optional_text(node.received_hz, 1),
         "busy": optional_text(node.busy, 4),

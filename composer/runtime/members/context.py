@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -50,7 +51,8 @@ class MemberContext:
 
     ``namespace`` is that of the coordinating manager; ``command`` starts ``compose run`` with the
     same system, and is empty if the process is only to be awaited. ``goals`` are those of the whole
-    system, which its processes keep.
+    system, which its processes keep. What nodes report within the context manager ``together`` is
+    handled together.
     """
 
     loop: Loop
@@ -60,6 +62,7 @@ class MemberContext:
     command: Sequence[str]
     goals: KeptGoals
     write_log: Callable[[LogLevel, str, str], None]
+    together: Callable[[], AbstractContextManager[None]] = nullcontext
 
     def full_name(self, process: Process) -> str:
         """Return the full name of a process, which is the namespace of its manager."""

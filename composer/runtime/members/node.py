@@ -17,7 +17,7 @@ from composer.runtime.executors.tasks import within
 from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
 from composer.runtime.members.report import MemberState
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES, TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
     INACTIVE,
@@ -26,7 +26,7 @@ from composer.runtime.outside_nodes.outside_node import (
     OutsideNode,
     TransitionRefused,
 )
-from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN, GOALS, PRIMARY_STATES
+from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN, GOALS
 from composer.runtime.ros.manager_protocol import CREATE
 
 #: A report follows a successful response soon; each second there is one in any case.

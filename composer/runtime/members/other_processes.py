@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 
 from composer.model import PrimaryState, System
@@ -25,17 +25,23 @@ _POLL_S = 0.01
 class OtherProcesses:
     """The processes that this one coordinates; each exists with its first node.
 
-    ``command`` starts them, as in :class:`.MemberContext`.
+    ``command`` starts them, and the nodes of one fail ``together``, as in :class:`.MemberContext`.
     """
 
     def __init__(
-        self, system: System, namespace: str, command: Sequence[str], write_log: Write
+        self,
+        system: System,
+        namespace: str,
+        command: Sequence[str],
+        write_log: Write,
+        together: Callable[[], AbstractContextManager[None]],
     ) -> None:
         self._models = {process.name.value: process for process in system.processes}
         self._addresses = {host.name.value: host.address.value for host in system.hosts}
         self._namespace = namespace
         self._command = command
         self._write_log = write_log
+        self._together = together
         self._goals = KeptGoals(system)
         self._processes: dict[str, MemberProcess] = {}
         self._loop: Loop  # set with the first process
@@ -59,6 +65,7 @@ class OtherProcesses:
                     command=self._command if is_local else (),
                     goals=self._goals,
                     write_log=self._write_log,
+                    together=self._together,
                 ),
             )
         return self._processes[name]

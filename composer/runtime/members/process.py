@@ -39,8 +39,7 @@ from composer.runtime.members.report import (
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.metrics.diagnostics import from_text
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
-from composer.runtime.node.outcome import FINALIZED
-from composer.runtime.outside_nodes.remote_lifecycle import PRIMARY_STATES
+from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
 from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
 
@@ -376,8 +375,9 @@ class MemberProcess:
     def _fail(self, reason: str, *, is_expected: bool = False) -> None:
         self.requests.fail(ProcessUnavailable(reason))
         if not is_expected:
-            for member in tuple(self._members.values()):
-                member.on_process_end(reason)
+            with self._context.together():
+                for member in tuple(self._members.values()):
+                    member.on_process_end(reason)
 
     def _warn(self, text: str) -> None:
         self._context.write_log(LogLevel.WARN, PROGRAM_LOGGER, f"{self} {text}")

@@ -10,12 +10,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from time import monotonic
 from typing import Any, Protocol, TypeVar
 
 from rclpy.node import Node as RosNode
 
 from composer.model import Node
+from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
@@ -361,7 +363,7 @@ def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
     if max_errors is None:
         return None
     window_s = supervision.restart.window_ms / 1000.0
-    return ErrorLimit(max_errors.value, window_s, listener.on_error_limit)
+    return ErrorLimit(max_errors.value, window_s, partial(listener.on_fault, FaultKind.ERRORS))
 
 
 def _mutation_check(seen: MessageSnapshots | None, error_log: ErrorLog) -> MutationCheck | None:

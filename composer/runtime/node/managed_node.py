@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar, runtime_checkable
 from rclpy.node import Node as RosNode
 
 from composer.model import LogLevel, Node
+from composer.plan import FaultKind
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.metrics.statistics import Statistics
@@ -25,8 +26,8 @@ class NodeListener(Protocol):
     def on_error(self, callback: str, text: str) -> None:
         """Receive an error of user code, at most once a second for each callback."""
 
-    def on_error_limit(self, text: str) -> None:
-        """Receive that the node has exceeded its ``max_errors``, once per activation."""
+    def on_fault(self, kind: FaultKind, text: str) -> None:
+        """Receive that the node has failed: it says so, or has exceeded its ``max_errors``."""
 
     def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
         """Receive that a node outside the process has ended by itself, and its new state.

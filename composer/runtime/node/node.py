@@ -14,6 +14,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, Node, PeriodError
+from composer.plan import FaultKind
 from composer.runtime.executors.exceptions import shown
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import calls_user_code
@@ -44,6 +45,10 @@ class WrongReturn(Exception):
     """A lifecycle handler returned something other than None, True or False."""
 
 
+class Failed(Exception):
+    """The node has reported during a transition that it has failed."""
+
+
 class RunningNode(LocalNode):
     """A node with reactions and, where it has one, a behavior."""
 
@@ -61,6 +66,7 @@ class RunningNode(LocalNode):
         super().__init__(model, loop, options, listener, statistics)
         self._behavior: Any = None
         self._cleaned_up_behavior: Any = None  # for ``on_shutdown``
+        self._failures: list[str] | None = None  # reported while a lifecycle handler runs
         self._make_library_node = options.make_library_node
         self._library: LibraryNode | None = None
         self._listeners = options.process.transforms
@@ -105,11 +111,20 @@ class RunningNode(LocalNode):
         behavior.action_clients = named_ports("action client", entities.action_clients)
         if entities.transforms is not None:
             behavior.transforms = entities.transforms
+        if not hasattr(behavior, "fail"):
+            behavior.fail = self._fail
         if self._make_library_node is not None and not hasattr(behavior, "node"):
             library: LibraryNode = self._make_library_node(self)
             self._library, entities.of_libraries = library, library.entities
             behavior.node = library.node
         self._set_used(behavior, behavior.publishers, *entities.senders.values())
+
+    def _fail(self, reason: str) -> None:
+        failures = self._failures
+        if failures is None:
+            self._listener.on_fault(FaultKind.REPORTED, str(reason))
+        else:
+            failures.append(str(reason))
 
     def _set_used(self, *used: object) -> None:
         self._context.hot_objects = self._always_on_context.hot_objects = used
@@ -134,9 +149,16 @@ class RunningNode(LocalNode):
         handler = method(self._behavior, name)
         if handler is None:
             return
-        result = handler(*arguments)
-        if isinstance(result, Awaitable):
-            result = await result
+        failures: list[str] = []
+        self._failures = failures
+        try:
+            result = handler(*arguments)
+            if isinstance(result, Awaitable):
+                result = await result
+        finally:
+            self._failures = None
+        if failures:
+            raise Failed(failures[0])
         if self._context.mutations is not None:
             self._context.mutations.check(name)
         if result is None or result is True:

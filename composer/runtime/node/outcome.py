@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 #: The label of the state that a node cannot leave.
 FINALIZED = "finalized"
+#: The labels of the states between transitions.
+PRIMARY_STATES = ("unconfigured", "inactive", "active", FINALIZED)
 
 
 @dataclass(frozen=True, slots=True)

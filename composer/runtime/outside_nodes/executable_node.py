@@ -99,7 +99,7 @@ class ExecutableNode(OutsideNode):
             await self._finish_task(child, end_s)
             return
         ready = partial(self._is_ready, child)
-        if not await self._until(ready, end_s) or child.ended.done():
+        if not await self._until_ready(ready, end_s) or child.ended.done():
             missing = self._presence.missing(self._earlier)
             reason = _ended(child) or f"{missing_text(missing)} after {_seconds(self._executable)}"
             await self._end_process()
@@ -107,7 +107,7 @@ class ExecutableNode(OutsideNode):
         self._check_names_later(child)
 
     async def _finish_task(self, child: Child, end_s: float) -> None:
-        if not await self._until(child.ended.done, end_s):
+        if not await self._until_ready(child.ended.done, end_s):
             await self._end_process()
             raise TransitionRefused(f"still running after {_seconds(self._executable)}", INACTIVE)
         self._child = None
@@ -144,7 +144,7 @@ class ExecutableNode(OutsideNode):
         def has_services() -> bool:
             return child.ended.done() or self._presence.has_service(service, self._earlier)
 
-        if await self._until(has_services, end_s) and not child.ended.done():
+        if await self._until_ready(has_services, end_s) and not child.ended.done():
             self._check_names_later(child)
             return
         problem = f"no service {service} after {_seconds(self._executable)}"

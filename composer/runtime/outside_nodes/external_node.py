@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from time import monotonic
 
 from composer.model import External, LifecycleKind, Node
@@ -42,7 +41,7 @@ class ExternalNode(OutsideNode):
         self._manager = context.manager
         self._presence = NodePresence(self._manager, model)
         self._remote: RemoteLifecycle | None = None
-        self._is_lost = False  # it disappeared, and its return has not been reported
+        self._is_lost = False  # it is not there, and its return has not been reported
         self._is_left = False
         self._timer = self.loop.call_every(_PERIOD_S, self._check)
 
@@ -50,6 +49,11 @@ class ExternalNode(OutsideNode):
     def transition_timeout_s(self) -> float:
         """How long a transition may take, including the time until the node appears."""
         return self._timeout_s + self._external.ready_timeout_s
+
+    @property
+    def is_absent(self) -> bool:
+        """Whether it is not there."""
+        return self._is_lost
 
     def destroy(self) -> None:
         """Stop to observe the node."""
@@ -74,11 +78,17 @@ class ExternalNode(OutsideNode):
         if transition in ("cleanup", "shutdown"):
             self._close_remote()
 
+    def _is_there(self) -> bool:
+        """Return whether it can be used: with its service if it is managed, or all its ports."""
+        if self._is_managed:
+            service = f"{self.full_name}/change_state"
+            return self._presence.has_service(service, _NOTHING_EARLIER)
+        return self._presence.has_node() and not self._presence.missing()
+
     async def _await_ports(self) -> None:
-        presence = self._presence
         end_s = monotonic() + self._external.ready_timeout_s
-        if not await self._until(lambda: presence.has_node() and not presence.missing(), end_s):
-            self._refuse_absent(missing_text(presence.missing()), INACTIVE)
+        if not await self._until_ready(self._is_there, end_s):
+            self._refuse_absent(missing_text(self._presence.missing()), INACTIVE)
         self._is_lost = False
 
     async def _work_managed(self, transition: str) -> None:
@@ -98,17 +108,17 @@ class ExternalNode(OutsideNode):
             raise TransitionRefused(text, UNCONFIGURED) from error
 
     async def _connect(self) -> None:
-        service = f"{self.full_name}/change_state"
         self._close_remote()
-        has_service = partial(self._presence.has_service, service, _NOTHING_EARLIER)
         end_s = monotonic() + self._external.ready_timeout_s
-        if not await self._until(has_service, end_s):
-            self._refuse_absent(f"it has no service {service}", UNCONFIGURED)
+        if not await self._until_ready(self._is_there, end_s):
+            missing = f"it has no service {self.full_name}/change_state"
+            self._refuse_absent(missing, UNCONFIGURED)
         self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_event)
         self._is_lost = False
 
     def _refuse_absent(self, missing: str, state: str) -> None:
         limit = f"after {self._external.ready_timeout_s:g} s"
+        self._is_lost = True
         raise TransitionRefused(f"{missing} {limit}; start it, or see 'ros2 node list'", state)
 
     def _close_remote(self) -> None:
@@ -124,7 +134,7 @@ class ExternalNode(OutsideNode):
         if is_used and not self._presence.has_node():
             self._is_lost = True
             self._close_remote()
-            self._fail("it has disappeared from the ROS graph")
-        elif self._is_lost and self._presence.has_node() and not self._presence.missing():
+            self._fail("it has disappeared from the ROS graph", is_awaited=True)
+        elif self._is_lost and self._is_there():
             self._is_lost = False
             self._listener.on_returned()

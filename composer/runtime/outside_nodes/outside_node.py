@@ -22,8 +22,8 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import NodeListener
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
-from composer.runtime.outside_nodes.remote_lifecycle import GOALS, PRIMARY_STATES
+from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES, TransitionOutcome
+from composer.runtime.outside_nodes.remote_lifecycle import GOALS
 
 UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
 _DURING = {
@@ -121,6 +121,11 @@ class OutsideNode(ABC):
     def transition_timeout_s(self) -> float:
         """How long a transition may take before it counts as stuck."""
         return self._timeout_s
+
+    @property
+    def is_absent(self) -> bool:
+        """Whether it is not there, and something else has to start it."""
+        return False
 
     @property
     def callback_owners(self) -> tuple[object, ...]:
@@ -226,10 +231,10 @@ class OutsideNode(ABC):
     def _on_settled(self) -> None:
         """React to what happened during a transition."""
 
-    def _fail(self, reason: str, state: str = UNCONFIGURED) -> None:
-        """Report that the node has ended by itself, and is in ``state`` now."""
-        self._state = state
-        self._listener.on_ended(reason, state)
+    def _fail(self, reason: str, *, is_awaited: bool = False) -> None:
+        """Report that the node has ended by itself, and is unconfigured now."""
+        self._state = UNCONFIGURED
+        self._listener.on_ended(reason, UNCONFIGURED, is_awaited=is_awaited)
 
     def _on_event(self, start: str, goal: str) -> None:
         """Follow a transition that another tool has requested from the node itself."""
@@ -246,6 +251,11 @@ class OutsideNode(ABC):
         self._listener.on_transition_end(
             TransitionOutcome(transition, goal, success=success, reason=reason)
         )
+
+    async def _until_ready(self, condition: Callable[[], bool], end_s: float) -> bool:
+        """Wait for ``condition()`` until ``end_s``, or until the system shuts down."""
+        await self._until(lambda: condition() or self._end_s is not None, end_s)
+        return condition()
 
     async def _until(self, condition: Callable[[], bool], end_s: float) -> bool:
         """Wait for ``condition()`` until ``end_s`` (monotonic); return its value."""

@@ -11,6 +11,8 @@ NAME = "manager"
 
 #: Services: std_srvs/srv/Trigger; ChangeState for nodes without lifecycle services.
 IS_ACTIVE = "is_active"
+#: At the end of ``startup`` and ``resume``: undo everything if a node fails.
+ALL_OR_NOTHING = "_all_or_nothing"
 CHANGE_STATE = "change_state"
 #: Of the processes of a system: rcl_interfaces/srv/SetParameters, with a list of texts as the value
 #: of the parameter ``steps``, or of ``last_steps`` if the process ends after them:

@@ -1,10 +1,12 @@
 """Commands for a running system as a whole, as in nav2's lifecycle manager.
 
-``startup``   bring up all nodes, all or nothing, and forget failures
+``startup``   bring up all nodes, and forget failures
 ``pause``     deactivate the active nodes
-``resume``    bring up the inactive nodes, all or nothing
+``resume``    bring up the inactive nodes
 ``reset``     make all nodes unconfigured, and forget failures
 ``restart``   take nodes down and bring them up again, each to its desired state
+
+Failures are handled by the policies of the nodes, unless a command is all or nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +17,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.model import PrimaryState, System
-from composer.plan import blocked_nodes, plan_transitions, start_causes, start_goals
+from composer.plan import (
+    blocked_nodes,
+    optional_nodes,
+    plan_transitions,
+    start_causes,
+    start_goals,
+)
 from composer.runtime.node.outcome import FINALIZED
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
@@ -49,18 +57,18 @@ class Commands:
         if command.name == _RESTART:
             problem = self._restart(command.nodes, self.supervisor.desired.serial)
         else:
-            problem = self._run_for_system(command.name)
+            problem = self._run_for_system(command.name, together=command.all_or_nothing)
         summary = self.status.snapshot().summary
         return problem is None, summary if problem is None else f"{problem}; {summary}"
 
-    def _run_for_system(self, name: str) -> str | None:
+    def _run_for_system(self, name: str, *, together: bool) -> str | None:
         doing, done = _ACTIVITIES[name]
         before = self.status.without_nodes.activity
         self.status.set_activity(doing)
         actions: dict[str, Callable[[int], str | None]] = {
-            "startup": self._start_up,
+            "startup": partial(self._start_up, together=together),
             "pause": self._pause,
-            "resume": self._resume,
+            "resume": partial(self._resume, together=together),
             "reset": self._reset,
         }
         problem = actions[name](self.supervisor.desired.serial)
@@ -69,21 +77,18 @@ class Commands:
 
     # The actions move no node that has been moved externally since the serial number ``since``.
 
-    def _start_up(self, since: int) -> str | None:
+    def _start_up(self, since: int, *, together: bool) -> str | None:
         problem = self._recreate(since)
-        return problem or self._bring_up(self._start_goals().keys(), since, forget_failures=True)
+        if problem is not None:
+            return problem
+        names = self._start_goals().keys()
+        return self._bring_up(names, since, together=together, forget_failures=True)
 
-    def _resume(self, since: int) -> str | None:
+    def _resume(self, since: int, *, together: bool) -> str | None:
         """Nodes that depend on a failed one come up after it."""
-        blocked = blocked_nodes(self.system, self.supervisor.desired)
         states = self.node_set.states()
         inactive = {name for name, at in states.items() if at is PrimaryState.INACTIVE}
-        problem = self._bring_up(inactive - blocked.keys(), since)
-        if problem is None:
-            goals = self._start_goals()
-            later = {name: goals[name] for name in inactive & blocked.keys()}
-            self.supervisor.set_goals(later, since)
-        return problem
+        return self._bring_up(inactive, since, together=together)
 
     def _pause(self, since: int) -> str | None:
         low = (PrimaryState.UNCONFIGURED, PrimaryState.INACTIVE)
@@ -126,17 +131,35 @@ class Commands:
         return problem or self._unreached_of(names)
 
     def _bring_up(
-        self, names: Collection[str], since: int, *, forget_failures: bool = False
+        self,
+        names: Collection[str],
+        since: int,
+        *,
+        together: bool,
+        forget_failures: bool = False,
     ) -> str | None:
+        """Bring nodes up; with ``together``, undo it if one fails that the system needs."""
         start_goals = self._start_goals()
         goals = {name: start_goals[name] for name in names}
-        causes = start_causes(self.system, PrimaryState.ACTIVE)
-        plan = plan_transitions(self.system, self.node_set.states(), goals, causes)
-        problem = self.supervisor.bring_up(plan, since)
-        if problem is not None:
-            return f"{problem}; rolled back"
+        left = {*optional_nodes(self.system)}
+        if not forget_failures:
+            left |= blocked_nodes(self.system, self.supervisor.desired).keys()
+        needed = {name: goal for name, goal in goals.items() if name not in left}
+        if together:
+            causes = start_causes(self.system, PrimaryState.ACTIVE)
+            plan = plan_transitions(self.system, self.node_set.states(), needed, causes)
+            problem = self.supervisor.bring_up_together(plan, since)
+            if problem is not None:
+                return f"{problem}; rolled back"
         self.supervisor.set_goals(goals, since, "running", forget_failures=forget_failures)
-        return self._unreached(goals)
+        self.supervisor.reconcile_settled("bring-up requested")
+        self.supervisor.settle()
+        desired = self.supervisor.desired
+        failed = [self.node_set.nodes[name].full_name for name in needed if name in desired.down]
+        if failed:
+            return f"{', '.join(failed)} failed"
+        blocked = {*blocked_nodes(self.system, desired), *desired.ignored}
+        return self._unreached({name: needed[name] for name in needed if name not in blocked})
 
     def _lower(
         self,

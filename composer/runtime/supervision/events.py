@@ -67,27 +67,33 @@ class RolledBack:
 
 @dataclass(frozen=True, slots=True)
 class NodeFailed:
-    """A node of a system that is up has failed; ``consequence`` is the reaction to that."""
+    """Nodes have failed for one reason; ``consequence`` is the reaction to that.
+
+    ``is_tolerated``: the system does not need them, or ignores it.
+    """
 
     elapsed_s: float
-    node: str
+    nodes: tuple[str, ...]
     reason: str
     consequence: str
+    is_tolerated: bool = False
 
     def __str__(self) -> str:
-        return f"{self.node} failed: {self.reason}; {self.consequence}"
+        return f"{', '.join(self.nodes)} failed: {self.reason}; {self.consequence}"
 
 
 @dataclass(frozen=True, slots=True)
 class Restarted:
-    """A node that had failed is up again, and so are the nodes that depend on it."""
+    """A node that had failed is where it should be again."""
 
     elapsed_s: float
     node: str
     attempt: int
+    state: str = "active"
 
     def __str__(self) -> str:
-        return f"{self.node} is up again after restart {self.attempt}"
+        state = "up" if self.state == "active" else self.state
+        return f"{self.node} is {state} again after restart {self.attempt}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,14 +111,20 @@ class Commanded:
 
 @dataclass(frozen=True, slots=True)
 class BroughtUp:
-    """Every step of the bring-up is done."""
+    """The bring-up is over; ``remarks`` are about nodes that are not up.
+
+    ``is_complete``: all nodes that the system needs are.
+    """
 
     elapsed_s: float
     active: int
     nodes: int
+    remarks: tuple[str, ...] = ()
+    is_complete: bool = True
 
     def __str__(self) -> str:
-        return f"{self.active} of {self.nodes} nodes active after {self.elapsed_s:.2f} s"
+        active = f"{self.active} of {self.nodes} nodes active after {self.elapsed_s:.2f} s"
+        return ", ".join((active, *self.remarks))
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,8 +251,8 @@ class NodeSummary:
 class Outcome:
     """How a run ended. ``exit_code`` is 0 after a clean stop and 1 if a node failed.
 
-    ``hung`` is true if the process must end by ``os._exit``: a callback never returned, or nodes
-    were not destroyed one by one.
+    ``remarks`` are about nodes that were not up at the end. ``hung`` is true if the process must
+    end by ``os._exit``: a callback never returned, or nodes were not destroyed one by one.
     """
 
     exit_code: int
@@ -250,3 +262,4 @@ class Outcome:
     hung: bool = False
     callbacks: tuple[CallbackFigures, ...] = ()
     chains: tuple[ChainFigures, ...] = ()
+    remarks: tuple[str, ...] = ()

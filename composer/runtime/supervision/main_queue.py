@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Generic, TypeAlias, TypeVar
 
@@ -27,6 +29,13 @@ class NodeMoved:
 
     node: str
     cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class StepEnded:
+    """A step has ended that ran on after its plan. ``node`` is a key."""
+
+    node: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +76,18 @@ class NodeReturned:
 class Command:
     """A command for the system, see :mod:`.commands`. Call ``answer(success, message)`` once.
 
-    ``nodes`` are the full names of the nodes that a restart is for.
+    ``nodes`` are the full names of the nodes that a restart is for. With ``all_or_nothing``, a
+    bring-up is undone if a node fails that the system needs.
     """
 
     name: str
     answer: Callable[[bool, str], None]
     nodes: tuple[str, ...] = ()
+    all_or_nothing: bool = False
 
 
 NodeEvent: TypeAlias = (
-    Fault | NodeMoved | CallbackHanging | CallbackBlocks | LoopRecovered | NodeReturned
+    Fault | NodeMoved | StepEnded | CallbackHanging | CallbackBlocks | LoopRecovered | NodeReturned
 )
 Item: TypeAlias = NodeEvent | Command
 
@@ -91,6 +102,7 @@ class MainQueue(Generic[T]):
         #: Woken for every item and request; wake it to make :meth:`wait` check its condition.
         self.wakeup = WakeupPipe()
         self._items: deque[T] = deque()
+        self._held = threading.local()
         #: Why the system stops; None while no stop is requested.
         self.stop_reason: str | None = None
         #: Whether a stop was requested a second time.
@@ -114,8 +126,33 @@ class MainQueue(Generic[T]):
 
     def put(self, item: T) -> None:
         """Append an item, from any thread."""
+        held = getattr(self._held, "items", None)
+        if held is not None:
+            held.append(item)
+            return
         self._items.append(item)
         self.wakeup.wake()
+
+    def put_back(self, item: T) -> None:
+        """Make an item that was just returned the next one again."""
+        self._items.appendleft(item)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are no items."""
+        return not self._items
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """Context manager: items that this thread puts become available at once, at its end."""
+        held: list[T] = []
+        self._held.items = held
+        try:
+            yield
+        finally:
+            self._held.items = None
+            self._items.extend(held)
+            self.wakeup.wake()
 
     def drain(self) -> list[T]:
         """Remove and return all items."""

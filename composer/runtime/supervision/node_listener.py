@@ -43,6 +43,7 @@ class SupervisionListener:
         self._main_queue = main_queue
         self._status = status
         self._reporter = reporter
+        self._last_state = ""
 
     def on_transition_end(self, result: TransitionOutcome) -> None:
         """Report the new state; record an external transition first."""
@@ -50,7 +51,9 @@ class SupervisionListener:
         at_s = self._reporter.elapsed_s
         transition, state = result.transition, result.state
         self._status.set_state(self._name, state)
-        self._reporter.report(events.StateChanged(at_s, self._full_name, transition, state))
+        if state != self._last_state:  # otherwise, the transition has failed
+            self._last_state = state
+            self._reporter.report(events.StateChanged(at_s, self._full_name, transition, state))
         if item is not None:
             self._main_queue.put(item)
 
@@ -72,10 +75,9 @@ class SupervisionListener:
         at_s = self._reporter.elapsed_s
         self._reporter.report(events.CallbackFailed(at_s, self._full_name, callback, text))
 
-    def on_error_limit(self, text: str) -> None:
-        """Report that the node has exceeded its ``max_errors``."""
-        serial = self._desired.value.serial
-        self._main_queue.put(Fault(self._name, FaultKind.ERRORS, text, serial))
+    def on_fault(self, kind: FaultKind, text: str) -> None:
+        """Report that the node has failed: it says so, or has exceeded its ``max_errors``."""
+        self._main_queue.put(Fault(self._name, kind, text, self._desired.value.serial))
 
     def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
         """Report that a node outside the process has ended by itself, and its new state.
@@ -87,6 +89,7 @@ class SupervisionListener:
         fault = Fault(self._name, kind, text, self._desired.value.serial)
         self._desired.update(lambda desired: desired.await_fault(fault))
         self._status.set_state(self._name, state)
+        self._last_state = state
         at_s = self._reporter.elapsed_s
         self._reporter.report(events.StateChanged(at_s, self._full_name, "end", state))
         self._main_queue.put(fault)

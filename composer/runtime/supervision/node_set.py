@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -71,7 +72,8 @@ class NodeSetOptions:
     ``transition_timeout_s`` overrides the system's; ``tracing`` records callback timings;
     ``check_mutation`` checks whether callbacks change messages. ``namespace`` is that of the
     manager, ``member_command`` starts the other processes of the system, which are only awaited
-    without it, and ``write_log`` receives what they print.
+    without it, and ``write_log`` receives what they print. What nodes report within the context
+    manager ``together`` is handled together.
     """
 
     log_level: LogLevel
@@ -81,6 +83,7 @@ class NodeSetOptions:
     namespace: str = ""
     member_command: Sequence[str] = ()
     write_log: Write = lambda *_: None
+    together: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
 class NodeSet:
@@ -110,7 +113,11 @@ class NodeSet:
         self._children = ChildProcesses()
         #: The other processes of the system, as far as nodes were created in them.
         self.other_processes = OtherProcesses(
-            system, options.namespace, options.member_command, options.write_log
+            system,
+            options.namespace,
+            options.member_command,
+            options.write_log,
+            options.together,
         )
         #: The names of the other processes, by the keys of the nodes that they run.
         self.process_of: Mapping[str, str] = {
@@ -218,9 +225,9 @@ class NodeSet:
         )
 
     def is_absent(self, name: str) -> bool:
-        """Return whether the node belongs to a process that is awaited, not started."""
+        """Return whether the node is not there, and something else has to start it."""
         node = self.nodes[name]
-        return isinstance(node, MemberNode) and node.is_absent
+        return isinstance(node, OutsideNode) and node.is_absent
 
     def running_callbacks(self, name: str) -> list[RunningCallback]:
         """Return the callbacks that keep the threads of the node's loop busy, one per thread."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.outcome import TransitionOutcome
-from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved
+from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved, StepEnded
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 
 if TYPE_CHECKING:  # this module and its tests need no ROS
@@ -59,13 +59,16 @@ class ExecutionOptions:
     With ``best_effort``, failures do not end the plan: every step that the states allow is run, and
     steps start in the order of the plan. If ``stoppable``, a request to stop the system ends the
     plan. Steps that have not ended at ``end_s`` (monotonic) have failed; no step gets longer than
-    ``step_limit_s``.
+    ``step_limit_s``. With ``detaches``, steps that no other node waits for may run on after the
+    plan; their ends are in the main queue. With ``are_faults``, the caller reports the failures.
 
     ``serial`` is that of the desired state that the plan is based on. Nodes that have been moved
     externally since then are not moved; None moves them as well.
     """
 
     best_effort: bool = False
+    detaches: bool = False
+    are_faults: bool = False
     stoppable: bool = True
     end_s: float = math.inf
     step_limit_s: float = math.inf
@@ -103,9 +106,10 @@ class _RunningStep:
 class _Phase:
     """A phase that is being executed.
 
-    ``processes`` are the other processes of the system, by the nodes that they run. ``ended`` are
-    the numbers of steps that have ended by themselves; until ``check_s``, no other one has to be
-    looked at.
+    ``processes`` are the other processes of the system, by the nodes that they run. ``done`` are
+    the numbers of steps that nothing waits for any more, ``unreached`` of those upward steps among
+    them after which the node is not where others need it. ``ended`` are the numbers of steps that
+    have ended by themselves; until ``check_s``, no other one has to be looked at.
     """
 
     waiting: deque[Step]
@@ -113,14 +117,16 @@ class _Phase:
     processes: Mapping[str, str]
     running: dict[int, _RunningStep] = field(default_factory=dict)
     done: set[int] = field(default_factory=set)
+    unreached: set[int] = field(default_factory=set)
     failures: list[StepFailed] = field(default_factory=list)
     ended: deque[int] = field(default_factory=deque)
     check_s: float = math.inf
 
     @property
-    def is_over(self) -> bool:
-        """Whether nothing runs, and no more steps will be started."""
-        return not self.running and (not self.waiting or self.has_failed)
+    def is_awaited(self) -> bool:
+        """Whether a step runs that the plan has to wait for."""
+        running = (item.step for item in self.running.values())
+        return any(step.is_awaited or not self.options.detaches for step in running)
 
     @property
     def has_failed(self) -> bool:
@@ -135,10 +141,16 @@ class _Phase:
             item.limit_s += lost_s
             item.end_s += lost_s
 
+    def finish(self, step: Step, *, is_reached: bool) -> None:
+        """Let nothing wait for a step any more; others do not go up without its node."""
+        self.done.add(step.number)
+        if step.is_upward and not is_reached:
+            self.unreached.add(step.number)
+
     def take_ready(self) -> list[tuple[Step, tuple[Step, ...]]]:
         """Remove and return the steps that can start now, each with those that it waits for.
 
-        It may wait for steps of its own process, which keeps the order by itself.
+        On the way down, it may wait for steps of its own process, which keeps the order by itself.
         """
         if self.has_failed:
             return []
@@ -146,8 +158,10 @@ class _Phase:
         ready: list[tuple[Step, tuple[Step, ...]]] = []
         waiting: deque[Step] = deque()
         for step in self.waiting:
-            keeps_order = not (waiting and self.options.best_effort)
-            if keeps_order and self._can_start(step, started):
+            keeps_order = step.is_upward or not (waiting and self.options.best_effort)
+            if not self.unreached.isdisjoint(step.after):
+                self.finish(step, is_reached=False)
+            elif keeps_order and self._can_start(step, started):
                 after = (started[number] for number in step.after if number not in self.done)
                 ready.append((step, tuple(after)))
                 started[step.number] = step
@@ -160,7 +174,7 @@ class _Phase:
         if self.done.issuperset(step.after):
             return True
         process = self.processes.get(step.node)
-        if process is None or not self.options.best_effort:
+        if process is None or step.is_upward or not self.options.best_effort:
             return False
         left = (started.get(number) for number in step.after if number not in self.done)
         return all(other and self.processes.get(other.node) == process for other in left)
@@ -181,6 +195,17 @@ class PlanExecutor:
         self._desired = desired
         self._main_queue = main_queue
         self._report_failure = report_failure
+        self._detached: dict[str, _RunningStep] = {}
+
+    @property
+    def moving(self) -> Collection[str]:
+        """The nodes with steps that run on after their plans."""
+        return self._detached.keys()
+
+    def end(self, node: str) -> StepFailed | None:
+        """Return why the step of a node failed that has run on; see :class:`.StepEnded`."""
+        failure = self._failure(self._detached.pop(node))
+        return None if failure is None or failure.outdated else failure
 
     def execute(
         self, plan: Plan, options: ExecutionOptions | None = None
@@ -193,24 +218,36 @@ class PlanExecutor:
             self._execute(phase)
             options = phase.options  # the time limit may have moved
             failures += phase.failures
-            if phase.has_failed or self._is_stopped(options):
+            # What follows a failure on the way up is decided before other nodes go further.
+            is_failure = bool(phase.failures) and any(step.is_upward for step in steps)
+            if is_failure or phase.has_failed or self._is_stopped(options):
                 break
         return tuple(failures)
 
     def _execute(self, phase: _Phase) -> None:
-        while not phase.is_over:
-            with self._node_set.other_processes.requests_together():
-                for step, after in phase.take_ready():
-                    self._start(step, after, phase)
-            if not phase.running:
-                continue
+        while self._start_ready(phase):
             wait_for_step(phase, self._main_queue)
             if self._is_stopped(phase.options):
-                break
+                return
             while phase.ended:
                 self._end(phase.ended.popleft(), phase)
             if self._main_queue.urgent or time.monotonic() >= phase.check_s:
                 self._end_late(phase)
+        for item in phase.running.values():
+            self._detach(item)
+
+    def _start_ready(self, phase: _Phase) -> bool:
+        """Start every step that can start; return whether one was started that is awaited."""
+        while ready := phase.take_ready():
+            with self._node_set.other_processes.requests_together():
+                for step, after in ready:
+                    self._start(step, after, phase)
+        return phase.is_awaited
+
+    def _detach(self, item: _RunningStep) -> None:
+        name = item.step.node
+        self._detached[name] = item
+        item.future.add_done_callback(lambda _: self._main_queue.put(StepEnded(name)))
 
     def _end_late(self, phase: _Phase) -> None:
         """End the steps that have no time left."""
@@ -236,12 +273,15 @@ class PlanExecutor:
         node = self._node_set.nodes[step.node]
         options = phase.options
         now_s = time.monotonic()
+        # A tear-down waits for the steps of earlier plans.
+        is_running = step.node in self._detached
+        is_possible = step.transition in node.lifecycle.available and not is_running
         if options.best_effort and (
             self._node_set.is_lost(step.node)
-            or step.transition not in node.lifecycle.available
+            or not (is_possible or (is_running and not options.stoppable))
             or now_s >= options.end_s
         ):
-            phase.done.add(step.number)
+            phase.finish(step, is_reached=False)
             return
         limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
         is_outdated = partial(self._is_outdated, step, options)
@@ -258,9 +298,14 @@ class PlanExecutor:
         self._main_queue.wakeup.wake()
 
     def _is_outdated(self, step: Step, options: ExecutionOptions) -> bool:
-        """Return whether an external transition came first. Called once no other one can."""
+        """Return whether an external transition or a fault came first.
+
+        Called once no other transition can.
+        """
         if options.serial is not None:
-            return self._desired.value.has_moved(step.node, options.serial)
+            desired = self._desired.value
+            has_failed = options.best_effort and step.node in desired.unhandled
+            return has_failed or desired.has_moved(step.node, options.serial)
         node = self._node_set.nodes[step.node]
         return options.best_effort and step.transition not in node.lifecycle.available
 
@@ -268,14 +313,14 @@ class PlanExecutor:
         item = phase.running.pop(number, None)
         if item is None:
             return  # it had no time left before
-        phase.done.add(number)
         failure = self._failure(item)
+        phase.finish(item.step, is_reached=failure is None)
         if not item.future.done():
             moved = NodeMoved(item.step.node, f"late end of '{item.step.transition}'")
             item.future.add_done_callback(lambda _: self._main_queue.put(moved))
         if failure is not None and not (failure.outdated and phase.options.best_effort):
             phase.failures.append(failure)
-            if not item.is_reported:
+            if not item.is_reported and (failure.stuck or not phase.options.are_faults):
                 self._report_failure(failure)
 
     def _failure(self, item: _RunningStep) -> StepFailed | None:

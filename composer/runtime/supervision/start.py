@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from composer.model import LogLevel, PrimaryState, System
 from composer.names import PROGRAM_LOGGER
-from composer.plan import Plan, SystemGoals
+from composer.plan import Plan, SystemGoals, optional_nodes
 from composer.runtime.supervision.events import BroughtUp, Reporter
-from composer.runtime.supervision.main_queue import Item, MainQueue
+from composer.runtime.supervision.main_queue import Command, Item, MainQueue
 from composer.runtime.supervision.node_set import NodeSet
+from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 
 #: Processes report every second. Bring-up waits longer for those that are started only now.
@@ -23,7 +24,12 @@ _POLL_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class SystemStart:
-    """Leads the nodes of a system to their first goals. ``up`` is the plan of a start."""
+    """Leads the nodes of a system to their first goals.
+
+    ``up`` is the plan of a start. With ``all_or_nothing``, the first failure of a required node
+    ends it; otherwise, the policies of the nodes apply. ``run_command`` runs the commands that come
+    before the end of the bring-up.
+    """
 
     system: System
     up: Plan
@@ -31,6 +37,9 @@ class SystemStart:
     supervisor: Supervisor
     main_queue: MainQueue[Item]
     reporter: Reporter
+    status: Status
+    run_command: Callable[[Command], None]
+    all_or_nothing: bool
 
     def run(self, within_s: float) -> str | None:
         """Bring the system up within a time, or take it over; return why that failed, or None."""
@@ -42,8 +51,15 @@ class SystemStart:
         else:
             self._take_over(found)
         if problem is None and not self.main_queue.stopping:
+            status = self.status.snapshot()
             self.reporter.report(
-                BroughtUp(self.reporter.elapsed_s, self.node_set.active(), len(self.node_set.nodes))
+                BroughtUp(
+                    self.reporter.elapsed_s,
+                    self.node_set.active(),
+                    len(self.node_set.nodes),
+                    status.remarks,
+                    is_complete=not status.failed,
+                )
             )
         return problem
 
@@ -60,19 +76,18 @@ class SystemStart:
 
     def _bring_up(self, within_s: float) -> str | None:
         serial = self.supervisor.desired.serial
-        failed = self.supervisor.bring_up(self.up, serial, within_s)
-        if failed is not None:
-            return f"{failed.partition(':')[0]} failed"
-        if not self.main_queue.stopping:
-            self.supervisor.start(self._reached(), "running", serial)
-        return None
-
-    def _reached(self) -> Mapping[str, PrimaryState]:
-        """Return the states that the bring-up has reached, also of nodes that have failed since."""
-        states = self.node_set.states()
-        planned = self.up.states_after(states)
-        failed = self.supervisor.desired.unhandled.keys() & planned.keys()
-        return {**states, **{name: planned[name] for name in failed}}
+        names = (node.name.value for node in self.system.nodes)
+        goals = self.up.states_after(dict.fromkeys(names, PrimaryState.UNCONFIGURED))
+        if self.all_or_nothing:
+            optional = optional_nodes(self.system)
+            needed = Plan(tuple(step for step in self.up.steps if step.node not in optional))
+            failed = self.supervisor.bring_up_together(needed, serial, within_s)
+            if failed is not None:
+                return f"{failed.partition(':')[0]} failed"
+        problem = self.supervisor.bring_up(goals, self.run_command, serial, within_s)
+        if self.status.without_nodes.activity == "starting":
+            self.status.set_activity("running")
+        return problem
 
     def _take_over(self, found: SystemGoals) -> None:
         """Lead the nodes to the goals that they had: those that are there do not move."""

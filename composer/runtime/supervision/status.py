@@ -6,13 +6,13 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import needed_states
-from composer.plan import parse_goals, start_goals
+from composer.plan import STARTING, Condition, optional_nodes, parse_goals, start_goals
 from composer.runtime.metrics.statistics import Statistics
 
 _MAX_LISTED = 5
@@ -23,8 +23,11 @@ class NodeStatus:
     """The status of one node.
 
     ``desired`` is the state that the supervisor keeps it in; ``since_s`` is when it reached its
-    state, in seconds since 1970. ``held_down`` is why a failed node is held down, else empty.
-    ``starts_active`` is whether a start of the system activates it. ``depends_on`` are the states
+    state, in seconds since 1970. ``held_down`` is why a failed node is held down, else empty;
+    ``condition`` says in words what becomes of it, or what it waits for. ``is_required`` is whether
+    the system needs it, ``is_optional`` whether the system is up without it: it is not required, or
+    depends on such a node. ``starts_active`` is whether a start of the system activates it.
+    ``depends_on`` are the states
     that the nodes it depends on must have, by their full names. ``left_to_manager`` are the
     services that the manager node has instead (see :class:`composer.model.Introspection`).
     ``process`` is the process of the system that the node runs in, empty for the one that reports.
@@ -43,6 +46,8 @@ class NodeStatus:
     node: str
     desired: str
     starts_active: bool = True
+    is_required: bool = True
+    is_optional: bool = False
     depends_on: Mapping[str, str] = field(default_factory=dict)
     left_to_manager: tuple[str, ...] = ()
     process: str = ""
@@ -53,6 +58,7 @@ class NodeStatus:
     restarts: int = 0
     last_error: str = ""
     held_down: str = ""
+    condition: str = ""
     errors: int = 0
     sent_hz: float | None = None
     received_hz: float | None = None
@@ -66,6 +72,11 @@ class NodeStatus:
     sent: Mapping[str, int] = field(default_factory=dict)
     received: Mapping[str, int] = field(default_factory=dict)
     dropped: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def counts(self) -> bool:
+        """Whether the system is not up without the node."""
+        return not self.is_optional and self.condition != Condition.IGNORED
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,17 +98,19 @@ class SystemStatus:
 
     @property
     def failed(self) -> tuple[NodeStatus, ...]:
-        """The nodes that are held down."""
-        return tuple(node for node in self.nodes if node.held_down)
+        """The nodes that are held down, and that the system needs."""
+        return tuple(node for node in self.nodes if node.held_down and node.is_required)
 
     @property
     def is_active(self) -> bool:
         """Whether every node that a start activates is active, and no node has failed.
 
-        A system without such a node is never active.
+        Optional nodes, and those whose failure is ignored, do not count. A system in which a start
+        activates no node is never active.
         """
         nodes = [node for node in self.nodes if node.starts_active]
-        return bool(nodes) and not self.failed and all(node.state == "active" for node in nodes)
+        are_active = all(node.state == "active" for node in nodes if node.counts)
+        return bool(nodes) and not self.failed and are_active
 
     @property
     def is_ready(self) -> bool:
@@ -106,19 +119,34 @@ class SystemStatus:
         A system in which a start activates no node is ready if it runs.
         """
         active = self.is_active or not any(node.starts_active for node in self.nodes)
-        settled = all(node.state == node.desired for node in self.nodes)
+        settled = all(node.state == node.desired for node in self.nodes if node.counts)
         return self.activity == "running" and active and not self.failed and settled
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What keeps nodes from being up, in words."""
+        missing = (Condition.ABSENT, STARTING)
+        absent = [node.node for node in self.nodes if node.condition in missing]
+        down = [node for node in self.nodes if node.held_down and node.node not in absent]
+        waiting = [f"waiting for {_listed(absent)}"] if absent else []
+        failed = [f"{node.node} is {node.condition or 'down'}: {node.held_down}" for node in down]
+        more = [f"{len(down) - _MAX_LISTED} more are down"] if len(down) > _MAX_LISTED else []
+        return (*waiting, *failed[:_MAX_LISTED], *more)
+
+    @property
+    def active(self) -> int:
+        """The number of active nodes."""
+        return sum(node.state == "active" for node in self.nodes)
+
+    @property
     def summary(self) -> str:
-        """The system in one line: ``2 of 3 nodes active, /planner is down: silent for 1 s``."""
-        active = sum(node.state == "active" for node in self.nodes)
-        parts = [f"{active} of {len(self.nodes)} nodes active"]
-        failed = self.failed
-        parts += [f"{node.node} is down: {node.held_down}" for node in failed[:_MAX_LISTED]]
-        if len(failed) > _MAX_LISTED:
-            parts.append(f"{len(failed) - _MAX_LISTED} more are down")
-        return ", ".join(parts)
+        """The system in one line: ``2 of 3 nodes active, /planner is isolated: no map``."""
+        return ", ".join((f"{self.active} of {len(self.nodes)} nodes active", *self.remarks))
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
+    return f"{', '.join(names[:_MAX_LISTED])}{more}"
 
 
 class _Counters(NamedTuple):
@@ -160,7 +188,7 @@ class Status:
             name: {port.name.value: port.full_name for port in node.ports}
             for name, node in models.items()
         }
-        goals = start_goals(system, PrimaryState.ACTIVE)
+        goals, optional = start_goals(system, PrimaryState.ACTIVE), optional_nodes(system)
         needed = needed_states(system)
         self._status = SystemStatus(
             system=system.name.value,
@@ -176,6 +204,8 @@ class Status:
                 models[name].full_name,
                 PrimaryState.UNCONFIGURED.value,
                 starts_active=goals[name] is PrimaryState.ACTIVE,
+                is_required=models[name].required,
+                is_optional=name in optional,
                 depends_on={
                     models[on].full_name: state.value for on, state in needed[name].items()
                 },
@@ -218,15 +248,23 @@ class Status:
             self._status = replace(self._status, goals=text)
         self._changed()
 
-    def set_desired(self, desired: Mapping[str, str], held_down: Mapping[str, str]) -> None:
-        """Set the desired states, and why failed nodes are held down, by the keys of nodes."""
+    def set_desired(
+        self,
+        desired: Mapping[str, str],
+        held_down: Mapping[str, str],
+        conditions: Mapping[str, str],
+    ) -> None:
+        """Set the desired states, why failed nodes are held down, and conditions, by their keys."""
         is_changed = False
         with self._lock:
-            for name, node in self._nodes.items():
-                goal, reason = desired.get(name, node.desired), held_down.get(name, "")
-                if (goal, reason) != (node.desired, node.held_down):
-                    self._nodes[name] = replace(node, desired=goal, held_down=reason)
-                    is_changed = True
+            for name, before in self._nodes.items():
+                self._nodes[name] = node = replace(
+                    before,
+                    desired=desired.get(name, before.desired),
+                    held_down=held_down.get(name, ""),
+                    condition=conditions.get(name, ""),
+                )
+                is_changed = is_changed or node != before
         if is_changed:
             self._changed()
 

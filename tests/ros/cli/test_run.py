@@ -146,11 +146,36 @@ def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None
     (tmp_path / "sour.yaml").write_text(
         "system: sour\nnodes:\n  good: {}\n  bad: {behavior: 'sour:Sour'}\n"
     )
-    done = compose("run", str(tmp_path / "sour.yaml"))
+    path = str(tmp_path / "sour.yaml")
+    done = compose("run", path, "--for", "0.2")
     assert done.returncode == 1
     assert "no milk" in done.stderr
-    assert "rolling back because of /bad" in done.stderr
-    assert states_in(done.stderr)[-1].endswith("finalized")
+    failure = "/bad is isolated: activate failed: RuntimeError: no milk"
+    assert re.search(
+        rf"\[WARN\].* 1 of 2 nodes active after \S+ s, {failure}$", done.stderr, re.MULTILINE
+    )
+    assert f"\nnot up at the end: {failure}\n" in done.stderr
+    together = compose("run", path, "--all-or-nothing")
+    assert together.returncode == 1
+    assert "rolling back because of /bad" in together.stderr
+    assert states_in(together.stderr)[-1].endswith("finalized")
+
+
+def test_a_background_run_that_is_not_complete_has_exit_code_1(tmp_path: Path) -> None:
+    (tmp_path / "part.yaml").write_text(
+        "system: part\nnodes:\n  good: {}\n  bad: {executable: {command: [sh, -c, exit 3]}}\n"
+    )
+    done = compose("run", str(tmp_path / "part.yaml"), "--wait")
+    try:
+        assert done.returncode == 1
+        assert "compose: 1 of 2 nodes active after " in done.stderr
+        assert "/bad is isolated: activate failed: its process exited with status 3" in done.stderr
+        assert "end them with 'compose down', or use --all-or-nothing" in done.stderr
+        assert re.search(
+            r"^/bad +unconfigured \(isolated\)", compose("ps", "part").stdout, re.MULTILINE
+        )
+    finally:
+        compose("down", "part")
 
 
 def test_errors_are_in_the_summary_and_may_fail_the_run(tmp_path: Path) -> None:

@@ -164,12 +164,16 @@ def test_commands_to_a_whole_system(robot: Robot) -> None:
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
 
     set_fault("configure")
-    refusal = refused("up", "robot")
+    refusal = refused("up", "robot", "--all-or-nothing")
     assert refusal.startswith(
         "compose: /fleet/robot did not come up: /fleet/planner: configure failed: "
         "ValueError: no map; rolled back"
     )
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
+    assert refused("up", "robot").startswith(
+        "compose: /fleet/robot did not come up: /fleet/planner failed; 0 of 3 nodes active, "
+        "/fleet/planner is isolated: configure failed: ValueError: no map\n"
+    )
     set_fault("none")
     assert repeated_until(bool, "up", "robot") == "/fleet/robot: 2 of 3 nodes active\n"
     assert refused("up", "rowbot").splitlines()[1] == "  did you mean '/fleet/robot'?"
@@ -317,11 +321,12 @@ def test_a_command_does_not_wait_for_an_ended_process(robot: Robot) -> None:
 
 
 def test_a_failed_bring_up_ends_the_background_process(path: Path) -> None:
-    refusal = refused("run", path, "--wait", "--set", "planner.fault=configure")
+    fault = ("--set", "planner.fault=configure")
+    refusal = refused("run", path, "--wait", "--all-or-nothing", *fault)
     assert "the system did not come up (exit code 1):" in refusal
     assert "/fleet/planner failed" in refusal
     # The limit is long enough to reach the node that hangs on a busy machine.
-    late = "activate failed: bring-up timed out after 5 s"
+    late = "rolling back because of /fleet/planner: bring-up timed out after 5 s"
     expect_error(late, "run", path, "--timeout", 5, "--set", "planner.fault=hang", "--grace", 3)
 
 

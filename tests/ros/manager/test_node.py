@@ -120,10 +120,12 @@ def test_a_system_is_not_active_after_the_failure_of_an_inactive_node(
     with running(ROBOT.replace("camera: {", camera), tmp_path, planner=PLANNER):
         assert command(peer, "is_active") == (True, "2 of 3 nodes active")
         assert not peer.change("/fleet/camera", "activate")
-        wait_until(lambda: "/fleet/camera is down" in command(peer, "is_active")[1], "the failure")
+        wait_until(
+            lambda: "/fleet/camera is isolated" in command(peer, "is_active")[1], "the failure"
+        )
         success, message = command(peer, "is_active")
         assert not success
-        assert message.startswith("2 of 3 nodes active, /fleet/camera is down: activate ended in")
+        assert message.startswith("2 of 3 nodes active, /fleet/camera is isolated: activate ended")
         assert command(peer, "startup") == (True, "2 of 3 nodes active")
         assert command(peer, "is_active")[0]
 
@@ -153,7 +155,7 @@ def test_a_failed_start_is_rolled_back_and_can_be_retried(
 ) -> None:
     with running(ROBOT, tmp_path, autostart=PrimaryState.UNCONFIGURED, planner=PLANNER) as system:
         assert peer.set_parameter("/fleet/planner", "fault", fault) == ""
-        success, message = command(peer, "startup")
+        success, message = command(peer, "startup_all_or_nothing")
         assert not success
         assert message.startswith(words)
         assert message.endswith("0 of 3 nodes active")
@@ -204,7 +206,7 @@ def test_states_are_published_latched_on_change_and_every_second(
         assert status["held_down"] == "deactivate ended in an error: ValueError: no map"
         assert status["last_error"] == "deactivate ended in an error: ValueError: no map"
         assert states[-1].status[0].level == DiagnosticStatus.ERROR
-        assert "/fleet/planner is down" in states[-1].status[0].message
+        assert "/fleet/planner is isolated" in states[-1].status[0].message
 
 
 DIAMOND = """
@@ -232,7 +234,7 @@ def test_the_start_of_a_diamond_with_a_failing_node_is_rolled_back(
 ) -> None:
     with running(DIAMOND, tmp_path, planner=PLANNER) as system:
         assert peer.set_parameter("/middle", "fault", "activate") == ""
-        success, message = command(peer, "startup", "/diamond")
+        success, message = command(peer, "startup_all_or_nothing", "/diamond")
         assert not success
         assert message.startswith("/middle: activate failed: ValueError: no map")
         rolling = system.reported(RollingBack)[0]

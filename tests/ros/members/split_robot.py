@@ -66,13 +66,20 @@ def command_of(path: Path) -> tuple[str, ...]:
 
 @contextmanager
 def split(
-    folder: Path, text: str = TEXT, *, fail_on_error: bool = False
+    folder: Path,
+    text: str = TEXT,
+    *,
+    fail_on_error: bool = False,
+    all_or_nothing: bool = False,
 ) -> Iterator[RunningSystem]:
     """Run the system as ``compose run`` does, with this process as the coordinating one."""
     path = folder / "robot.yaml"
     path.write_text(text, encoding="utf-8")
     options = HostOptions(
-        stop_within_s=6.0, member_command=command_of(path), fail_on_error=fail_on_error
+        stop_within_s=6.0,
+        member_command=command_of(path),
+        fail_on_error=fail_on_error,
+        all_or_nothing=all_or_nothing,
     )
     with running(text, folder, options=options, detector=DETECTOR) as system:
         yield system

@@ -58,7 +58,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             members[0].kill()
             failed = wait_for_failure(system)
             # Only what has started it may start it again, whatever the policy.
-            assert str(failed).endswith("process 'sensing' has ended; waiting for its return")
+            assert str(failed).endswith("process 'sensing' has ended; waiting for it")
             assert system.node("detector").state == "inactive"
             members[0].wait()
             members[0] = subprocess.Popen([*command_of(path), "--process", "sensing"])
@@ -95,7 +95,7 @@ def stop_until_the_pause(
     member.send_signal(signal.SIGSTOP)
     wait_until(lambda: system.node("arm").state == "deactivating", "the pause")
     failed = system.reported(NodeFailed)[-1]
-    assert failed.node == "/lab/detector"
+    assert failed.nodes == ("/lab/detector",)
     assert failed.reason == "process 'acting' has not reported for 5 s"
     reports.clear()
     member.send_signal(signal.SIGCONT)

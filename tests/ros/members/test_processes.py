@@ -12,10 +12,26 @@ from lifecycle_msgs.srv import GetState
 from std_srvs.srv import Trigger
 
 from composer.runtime.ros_graph.graph import participant, servers_of
-from composer.runtime.supervision.events import NodeFailed, Restarted, RollingBack
+from composer.runtime.supervision.events import (
+    NodeFailed,
+    NodeTransitionFailed,
+    Restarted,
+    RollingBack,
+)
 from tests.ros.members.split_robot import TEXT, split, states
 from tests.ros.support.in_process import Peer, RunningSystem, wait_until
 
+TOGETHER = """
+system: robot
+namespace: lab
+lifecycle: {on_failure: restart, restart: {backoff_ms: 100}}
+processes: {robots: {nodes: [base, lidar, safety]}}
+nodes:
+  base: {}
+  lidar: {lifecycle: {depends_on: [base]}}
+  safety: {lifecycle: {depends_on: [lidar]}}
+  mission: {lifecycle: {depends_on: [safety, base]}}
+"""
 SHAKY = """
 system: robot
 namespace: lab
@@ -54,7 +70,7 @@ def pid_of(system: RunningSystem, node: str) -> int:
 def wait_for_restart(system: RunningSystem, node: str, count: int = 1) -> NodeFailed:
     wait_until(lambda: len(system.reported(Restarted)) >= count, "the restart")
     wait_until(lambda: states(system) == {"active"}, "all nodes")
-    return next(event for event in system.reported(NodeFailed) if event.node == node)
+    return next(event for event in system.reported(NodeFailed) if node in event.nodes)
 
 
 def alive(pid: int) -> bool:
@@ -127,6 +143,24 @@ def test_a_killed_process_is_a_failure_of_its_nodes(tmp_path: Path) -> None:
         assert requests._participant in known
 
 
+def test_the_end_of_a_process_with_several_nodes_is_one_fact(tmp_path: Path) -> None:
+    names = ["/lab/base", "/lab/lidar", "/lab/safety"]
+    with split(tmp_path, TOGETHER) as system:
+        os.kill(pid_of(system, "base"), signal.SIGKILL)
+        wait_until(lambda: len(system.reported(Restarted)) >= len(names), "the restarts")
+        (failed,) = system.reported(NodeFailed)
+        assert sorted(failed.nodes) == names
+        reason = "process 'robots' was ended by SIGKILL"
+        assert (failed.reason, failed.consequence) == (reason, "restart 1 in 0.1 s")
+        assert not system.reported(NodeTransitionFailed)
+        texts = list(map(str, system.events))
+        for name in names:  # not before it is active
+            up = texts.index(f"{name} is up again after restart 1")
+            changes = [text for text in texts[:up] if text.startswith(f"{name} ")]
+            assert changes[-1] == f"{name} active"
+        assert system.stop().exit_code == 0
+
+
 def test_a_failed_node_of_another_process_is_restarted(tmp_path: Path, peer: Peer) -> None:
     with split(tmp_path) as system:
         process = pid_of(system, "detector")
@@ -188,7 +222,7 @@ def test_a_bring_up_over_processes_is_rolled_back(tmp_path: Path) -> None:
     text = TEXT.replace('mood: ""', "mood: broken")
     idle = [f"idle_{number}" for number in range(10, 50)]  # more than a service keeps requests
     text += "".join(f"  {name}: {{process: acting}}\n" for name in idle)
-    with split(tmp_path, text) as system:
+    with split(tmp_path, text, all_or_nothing=True) as system:
         assert system.end().exit_code == 1
     assert "ValueError: no lens" in str(system.reported(RollingBack)[0])
     for name in ("/lab/camera", *(f"/lab/{name}" for name in idle)):

@@ -80,7 +80,7 @@ def has_ended(pid: int) -> bool:
 
 def wait_for_failure(system: RunningSystem, node: str) -> NodeFailed:
     def failures() -> list[NodeFailed]:
-        return [event for event in system.reported(NodeFailed) if event.node == node]
+        return [event for event in system.reported(NodeFailed) if node in event.nodes]
 
     wait_until(failures, f"a fault of {node}")
     return failures()[0]
@@ -234,7 +234,7 @@ def test_failed_starts_are_rolled_back(
     executable: str, ports: str, reason: str, tmp_path: Path
 ) -> None:
     text = FAILING.replace("EXECUTABLE", executable).replace("PORTS", ports)
-    with running(text, tmp_path) as system:
+    with running(text, tmp_path, options=HostOptions(all_or_nothing=True)) as system:
         outcome = system.end()
     assert outcome.exit_code == 1
     assert reason in str(system.reported(RollingBack)[0])
@@ -291,8 +291,53 @@ def test_an_external_node_is_awaited_and_observed(tmp_path: Path) -> None:
         process.wait()
 
 
-def test_an_absent_external_node_fails_the_bring_up(tmp_path: Path) -> None:
-    with running(EXTERNAL.replace("TIMEOUT", "300"), tmp_path) as system:
+@pytest.mark.parametrize("is_required", [True, False])
+def test_a_system_is_up_without_an_external_node_and_takes_it_in_later(
+    is_required: bool, tmp_path: Path
+) -> None:
+    text = EXTERNAL.replace("TIMEOUT", "300") + "  other: {}\n"
+    if not is_required:
+        text = text.replace("  lidar:\n", "  lidar:\n    required: false\n")
+    process = None
+    try:
+        with running(text, tmp_path) as system:
+            (up,) = system.reported(BroughtUp)
+            assert str(up).startswith("1 of 3 nodes active after ")
+            assert str(up).endswith(" s, waiting for /lidar")
+            assert up.is_complete is not is_required
+            failed = wait_for_failure(system, "/lidar")
+            missing = "it has no publisher /scan, service /reset after 0.3 s"
+            assert failed.reason.startswith(f"activate failed: {missing}")
+            assert failed.is_tolerated is not is_required
+            assert [system.node(name).state for name in ("other", "filter")] == [
+                "active",
+                "inactive",
+            ]
+            process = start_external(tmp_path)
+            wait_until(lambda: system.node("filter").state == "active", "the arrival")
+            assert system.reported(NodeFailed) == [failed]
+            assert system.stop().exit_code == 0
+    finally:
+        if process is not None:
+            process.kill()
+            process.wait()
+
+
+def test_the_end_does_not_wait_for_an_absent_node(tmp_path: Path) -> None:
+    text = EXTERNAL.replace("TIMEOUT", "60000").replace(
+        "  lidar:\n", "  lidar:\n    required: false\n"
+    )
+    with running(text, tmp_path) as system:
+        wait_until(lambda: system.node("lidar").state == "activating", "the wait for it")
+        outcome = system.stop()
+        assert outcome.exit_code == 0
+        assert [node.state for node in outcome.nodes] == ["finalized"] * 2
+        assert outcome.remarks == ("waiting for /lidar",)
+
+
+def test_an_absent_external_node_fails_a_bring_up_that_is_all_or_nothing(tmp_path: Path) -> None:
+    options = HostOptions(all_or_nothing=True)
+    with running(EXTERNAL.replace("TIMEOUT", "300"), tmp_path, options=options) as system:
         assert system.end().exit_code == 1
     reason = str(system.reported(RollingBack)[0])
     assert "it has no publisher /scan, service /reset after 0.3 s" in reason

@@ -81,7 +81,7 @@ def test_native_nodes_with_our_own(prefix: Path, tmp_path: Path, peer: Peer) -> 
             os.kill(node.pid, signal.SIGKILL)
             wait_until(lambda n=round_: len(system.reported(NodeFailed)) == n, "the fault")
             failed = system.reported(NodeFailed)[-1]
-            assert failed.node == node.full_name
+            assert failed.nodes == (node.full_name,)
             assert failed.reason == "its process was ended by SIGKILL"  # and not its DDS lease
             wait_until(lambda: system.node("listener").state == "inactive", "the pause")
             wait_until(lambda n=round_: len(system.reported(Restarted)) == n, "the restart")

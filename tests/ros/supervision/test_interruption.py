@@ -109,7 +109,7 @@ def test_callbacks_that_wait_for_a_hanging_callback_are_not_interrupted(tmp_path
     """It runs within a reaction within a callback, which have half of its time limit."""
     with running(NESTED, tmp_path, nested=CALLER_AND_HANGING) as system:
         wait_until(lambda: "/hanging unconfigured" in system.states(), "the isolation")
-        failed = [(event.node, event.reason) for event in system.reported(NodeFailed)]
+        failed = [(*event.nodes, event.reason) for event in system.reported(NodeFailed)]
         assert failed == [("/hanging", "on_passed took longer than 1000 ms")]
         assert system.states("/caller")[-1] == "/caller active"
         assert system.states("/relay")[-1] == "/relay active"

@@ -108,7 +108,7 @@ def test_a_failed_node_is_restarted_while_its_dependents_wait(
         wait_until(lambda: system.reported(Restarted), "the restart")
         assert len(system.reported(NodeFailed)) == 1
         failed = system.reported(NodeFailed)[0]
-        assert (failed.node, failed.reason) == ("/sensor", reason)
+        assert (failed.nodes, failed.reason) == (("/sensor",), reason)
         assert failed.consequence == "restart 1 in 0.02 s"
         assert since(system, failed) == RESTART_CHANGES
         wait_until(lambda: scans and scans[-1].data == "2", "messages of the new behavior")
@@ -139,7 +139,7 @@ def test_a_failed_restart_is_retried(tmp_path: Path, peer: Peer) -> None:
 
 def test_too_many_restarts_end_the_system_in_order(tmp_path: Path, peer: Peer) -> None:
     """After five restarts within the window, the system shuts down and reports the reason."""
-    budget = "max_attempts: 5, window_ms: 60000, backoff_ms: 1"
+    budget = "max_attempts: 5, window_ms: 60000, backoff_ms: 1, then: shutdown"
     with running(robot("silent", budget=budget), tmp_path, sensor=SENSOR) as system:
         assert peer.set_parameter("/sensor", "fault", "always silent") == ""
         outcome = system.end()

@@ -67,7 +67,8 @@ def test_the_usage_of_a_system_is_that_of_its_processes() -> None:
 def report(name: str, **nodes: dict[str, str]) -> SystemReport:
     zeros = dict.fromkeys(("since", "restarts", "errors", "sent_hz", "received_hz", "busy"), "0")
     zeros |= dict.fromkeys(("overruns", "queue_drops"), "0")
-    texts = dict.fromkeys(("last_error", "held_down", "slowest", "qos_events", "depends_on"), "")
+    names = ("last_error", "held_down", "condition", "slowest", "qos_events", "depends_on")
+    texts = dict.fromkeys(names, "")
     texts |= dict.fromkeys(("sent", "received", "dropped"), "")
     usual = {"state": "active", "desired": "active", **zeros, **texts}
     system = {"activity": "running", "host": "robot", "pid": "1"}

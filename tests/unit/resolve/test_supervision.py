@@ -22,7 +22,7 @@ nodes:
     lifecycle:
       timeout_ms: 500
       on_failure: shutdown
-      restart: {window_ms: 1000}
+      restart: {window_ms: 1000, then: shutdown}
       watch: {topic_silence_ms: {scan: 100, status: 900}}
   whole: {lifecycle: {watch: {topic_silence_ms: 300, callback_ms: 9}}}
 """
@@ -44,7 +44,9 @@ def test_what_the_system_says_holds_for_nodes_that_say_nothing() -> None:
 def test_a_node_overrides_it_key_by_key() -> None:
     own = of("own")
     assert (own.timeout_ms, own.policy) == (500, OnFailure.SHUTDOWN)
-    assert own.restart == RestartBudget(max_attempts=3, window_ms=1000, backoff_ms=100)
+    assert own.restart == RestartBudget(
+        max_attempts=3, window_ms=1000, backoff_ms=100, then=OnFailure.SHUTDOWN
+    )
     assert own.restart.span is not None
     assert quoted(own.restart.span) == "restart"
     limits = {name.value: limit.value for name, limit in own.watch.topics}

@@ -17,6 +17,7 @@ from composer.cli.support.hosts import (
     require_hosts,
 )
 from composer.cli.support.options import (
+    AllOrNothing,
     AutostartTo,
     LogLevelOption,
     Namespace,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 #: As long as a transition may take by default, with a margin.
 _TIMEOUT_S = 15.0
+_ALL_OR_NOTHING = ("--all-or-nothing",)
 _HINT = "see the log of the system; 'compose ps' shows the state of every node"
 
 
@@ -77,11 +79,12 @@ def up(
     use_sim_time: UseSimTime = False,
     autostart: AutostartTo = None,
     log_level: LogLevelOption = None,
+    all_or_nothing: AllOrNothing = False,
     timeout: Timeout = _TIMEOUT_S,
 ) -> None:
     """Bring up the nodes of a running system.
 
-    Each node is brought up to its autostart state. If a node fails, the bring-up is rolled back and
+    Each node is brought up to its autostart state. If a node fails, its 'on_failure' applies, and
     the cause is reported. Nodes that failed before are retried. Use 'compose run' to start the
     process of a system.
 
@@ -98,14 +101,15 @@ def up(
     if hosts:
         require_hosts("compose up --hosts")
         loaded = load_for_hosts(system, settings or (), namespace, use_sim_time=use_sim_time)
-        _up_on_hosts(loaded, start)
+        _up_on_hosts(loaded, [*start, *_ALL_OR_NOTHING] if all_or_nothing else start)
         return
     if start:
         raise UsageError(
             f"{start[0]} needs --hosts: without it, 'compose up' starts no system",
             hint="give it to 'compose run'",
         )
-    _command("up", "startup", system, timeout, failure="did not come up")
+    service = _service("startup", all_or_nothing=all_or_nothing)
+    _command("up", service, system, timeout, failure="did not come up")
 
 
 def down(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
@@ -131,12 +135,18 @@ def pause(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
     _command("pause", "pause", system, timeout, failure="did not pause")
 
 
-def resume(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
+def resume(
+    system: RunningSystem,
+    *,
+    all_or_nothing: AllOrNothing = False,
+    timeout: Timeout = _TIMEOUT_S,
+) -> None:
     """Activate the inactive nodes of a running system.
 
     The nodes are activated in the order of the bring-up.
     """
-    _command("resume", "resume", system, timeout, failure="did not resume")
+    service = _service("resume", all_or_nothing=all_or_nothing)
+    _command("resume", service, system, timeout, failure="did not resume")
 
 
 def reset(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
@@ -149,6 +159,12 @@ def reset(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
     changes, restart the system: 'compose down', then 'compose run'.
     """
     _command("reset", "reset", system, timeout, failure="did not reset")
+
+
+def _service(name: str, *, all_or_nothing: bool) -> str:
+    from composer.runtime.ros.manager_protocol import ALL_OR_NOTHING
+
+    return f"{name}{ALL_OR_NOTHING}" if all_or_nothing else name
 
 
 def _command(command: str, service: str, text: str, timeout_s: float, *, failure: str) -> None:

@@ -163,7 +163,7 @@ def _system(
 def _row(node: NodeReport) -> tuple[str, ...]:
     return (
         node.node,
-        f"{node.state} (failed)" if node.held_down else node.state,
+        f"{node.state} ({node.condition})" if node.condition else node.state,
         _duration(time.time() - node.since_s),
         str(node.restarts),
         str(node.errors),

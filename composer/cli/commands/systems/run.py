@@ -18,6 +18,7 @@ import typer
 from composer.cli.support.dashboard_process import require_dashboard
 from composer.cli.support.errors import CONFIG, CommandError, UsageError
 from composer.cli.support.options import (
+    AllOrNothing,
     Autostart,
     AutostartTo,
     LogLevelOption,
@@ -110,6 +111,7 @@ def run(
             help="Exit with code 1 if a handler has raised an error or a call has failed.",
         ),
     ] = False,
+    all_or_nothing: AllOrNothing = False,
     dashboard: Annotated[
         bool,
         typer.Option(
@@ -163,12 +165,13 @@ def run(
 
     The system is validated first, and nothing is started if it has errors. All nodes run in this
     process, except for executables and the nodes of other processes, which it starts. They are
-    brought up in dependency order and shut down in reverse order. If the bring-up fails, it is
-    rolled back. Press Ctrl-C to shut down.
+    brought up in dependency order and shut down in reverse order. If a node fails, its 'on_failure'
+    applies, during bring-up as well: the nodes that do not depend on it come up. Press Ctrl-C to
+    shut down.
 
-    Exit code 1 if the bring-up fails or a node fails permanently, 78 if the system has errors or
-    lacks an interface package. Errors of handlers are reported in the summary; use --fail-on-error
-    in tests.
+    Exit code 1 if the bring-up fails or a required node is down at the end, 78 if the system has
+    errors or lacks an interface package. Errors of handlers are reported in the summary; use
+    --fail-on-error in tests.
     """
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
@@ -211,6 +214,7 @@ def run(
         up_s = _WAIT_S if timeout is None else timeout
         start += _words({"--process": process, "--await-processes": await_processes})
         start += _words({"--fail-on-error": fail_on_error, "--dashboard": dashboard})
+        start += _words({"--all-or-nothing": all_or_nothing})
         start += _words({"--for": run_for, "--timeout": up_s, "--grace": grace})
         limit_s = up_s + grace + _START_S
         write(run_in_background(part.name.value, [system, *start], limit_s))
@@ -220,6 +224,7 @@ def run(
         tracing=tracing,
         check_mutation=check_mutation,
         fail_on_error=fail_on_error,
+        all_or_nothing=all_or_nothing,
         process=member,
         started_by=os.environ.pop(STARTED_BY_VARIABLE, ""),  # not for its own children
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
@@ -323,7 +328,8 @@ def _run(
             # The process that has started this one prints the states of its nodes, and which have
             # failed: it decides what follows.
             is_known = not isinstance(event, Logged) and severity_of(event) == "INFO"
-            if not is_child or not (is_known or isinstance(event, NodeFailed)):
+            is_known = is_known or (isinstance(event, NodeFailed) and not event.is_tolerated)
+            if not is_child or not is_known:
                 progress.show(event)
             log.show(event)
             if isinstance(event, BroughtUp | Stopping):

@@ -60,7 +60,8 @@ class Progress:
             return
         if isinstance(event, BroughtUp):
             address = None if self._address is None or self._ready is None else self._address()
-            report_ready(self._ready, str(event) if address is None else f"{address}\n{event}")
+            text = str(event) if address is None else f"{address}\n{event}"
+            report_ready(self._ready, text, is_complete=event.is_complete)
             self._ready = None
         line = self._line(event)
         code = _code(event)
@@ -94,6 +95,8 @@ def severity_of(event: Event) -> str:
     match event:
         case Logged():
             return event.level.upper()
+        case NodeFailed(is_tolerated=True) | BroughtUp(is_complete=False):
+            return "WARN"
         case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
             return "ERROR"
         case _:
@@ -102,6 +105,8 @@ def severity_of(event: Event) -> str:
 
 def _code(event: Event) -> str:
     match event:
+        case NodeFailed(is_tolerated=True) | BroughtUp(is_complete=False):
+            return _YELLOW
         case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
             return _RED
         case BroughtUp() | Restarted():
@@ -126,6 +131,8 @@ def summary(outcome: Outcome) -> str:
     if called:
         parts.append(summary_table(called, _MAX_CALLBACKS))
     parts += [f"chain {chain.chain}: {chain.text}" for chain in outcome.chains]
+    if outcome.remarks:
+        parts.append(lines([f"not up at the end: {', '.join(outcome.remarks)}"]))
     if any(node.errors for node in outcome.nodes):
         parts.append(_error_line(outcome.nodes))
     return "\n".join(parts)

@@ -92,6 +92,7 @@ function nodeState(node) {
       "p",
       { class: "node-state" },
       stateBadge(node.state),
+      node.condition ? h("span", { class: "desired" }, ` ${node.condition}`) : null,
       node.since_s ? h("span", { class: "muted" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
     ),
     node.last_error && h("p", { class: "problem" }, h("strong", {}, "Last error: "), node.last_error),

@@ -84,6 +84,7 @@ export function createNodeDetail(app) {
       "p",
       { class: "node-state" },
       stateBadge(node.state),
+      node.condition ? h("span", { class: "desired" }, ` ${node.condition}`) : null,
       node.since_s ? h("span", { class: "muted" }, ` for ${duration(Date.now() / 1000 - node.since_s)}`) : null,
       node.desired && node.desired !== node.state ? h("span", { class: "desired" }, ` should be ${node.desired}`) : null,
     ));

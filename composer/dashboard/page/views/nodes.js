@@ -12,7 +12,7 @@ const COLUMNS = [
   {
     id: "state",
     label: "State",
-    text: (node) => `${node.state}${node.desired && node.desired !== node.state ? ` → ${node.desired}` : ""}`,
+    text: (node) => `${node.state}${change(node)}`,
     render: (node) => h("span", {}, stateBadge(node.state), wanted(node)),
   },
   { id: "since", label: "Since", number: true, level: 2, value: (node) => -(node.since_s ?? 0), text: since },
@@ -27,9 +27,14 @@ const COLUMNS = [
   { id: "slowest", label: "Slowest callback", level: 4, text: (node) => node.slowest ?? "" },
 ];
 
+/** Return what becomes of a node, or the state that it should have, in words; empty if it is as it should be. */
+function change(node) {
+  if (node.condition) return ` ${node.condition}`;
+  return node.desired && node.desired !== node.state ? ` → ${node.desired}` : "";
+}
+
 function wanted(node) {
-  if (!node.desired || node.desired === node.state) return null;
-  return h("span", { class: "desired" }, ` → ${node.desired}`);
+  return change(node) && h("span", { class: "desired" }, change(node));
 }
 
 function since(node) {

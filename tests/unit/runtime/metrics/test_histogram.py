@@ -212,6 +212,7 @@ def node(name: str, process: str) -> NodeReport:
     zeros = dict.fromkeys(("since_s", "restarts", "errors", "sent_hz", "received_hz", "busy"), 0)
     counts = {"overruns": 0, "queue_drops": 0, "qos_events": {}, "depends_on": {}}
     topics = {"sent": {}, "received": {}, "dropped": {}}
-    texts = {"last_error": "", "held_down": "", "slowest": "", "process": process}
+    texts = dict.fromkeys(("last_error", "held_down", "condition", "slowest"), "")
+    texts["process"] = process
     values: dict[str, Any] = {**zeros, **counts, **topics, **texts}
     return NodeReport(node=name, state="active", desired="active", **values)

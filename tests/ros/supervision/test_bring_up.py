@@ -1,0 +1,204 @@
+"""The policies of nodes during bring-up, nodes that fail themselves, and all or nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.runtime.host_options import HostOptions
+from composer.runtime.supervision.events import (
+    BroughtUp,
+    NodeFailed,
+    NodeTransitionFailed,
+    Restarted,
+    RolledBack,
+)
+from tests.ros.support.in_process import Peer, running, wait_until
+
+ROBOT = """
+system: robot
+lifecycle: {restart: {max_attempts: 2, backoff_ms: 20}}
+nodes:
+  base: {}
+  user: {lifecycle: {depends_on: [driver]}}
+  driver:
+    behavior: driver:Driver
+    required: REQUIRED
+    parameters: {fails: FAILS}
+    lifecycle: {on_failure: POLICY}
+"""
+DRIVER = """
+from composer.behavior import Behavior
+
+TRIES = []
+
+class Driver(Behavior):
+    def on_activate(self):
+        TRIES.append(self)
+        if len(TRIES) <= self.parameters.fails:
+            raise OSError("usb device not ready")
+"""
+NOT_READY = "activate failed: OSError: usb device not ready"
+
+
+def robot(policy: str, fails: int = 99, required: str = "true") -> str:
+    text = ROBOT.replace("POLICY", policy).replace("FAILS", str(fails))
+    return text.replace("REQUIRED", required)
+
+
+def test_a_driver_that_fails_its_first_starts_is_restarted(tmp_path: Path) -> None:
+    with running(robot("restart", fails=2), tmp_path, driver=DRIVER) as system:
+        texts = list(map(str, system.events))
+        (up,) = system.reported(BroughtUp)
+        assert (up.active, up.is_complete, up.remarks) == (3, True, ())
+        failed = [f"/driver failed: {NOT_READY}; restart {n}" for n in (1, 2)]
+        order = ["/base active", failed[0], failed[1], "/driver active", "/user active", str(up)]
+        found = [next(n for n, text in enumerate(texts) if part in text) for part in order]
+        assert found == sorted(found), texts
+        assert system.reported(Restarted)[0].attempt == 2
+        assert not system.reported(NodeTransitionFailed), "each failure is reported once"
+        assert system.stop().exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("policy", "required", "remark", "exit_code"),
+    [
+        ("isolate", "true", f"/driver is isolated: {NOT_READY}", 1),
+        ("restart", "true", f"/driver is given up: {NOT_READY}", 1),
+        ("restart", "false", f"/driver is given up: {NOT_READY}", 0),
+        ("shutdown", "false", f"/driver is isolated: {NOT_READY}", 0),
+    ],
+)
+def test_a_node_that_does_not_come_up_stops_only_those_that_depend_on_it(
+    tmp_path: Path, policy: str, required: str, remark: str, exit_code: int
+) -> None:
+    with running(robot(policy, required=required), tmp_path, driver=DRIVER) as system:
+        (up,) = system.reported(BroughtUp)
+        assert up.is_complete is (required == "false")
+        wait_until(lambda: system.node("driver").state == "unconfigured", "the end of restarts")
+        restarts = 2 if policy == "restart" else 0
+        wait_until(lambda: len(system.reported(NodeFailed)) == restarts + 1, "the last failure")
+        assert [system.node(name).state for name in ("base", "user")] == ["active", "inactive"]
+        outcome = system.stop()
+    assert (outcome.exit_code, outcome.remarks) == (exit_code, (remark,))
+
+
+def test_nodes_start_without_one_whose_failure_is_ignored(tmp_path: Path) -> None:
+    with running(robot("ignore"), tmp_path, driver=DRIVER) as system:
+        assert system.reported(BroughtUp)[0].active == 2
+        (failed,) = system.reported(NodeFailed)
+        assert (failed.consequence, failed.is_tolerated) == ("ignoring it", True)
+        assert system.node("user").state == "active"
+        assert system.stop().exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("policy", "together"),
+    [("shutdown", False), ("restart, restart: {max_attempts: 1, then: shutdown}", False),
+     ("isolate", True)],
+)  # fmt: skip
+def test_a_bring_up_is_rolled_back(tmp_path: Path, policy: str, together: bool) -> None:
+    options = HostOptions(all_or_nothing=together)
+    with running(robot(policy), tmp_path, options=options, driver=DRIVER) as system:
+        outcome = system.end()
+    assert outcome.exit_code == 1
+    assert outcome.reason.startswith("/driver failed")
+    assert "/base" in system.reported(RolledBack)[0].nodes
+    assert not system.reported(BroughtUp)
+    assert {node.state for node in outcome.nodes} == {"finalized"}
+
+
+def test_all_or_nothing_is_not_about_nodes_that_are_not_required(tmp_path: Path) -> None:
+    options = HostOptions(all_or_nothing=True)
+    text = robot("isolate", required="false")
+    with running(text, tmp_path, options=options, driver=DRIVER) as system:
+        wait_until(lambda: system.reported(NodeFailed), "the failure")
+        assert system.node("base").state == "active"
+        assert system.stop().exit_code == 0
+
+
+FAILING = """
+system: robot
+lifecycle: {on_failure: restart, restart: {backoff_ms: 20}}
+nodes:
+  driver:
+    behavior: driver:Driver
+    parameters: {fails_in: {type: string, default: WHERE}}
+    timers: {tick: {period_ms: 20}}
+"""
+FAILING_DRIVER = """
+from composer.behavior import Behavior
+
+LIVES = []
+
+class Driver(Behavior):
+    def on_configure(self):
+        LIVES.append(self)
+        self.check("configure")
+
+    def on_activate(self):
+        self.check("activate")
+
+    def on_tick(self):
+        self.check("tick")
+
+    def check(self, where):
+        if len(LIVES) == 1 and self.parameters.fails_in == where:
+            self.fail("lost the device")
+"""
+
+
+@pytest.mark.parametrize(
+    ("where", "reason"),
+    [
+        ("configure", "configure failed: Failed: lost the device"),
+        ("activate", "activate failed: Failed: lost the device"),
+        ("tick", "lost the device"),
+    ],
+)
+def test_a_behavior_can_fail_its_node(tmp_path: Path, where: str, reason: str) -> None:
+    text = FAILING.replace("WHERE", where)
+    with running(text, tmp_path, driver=FAILING_DRIVER) as system:
+        wait_until(lambda: system.reported(Restarted), "the restart")
+        (failed,) = system.reported(NodeFailed)
+        assert (failed.reason, failed.consequence) == (reason, "restart 1 in 0.02 s")
+        assert system.node("driver").state == "active"
+        assert system.stop().exit_code == 0
+
+
+CLASS = """
+system: robot
+lifecycle: {on_failure: restart, restart: {backoff_ms: 20}}
+nodes: {driver: {class: driver:Driver}, base: {}}
+"""
+CLASS_CODE = """
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+
+TRIES = []
+
+class Driver(LifecycleNode):
+    def __init__(self):
+        super().__init__("driver")
+
+    def on_activate(self, state):
+        TRIES.append(state)
+        if len(TRIES) == 1:
+            return TransitionCallbackReturn.ERROR
+        return super().on_activate(state)
+
+    def on_error(self, state):
+        self.get_logger().info("handles the error")
+        return TransitionCallbackReturn.SUCCESS
+"""
+
+
+def test_a_class_that_returns_an_error_is_restarted(tmp_path: Path, peer: Peer) -> None:
+    with running(CLASS, tmp_path, driver=CLASS_CODE) as system:
+        assert system.reported(BroughtUp)[0].active == 2
+        (failed,) = system.reported(NodeFailed)
+        assert failed.nodes == ("/driver",)
+        assert failed.consequence == "restart 1 in 0.02 s"
+        system.wait_for_log("handles the error")
+        assert peer.state("/driver") == "active"
+        assert system.stop().exit_code == 0
