@@ -173,7 +173,8 @@ class Relevance:
             return not is_ros and _arity(given) in (_arity(expected), None)
         if self.is_class and "Unknown" in given:
             return True
-        members = [item for item in given.split(" | ") if item not in ("Any", "Unknown")]
+        types = re.sub(r"\bLiteral\[-?\d+\]", "int", given).split(" | ")
+        members = {*types} - {"Any", "Unknown"}
         if len(members) > 1 and "None" not in members:
             return True
         if node is None:

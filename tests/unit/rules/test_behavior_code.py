@@ -82,6 +82,12 @@ MISTAKES = [
     ("odometry", "String(data=['x'])", "invalid-value", "['x']"),
     (
         "odometry",
+        "n = 0\nfor name in self.parameters.names:\n    n += len(name)\nString(data=n)",
+        "invalid-value",
+        "n",
+    ),
+    (
+        "odometry",
         "PoseStamped(pose=self.parameters.speed * 2)",
         "invalid-value",
         "self.parameters.speed * 2",
