@@ -17,6 +17,7 @@ from typing import Any
 
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.cache import entry_of, keep_entry, read_entry
+from composer.python_code.stubs.folder import LIBRARIES
 
 #: Kinds that the composer checks itself, or that say nothing about what happens at run time.
 _IGNORED = (
@@ -174,9 +175,9 @@ def _package_folders() -> list[str]:
 
 
 def _state_of_packages() -> Iterator[str]:
-    """Yield what changes if a package is installed, with what the checker imports it from."""
-    for path in _package_folders():
-        yield f"{path} {Path(path).stat().st_mtime_ns}"
+    """Yield what changes if a package is installed, or if one of our own stubs is changed."""
+    for path in (*map(Path, _package_folders()), *sorted(LIBRARIES.rglob("*.pyi"))):
+        yield f"{path} {path.stat().st_mtime_ns}"
 
 
 def _environment(root: Path) -> dict[str, str]:
