@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, warning
 from composer.model import Node, OnFailure
 
-RULE = register(
-    Rule(
-        code="RC476",
-        name="impossible-policy",
-        severity=Severity.WARNING,
-        summary="The 'on_failure' of a node cannot be carried out.",
-        why=(
-            "The system does not start external nodes, so it cannot restart them: with any policy "
-            "but shutdown and ignore, it waits for them. A node with 'required: false' never ends "
-            "the system."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC476",
+    name="impossible-policy",
+    summary="The 'on_failure' of a node cannot be carried out.",
+    why=(
+        "The system does not start external nodes, so it cannot restart them: with any policy "
+        "but shutdown and ignore, it waits for them. A node with 'required: false' never ends "
+        "the system."
+    ),
+    bad="""\
 system: lidar
 nodes:
   lidar:
@@ -27,14 +25,13 @@ nodes:
     publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
     lifecycle: {on_failure: restart}
 """,
-        good="""\
+    good="""\
 system: lidar
 nodes:
   lidar:
     external: true
     publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
 """,
-    )
 )
 
 

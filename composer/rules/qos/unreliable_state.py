@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
-from composer.diagnostics import Diagnostic, Rule, Severity, register
+from composer.diagnostics import Diagnostic, info
 from composer.model import ChannelKind
 from composer.qos import Durability, QosProfile, Reliability
 
-RULE = register(
-    Rule(
-        code="RC532",
-        name="unreliable-state",
-        severity=Severity.INFO,
-        summary="A publisher or subscription is transient local, but best effort.",
-        why=(
-            "Messages from before a subscription existed are sent to it as lost ones are: again. "
-            "Best effort sends nothing again, so late joiners do not get the last message. PX4 "
-            "uses both by convention, and a node that communicates with it may have to."
-        ),
-        bad="""\
+RULE = info(
+    code="RC532",
+    name="unreliable-state",
+    summary="A publisher or subscription is transient local, but best effort.",
+    why=(
+        "Messages from before a subscription existed are sent to it as lost ones are: again. "
+        "Best effort sends nothing again, so late joiners do not get the last message. PX4 "
+        "uses both by convention, and a node that communicates with it may have to."
+    ),
+    bad="""\
 system: state
 nodes:
   robot:
@@ -30,7 +28,7 @@ nodes:
         qos: {durability: transient_local, reliability: best_effort}
         external: true
 """,
-        good="""\
+    good="""\
 system: state
 nodes:
   robot:
@@ -40,7 +38,6 @@ nodes:
         qos: {durability: transient_local, reliability: reliable}
         external: true
 """,
-    )
 )
 
 

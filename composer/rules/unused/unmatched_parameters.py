@@ -6,24 +6,22 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Label, Rule, Severity, register, shown, suggestion
+from composer.diagnostics import Diagnostic, Label, Severity, shown, suggestion, warning
 from composer.model import UnmatchedParameters
 from composer.names import namespace_problem, split_node_name
 from composer.source import Located
 from composer.spelling import is_typo
 
-RULE = register(
-    Rule(
-        code="RC246",
-        name="unmatched-parameters",
-        severity=Severity.WARNING,
-        summary="A parameter file sets values for a node or parameter that does not exist.",
-        why=(
-            "Parameter files use the full ROS names of nodes, with the namespace and the prefixes "
-            "of includes. Values under any other name are ignored, and the node keeps its "
-            "defaults."
-        ),
-        bad="""\
+RULE = warning(
+    code="RC246",
+    name="unmatched-parameters",
+    summary="A parameter file sets values for a node or parameter that does not exist.",
+    why=(
+        "Parameter files use the full ROS names of nodes, with the namespace and the prefixes "
+        "of includes. Values under any other name are ignored, and the node keeps its "
+        "defaults."
+    ),
+    bad="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -32,7 +30,7 @@ nodes:
 # file: robot.yaml
 /motor: {ros__parameters: {speed: 2.0}}
 """,
-        good="""\
+    good="""\
 # file: system.yaml
 system: parameters
 parameter_files: [robot.yaml]
@@ -41,7 +39,6 @@ nodes:
 # file: robot.yaml
 /control/motor: {ros__parameters: {speed: 2.0}}
 """,
-    )
 )
 
 
