@@ -136,7 +136,8 @@ def _policy(scope: Scope, name: str, node: ast.expr) -> object:
     return kind(value)
 
 
-def _duration_ms(scope: Scope, node: ast.expr) -> float:
+def _duration_ms(scope: Scope, node: ast.expr) -> float | None:
+    """Return a duration; None if it is 0, which is unlimited."""
     value = scope.followed(node)
     if not isinstance(value, ast.Call) or value.args:
         raise NotLiteral(node)
@@ -146,4 +147,4 @@ def _duration_ms(scope: Scope, node: ast.expr) -> float:
     seconds, nanoseconds = (given.get(name, 0) for name in ("seconds", "nanoseconds"))
     if not (isinstance(seconds, int | float) and isinstance(nanoseconds, int | float)):
         raise NotLiteral(node)
-    return float(seconds) * 1e3 + float(nanoseconds) * 1e-6
+    return (float(seconds) * 1e3 + float(nanoseconds) * 1e-6) or None

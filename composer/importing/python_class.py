@@ -231,13 +231,12 @@ class _ClassReader:
         place: str,
     ) -> None:
         value: Plain = None
-        if value_node is not None:
+        kind = None if value_node is None else _type_of_node(scope, value_node)
+        if kind is None and value_node is not None:
             value = self._try(
                 lambda: scope.literal(value_node), f"{place}: the default of parameter {name}"
             )
-        kind = rclpy_type(value)
-        if kind is None and value_node is not None:
-            kind = _type_of_node(scope, value_node)
+            kind = rclpy_type(value)
         if kind is None:
             self.unknown.append(f"{place}: the type of parameter {name}")
         else:

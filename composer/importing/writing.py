@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from composer.document.writer import write_document
 from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
@@ -90,6 +91,7 @@ def node_keys(nodes: Iterable[FoundNode]) -> dict[str, FoundNode]:
 
 def qos_value(profile: QosProfile) -> Plain:
     """Return a profile as YAML: a preset, or the policies that differ from the defaults."""
+    profile = replace(profile, depth=max(profile.depth, 1))  # 0 leaves it to the middleware: 1
     for name in _PRESETS:
         if PRESETS[name] == profile:
             return name

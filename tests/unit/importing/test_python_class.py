@@ -19,6 +19,7 @@ import std_msgs.msg
 from rclpy.action import ActionClient
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, QoSProfile, ReliabilityPolicy
 from rclpy.qos import qos_profile_sensor_data as SENSOR
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
@@ -60,6 +61,9 @@ class Lidar(Base):
         changed = QoSProfile(depth=3)
         changed.depth = 7
         self.create_publisher(String, "changed", changed)
+        self.declare_parameters("", [("speed", Parameter.Type.DOUBLE)])
+        least = QoSProfile(depth=0, lifespan=Duration())
+        self.create_publisher(String, "least", least)
         for i in range(2):
             self.create_publisher(String, f"out{i}", 10)
         self.create_publisher(self.kind, "any", 10)
@@ -83,11 +87,13 @@ parameters:
   rate: {type: double, default: 10.0, minimum: 0.0, maximum: 50.0, description: Rate.}
   limits.x: {type: integer, default: -1}
   limits.y: {type: double_array, default: [1.0, 2.0]}
+  speed: {type: double}
   frame: {type: string, default: laser, read_only: true}
 publishers:
   scan: {type: std_msgs/msg/String, qos: sensor_data}
   status: {type: std_msgs/msg/String, topic: "~/status", qos: state}
   changed: {type: std_msgs/msg/String}
+  least: {type: std_msgs/msg/String, qos: {depth: 1}}
 subscriptions:
   cmd:
     type: std_msgs/msg/String
