@@ -14,6 +14,7 @@ _MAX_PLACES = 3  # in the labels of one diagnostic
 _MANY = 3  # different unknown names: a file or a section is probably missing
 _MAX_UNKNOWN = 20  # further unknown names in the labels of one diagnostic
 _NEARBY_LINES = 3  # between the ends of a connection
+_SEVERITIES = tuple(Severity)  # the most severe one first
 _NODE = "a node of this system"
 _PORT = re.compile(r"'(?:[^'.]*\.)?(?:on_|accept_)?([^'.]+)'")
 _INTERFACE = re.compile(r"^([a-z][a-z0-9_]*)/\w+/\w+ has no ")
@@ -115,12 +116,17 @@ def _files_of_infos(found: Iterable[Diagnostic]) -> set[str]:
 
 
 def _joined(found: list[Diagnostic], context: Context) -> list[Diagnostic]:
-    """Report what was probably renamed or removed in one place once, with all uses of it."""
+    """Report what was probably renamed or removed in one place once, with all uses of it.
+
+    The report is the first of the most severe ones, whatever the files are called.
+    """
     groups: dict[tuple[str, ...], list[Diagnostic]] = {}
     for item in found:
         name = _renamed(item, context)
         if name is not None:
             groups.setdefault(name, []).append(item)
+    for items in groups.values():
+        items.sort(key=lambda item: _SEVERITIES.index(item.severity))
     repeated = {id(item): items for items in groups.values() if len(items) > 1 for item in items}
     found = list(_with_groups(found, repeated)) if repeated else found
     return _with_one_of_many(found)

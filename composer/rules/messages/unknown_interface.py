@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Label, error, shown
+from composer.diagnostics import Diagnostic, Label, error, nearest, shown
 from composer.interfaces import Interfaces, InvalidDefinition
 from composer.interfaces.index import similar_interface
 from composer.interfaces.sources import FOLDERS
@@ -92,7 +92,11 @@ def _hint(context: Context, port: Port) -> str | None:
     if incomplete is not None:
         return f"'{shown_path(incomplete)}' has no package.xml: add one that names '{package}'"
     hint = similar_interface(full if slash else name, known)
-    if hint is not None or not slash:
+    if not slash:
         return hint or f"include the package, as in std_msgs/{folder}/Name"
+    packages = context.interfaces.packages()
+    if hint is not None and (package in packages or nearest(package, packages) is not None):
+        return hint
     source = "or put its source into the folder 'interfaces'"
-    return f"install the package '{shown(package)}', {source}"
+    install = f"install the package '{shown(package)}', {source}"
+    return install if hint is None else f"{install}; {hint}"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.diagnostics import Severity
 from composer.loading import collect_diagnostics, load_files, project_diagnostics
 from tests.unit.support.checking import diagnostics_in, rules_broken
 
@@ -107,6 +108,28 @@ def test_a_package_that_is_missing_is_reported_once_with_all_uses(tmp_path: Path
     )
     [found] = diagnostics_in(text, tmp_path)
     assert len(found.related) >= len(["the other import", "the port", "the client"])
+
+
+@pytest.mark.parametrize("module", ["a", "z"], ids=["before the system", "after the system"])
+def test_a_missing_package_of_a_port_is_an_error_in_files_of_any_name(
+    module: str, tmp_path: Path
+) -> None:
+    code = (
+        "from rclpy.node import Node\nfrom turtlesim.msg import Pose\n\n\nclass Turtle(Node):\n"
+        "    def __init__(self):\n        super().__init__('turtle')\n"
+        "        self.create_subscription(Pose, 'pose', print, 10)\n"
+    )
+    (tmp_path / f"{module}.py").write_text(code, encoding="utf-8")
+    text = (
+        f"system: demo\nnodes:\n  turtle:\n    class: {module}:Turtle\n    subscriptions:\n"
+        "      pose: {type: turtlesim/msg/Pose, external: true}\n"
+    )
+    found = max(diagnostics_in(text, tmp_path), key=lambda item: item.severity is Severity.ERROR)
+    assert found.rule.name == "unknown-interface"
+    assert found.hint == (
+        "install the package 'turtlesim', or put its source into the folder 'interfaces'; "
+        "did you mean 'geometry_msgs/msg/Pose'?"
+    )
 
 
 def test_a_missing_folder_of_node_types_is_reported_once(tmp_path: Path) -> None:
