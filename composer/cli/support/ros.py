@@ -97,13 +97,12 @@ def require_modules(system: System) -> None:
 
         missing = missing_module(node.hosted_class.reference)
         if missing is not None:
-            sources = _interface_sources()
+            package = missing.partition(".")[0]
+            source = _interface_sources().get(package)
             raise CommandError(
                 f"class '{node.hosted_class.reference.text}' of node '{node.name}' imports"
                 f" '{missing}', which is not installed for this Python",
-                hint=how_to_build(missing, sources[missing])
-                if missing in sources
-                else how_to_get(missing),
+                hint=how_to_get(missing) if source is None else how_to_build(package, source),
                 exit_code=CONFIG,
             )
 

@@ -255,11 +255,21 @@ def test_a_missing_interface_package_is_reported_before_the_start(
             "pip install interactive_markers   or, if it is a package of ROS: apt",
         ),
         ("geographic_msgs.msg", "compose interfaces build geographic_msgs   or: apt install ros-"),
+        ("arm_interfaces.msg", "compose interfaces build arm_interfaces   or: colcon build"),
     ],
 )
 def test_a_module_that_a_class_imports_in_vain_is_reported_before_the_start(
-    tmp_path: Path, module: str, hint: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, hint: str
 ) -> None:
+    definition = tmp_path / "interfaces" / "arm_interfaces" / "msg" / "Grip.msg"
+    definition.parent.mkdir(parents=True)
+    definition.write_text("float64 force\n")
+    (definition.parents[1] / "package.xml").write_text(
+        "<package><name>arm_interfaces</name></package>"
+    )
+    (tmp_path / "arm_interfaces").mkdir()  # as in the source of a package with code as well
+    (tmp_path / "arm_interfaces" / "__init__.py").touch()
+    monkeypatch.chdir(tmp_path)
     tmp_path.joinpath("marker.py").write_text(
         f"import {module}\nfrom rclpy.node import Node\nclass Marker(Node): ...\n"
     )
@@ -268,7 +278,8 @@ def test_a_module_that_a_class_imports_in_vain_is_reported_before_the_start(
     done = compose("run", system)
     assert done.returncode == 78
     package = module.partition(".")[0]
-    assert f"'marker:Marker' of node 'marker' imports '{package}', which is not" in done.stderr
+    assert f"'marker:Marker' of node 'marker' imports '{package}" in done.stderr
+    assert "', which is not installed for this Python\n" in done.stderr
     assert f"\n  {hint}" in done.stderr
     assert "Traceback" not in done.stderr
 
