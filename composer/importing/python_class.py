@@ -22,7 +22,7 @@ from composer.python_code.source import (
     nearby_modules,
 )
 from composer.python_code.source.scopes import NotLiteral, Scope
-from composer.python_code.source.syntax import scopes_in
+from composer.python_code.source.syntax import Method, scopes_in
 from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain
@@ -68,6 +68,7 @@ def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]
     for scope in scopes_in(source.classes):
         reader.read(scope)
     reader.add_conditions()
+    reader.add_arguments(source.method("__init__"))
     own_module, own = source.classes[0]
     place = f"{shown_path(own_module.path)}:{own.span.line}"
     comments: tuple[str, ...] = (
@@ -191,6 +192,16 @@ class _ClassReader:
             if "" not in conditions and conditions.isdisjoint(map(negated, conditions)):
                 place, condition = calls[0]
                 self.unknown.append(f"{place}: whether there is the {what}: only if {condition}")
+
+    def add_arguments(self, constructor: Method | None) -> None:
+        """List the arguments of the constructor that have no default."""
+        if constructor is not None and constructor.known:
+            place = f"{Path(constructor.span.file.path).name}:{constructor.span.line}"
+            self.unknown.extend(
+                f"{place}: the value of argument {name} of the constructor: 'arguments' sets it"
+                for names in constructor.required
+                for name in names
+            )
 
     def _add_parameter(self, scope: Scope, call: ast.Call, place: str) -> None:
         given = _arguments(call, ("name", "value", "descriptor"))

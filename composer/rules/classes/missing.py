@@ -57,7 +57,10 @@ CLASS_ARGUMENTS = error(
 
 
 def check(context: Context) -> Iterator[Diagnostic]:
-    """Check that every class can be read, is a node, and takes the arguments that it is given."""
+    """Check that every class can be read, is a node, and takes the arguments that it is given.
+
+    A node type alone does not need arguments; systems may add them.
+    """
     for node in context.system.nodes:
         if node.hosted_class is not None:
             yield from unnamed(node.hosted_class.reference, "class", CLASS_MISSING)
@@ -71,7 +74,8 @@ def check(context: Context) -> Iterator[Diagnostic]:
         constructor = item.constructor
         if constructor is not None and constructor.known and constructor.node is not None:
             unknown = list(_unknown_arguments(item, constructor))
-            yield from _missing_arguments(item, constructor, len(unknown))
+            if not context.system.node_type:
+                yield from _missing_arguments(item, constructor, len(unknown))
             yield from unknown
 
 

@@ -151,7 +151,7 @@ from std_msgs.msg import Int32, String
 
 
 class Guard(Node):
-    def __init__(self):
+    def __init__(self, area, *, alarm, limit=1):
         super().__init__("guard")
         self.create_subscription(String, "words", print, 10)
         self.create_publisher(String, "words", 10)
@@ -179,7 +179,7 @@ class Guard(Node):
 """
 
 
-def test_what_depends_on_branches_is_listed_and_ports_of_one_name_are_two(tmp_path: Path) -> None:
+def test_what_is_open_is_listed_and_the_file_is_valid(tmp_path: Path) -> None:
     (tmp_path / "guard.py").write_text(BRANCHES)
     node, unknown = describe_class("guard:Guard", tmp_path)
     assert unknown == (
@@ -192,6 +192,8 @@ def test_what_depends_on_branches_is_listed_and_ports_of_one_name_are_two(tmp_pa
         "guard.py:27: whether there is the publisher ready: only if self.ready()",
         "guard.py:28: whether there is the publisher x: only if self.name",
         "guard.py:31: whether there is the publisher last: only if self.name",
+        "guard.py:7: the value of argument area of the constructor: 'arguments' sets it",
+        "guard.py:7: the value of argument alarm of the constructor: 'arguments' sets it",
     )
     path = tmp_path / "guard.yaml"
     path.write_text(write_node_type("guard", node))
