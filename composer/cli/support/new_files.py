@@ -13,7 +13,10 @@ from composer.cli.support.errors import CommandError
 
 
 def write_new_files(root: Path, files: Mapping[str, str]) -> None:
-    """Write new files below ``root``, all or none, and their folders. Raises CommandError."""
+    """Write new files below ``root``, all or none, and their folders.
+
+    Raises CommandError, also for a name that leads out of ``root``.
+    """
     _write(_encoded(root, files), replace=False)
 
 
@@ -51,10 +54,16 @@ def write_file(path: Path, data: bytes) -> None:
 
 
 def _encoded(root: Path, files: Mapping[str, str | bytes]) -> dict[Path, bytes]:
-    return {
-        root / path: content.encode() if isinstance(content, str) else content
-        for path, content in files.items()
-    }
+    """Return the files with their paths, all of them below ``root``. Raises CommandError."""
+    folder = Path(os.path.realpath(root))
+    encoded: dict[Path, bytes] = {}
+    for name, content in files.items():
+        path = root / name
+        parent = Path(os.path.realpath(path.parent))  # links lead out of a folder as well
+        if not parent.is_relative_to(folder) or path.name in ("", ".."):
+            raise CommandError(f"'{name}' is not in the folder '{root}'")
+        encoded[path] = content.encode() if isinstance(content, str) else content
+    return encoded
 
 
 def _has_content(path: Path, data: bytes) -> bool:

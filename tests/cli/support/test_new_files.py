@@ -75,6 +75,22 @@ def test_exports_replace_all_files_or_none(
         assert contents(tmp_path) == {**files, "sub/": ""}
 
 
+@pytest.mark.parametrize(
+    "name", ["../x", "a/../../x", "{outside}/x", "link/x", "link/new/x", "a/..", "..", "."]
+)
+def test_files_outside_the_folder_are_not_written(tmp_path: Path, name: str) -> None:
+    root, outside = tmp_path / "root", tmp_path / "outside"
+    root.mkdir()
+    outside.mkdir()
+    (root / "link").symlink_to(outside)
+    before = contents(tmp_path)
+    with pytest.raises(CommandError, match=r"is not in the folder '.*root'"):
+        write_exports(root, {"first": "x", name.format(outside=outside): "x"}, replace=True)
+    assert contents(tmp_path) == before
+    write_exports(root / "link", {"x": "x"}, replace=True)  # the user has named the link
+    assert (outside / "x").read_text() == "x"
+
+
 @pytest.mark.parametrize("replace", [False, True])
 def test_folders_and_devices_are_not_replaced(tmp_path: Path, replace: bool) -> None:
     (tmp_path / "folder").mkdir()
