@@ -7,7 +7,7 @@ import shlex
 from pathlib import PurePosixPath
 
 from composer.fast_dataclass import dataclass
-from composer.model.hosts import pattern_of
+from composer.project.copied_files import pattern_of
 
 CONTAINERFILE = PurePosixPath("Containerfile")
 #: Where BuildKit and podman look for it first.
@@ -52,13 +52,7 @@ _UNKNOWN = """\
 # Not in the image, unless requirements.txt adds them: {packages}
 """
 _IGNORED = """\
-# Written by 'compose export': files of the project that the image does not need.
-.git
-**/.venv
-**/__pycache__
-build
-install
-log
+# Written by 'compose export': files of the project that are not copied into the image.
 """
 
 
@@ -70,7 +64,8 @@ class Contents:
     Python (3.12).
     ``has_requirements`` is whether the project has a requirements.txt. ``interfaces`` are interface
     packages to be compiled, ``unknown_interfaces`` those of which there are no definitions here.
-    ``private`` are files below the root that stay here.
+    ``ignored`` are the patterns for docker of files that are not in it, first those that hold for
+    files made later, then those of files that exist.
     """
 
     system: str
@@ -79,7 +74,7 @@ class Contents:
     has_requirements: bool = False
     interfaces: tuple[str, ...] = ()
     unknown_interfaces: tuple[str, ...] = ()
-    private: tuple[PurePosixPath, ...] = ()
+    ignored: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     @property
     def run(self) -> list[str]:
@@ -113,6 +108,11 @@ def containerfile(contents: Contents, wheel: PurePosixPath) -> str:
     )
 
 
-def ignored_files(contents: Contents) -> str:
-    """Return the names of files that are not copied into the image."""
-    return _IGNORED + "".join(f"{pattern_of(path)}\n" for path in contents.private)
+def ignored_files(contents: Contents, wheel: PurePosixPath) -> str:
+    """Return the patterns of files that are not copied into the image."""
+    general, files = contents.ignored
+    folders = {pattern_of(str(path)) for path in wheel.parents}  # may be ignored by git
+    first = [line for line in files if line in folders]
+    last = [line for line in files if line not in folders]
+    lines = (*general, *first, f"!{pattern_of(str(wheel))}", *last)
+    return _IGNORED + "".join(f"{line}\n" for line in lines)

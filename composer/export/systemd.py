@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
@@ -271,8 +272,14 @@ def _quoted(word: str) -> str:
     text = _escaped(word)
     if text and all(character.isalnum() or character in "/._-=:+,@" for character in text):
         return text
-    inner = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{inner}"'
+    inner = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(map(_printable, inner)) + '"'
+
+
+def _printable(character: str) -> str:
+    if character.isprintable():
+        return character
+    return "".join(f"\\x{byte:02x}" for byte in os.fsencode(character))
 
 
 def _escaped(text: str) -> str:

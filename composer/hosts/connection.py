@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from pathlib import Path
 
 import asyncssh
 
 from composer.hosts.remote_command import NO_PYTHON, NO_SETUP, NO_WORKSPACE, workspace
 from composer.model import Host
+from composer.model.hosts import key_file
 
 _CONNECT_WITHIN_S = 10.0
 #: A connection over which nothing is received for their product is lost; see ``SILENCE_S``.
@@ -140,10 +140,3 @@ def _reason(error: OSError) -> str:
     if error.errno is not None and error.errno > 0:
         return os.strerror(error.errno)
     return error.strerror or str(error)
-
-
-def key_file(name: str, root: Path) -> Path:
-    """Return the path of a file of ssh; a relative one begins at ``root``."""
-    with suppress(RuntimeError):  # the home folder of an unknown user
-        return root / Path(name).expanduser()
-    return root / name

@@ -5,31 +5,17 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import asyncssh
 
 from composer.fast_dataclass import dataclass
-from composer.hosts.connection import HostError, key_file
+from composer.hosts.connection import HostError
 from composer.hosts.remote_command import quoted_path, workspace
 from composer.model import Host
-from composer.model.hosts import pattern_of
+from composer.model.hosts import key_file
+from composer.project.copied_files import MARK
 
-#: In a workspace: it holds a copy of a project, which may be replaced.
-MARK = ".compose-sync"
-#: What is made on each computer, and repositories.
-EXCLUDED = (
-    f"/{MARK}",
-    "/.venv",
-    "/venv",
-    "/build",
-    "/install",
-    "/log",
-    "/logs",
-    ".git",
-    "__pycache__",
-    "node_modules",
-)
 _NOT_OURS, _NOT_WRITABLE = 74, 75
 _FOLDER = "compose-workspace:"
 _COPY_WITHIN_S = 3600.0
@@ -37,16 +23,16 @@ _COPY_WITHIN_S = 3600.0
 
 @dataclass(frozen=True, slots=True)
 class SyncOptions:
-    """What to copy: everything below ``root`` but ``EXCLUDED``.
+    """What to copy: everything below ``root`` that ``excluded`` patterns of rsync do not match.
 
     With ``delete``, files of the workspace that are not in the project are deleted. With
-    ``dry_run``, nothing is changed. ``private`` are files below ``root`` that stay here.
+    ``dry_run``, nothing is changed.
     """
 
     root: Path
     delete: bool = False
     dry_run: bool = False
-    private: tuple[PurePosixPath, ...] = ()
+    excluded: tuple[str, ...] = ()
 
 
 def root_problem(root: Path) -> str | None:
@@ -112,7 +98,7 @@ def copy_project(host: Host, target: str, options: SyncOptions) -> tuple[str, ..
             capture_output=True,
             text=True,
             errors="replace",
-            stdin=subprocess.DEVNULL,
+            input="".join(f"{pattern}\0" for pattern in options.excluded),
             timeout=_COPY_WITHIN_S,
         )
     except subprocess.TimeoutExpired as error:
@@ -138,7 +124,7 @@ def rsync_command(host: Host, target: str, options: SyncOptions) -> list[str]:
         if file is not None
     }
     for name, value in settings.items():
-        quoted = f'"{value}"' if " " in value else value
+        quoted = f'"{value}"' if " " in value or "'" in value else value
         ssh += ["-o", f"{name}={quoted}"]
     address = f"[{host.address}]" if ":" in host.address.value else host.address.value
     user = "" if host.user is None else f"{host.user}@"
@@ -153,8 +139,8 @@ def rsync_command(host: Host, target: str, options: SyncOptions) -> list[str]:
         "--out-format=%o %n",
         *(["--delete"] if options.delete else []),
         *(["--dry-run"] if options.dry_run else []),
-        *(f"--exclude={pattern}" for pattern in EXCLUDED),
-        *(f"--exclude={pattern_of(path)}" for path in options.private),
+        "--from0",
+        "--exclude-from=-",
         f"--rsh={shlex.join(ssh)}",
         "--",
         f"{options.root}{os.sep}",

@@ -101,11 +101,15 @@ def peer_problem(host: str) -> str | None:
     if _LIKE_IPV4.match(host) is None:
         return None if _HOST_NAME.match(host) else "is neither an IPv4 address nor a host name"
     parts = host.split(".")
-    if len(parts) != _IPV4_PARTS or not all(part and int(part) <= _BYTE for part in parts):
+    if len(parts) != _IPV4_PARTS or not all(map(_is_byte, parts)):
         return "is not an IPv4 address"
     if not 0 < int(parts[0]) < _FIRST_MULTICAST:
         return "is not the address of a computer"
     return None
+
+
+def _is_byte(text: str) -> bool:
+    return 0 < len(text) <= len(str(_BYTE)) and int(text) <= _BYTE
 
 
 def interface_problem(text: str) -> str | None:

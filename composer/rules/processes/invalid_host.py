@@ -1,4 +1,4 @@
-"""An address, a user, a workspace or a ROS domain of a host that cannot be used."""
+"""A name, an address, a user, a file or a ROS domain of a host that cannot be used."""
 
 from __future__ import annotations
 
@@ -7,16 +7,24 @@ from collections.abc import Callable, Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.diagnostics import Diagnostic, error
 from composer.model import Host
-from composer.model.hosts import domain_problem, login_problem, workspace_problem
+from composer.model.hosts import (
+    address_problem,
+    domain_problem,
+    key_file_problem,
+    name_problem,
+    user_problem,
+    workspace_problem,
+)
 from composer.source import Located
 
 RULE = error(
     code="RC492",
     name="invalid-host",
-    summary="A host has an invalid address, user or ROS domain, or an unsafe workspace.",
+    summary="A host has an invalid name, address, user, file, workspace or ROS domain.",
     why=(
         "'compose sync' copies the project to the workspace and may delete other files there, "
-        "so it must be a folder of its own. Addresses and users are words of command lines."
+        "so it must be a folder of its own. Names of hosts become files and settings of "
+        "'compose export'; addresses, users and files are words of command lines."
     ),
     bad="""\
 system: robot
@@ -43,9 +51,15 @@ def check(context: Context) -> Iterator[Diagnostic]:
 
 
 def _check_host(host: Host) -> Iterator[Diagnostic]:
+    problem = None if is_unresolved(host.name.value) else name_problem(host.name.value)
+    if problem is not None:
+        yield Diagnostic(RULE, f"the name of host '{host.name}' {problem}", host.name.span)
+    address = None if host.address == host.name else host.address  # reported once
     checks: tuple[tuple[str, Located[str] | None, Callable[[str], str | None], str | None], ...] = (
-        ("address", host.address, login_problem, None),
-        ("user", host.user, login_problem, None),
+        ("address", address, address_problem, None),
+        ("user", host.user, user_problem, None),
+        ("identity_file", _located(host, host.identity_file), key_file_problem, None),
+        ("known_hosts", _located(host, host.known_hosts), key_file_problem, None),
         ("workspace", host.workspace, workspace_problem, _WORKSPACE_HINT),
     )
     for what, written, find_problem, hint in checks:
@@ -60,3 +74,7 @@ def _check_host(host: Host) -> Iterator[Diagnostic]:
         if problem is not None and not is_unresolved(value):
             text = f"the ROS_DOMAIN_ID of host '{host.name}', '{value}', {problem}"
             yield Diagnostic(RULE, text, name.span)
+
+
+def _located(host: Host, text: str | None) -> Located[str] | None:
+    return None if text is None else Located(text, host.span)

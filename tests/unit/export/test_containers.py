@@ -275,12 +275,26 @@ def test_the_file_of_the_image_names_the_interfaces_that_it_lacks() -> None:
     assert "# Not in the image, unless requirements.txt adds them: acme_msgs, lab_msgs\n" in text
 
 
-def test_the_image_has_no_private_keys(project: Path) -> None:
+def test_the_image_has_no_secrets(project: Path) -> None:
     add(project, "hosts: {jetson: {identity_file: keys/robot}, arm: {identity_file: ~/.ssh/id}}\n")
+    (project / ".gitignore").write_text("/deploy\n")
+    (project / ".env").write_text("PASSWORD=x\n")
     export("docker-compose", "-o", "deploy")
+    export("docker-compose", "-o", "deploy", "--force")  # the folder exists now
     ignored = (project / "deploy" / "Containerfile.dockerignore").read_text().splitlines()
-    assert "/keys/robot" in ignored
+    folder, wheel, *files = ignored[-4:]
+    assert folder == "/deploy"
+    assert wheel.startswith("!/deploy/ros2_composer-")
+    assert files == ["/.env", "/keys/robot"]
     assert not [line for line in ignored if ".ssh" in line]
+    done = compose("export", "kubernetes", "robot", "--list")
+    assert done.out.splitlines() == [
+        ".gitignore",
+        "systems/robot.yaml",
+        "not copied: .env (a secret, by its name)",
+        "not copied: deploy (ignored by .gitignore)",
+        "not copied: keys/robot (the private key of a host)",
+    ]
 
 
 def test_two_formats_share_the_image(project: Path) -> None:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from composer.model.hosts import domain_problem, login_problem, workspace_problem
+from composer.model.hosts import (
+    address_problem,
+    domain_problem,
+    key_file_problem,
+    name_problem,
+    user_problem,
+    workspace_problem,
+)
 
 
 @pytest.mark.parametrize("text", ["~/robot", "/opt/robot", "/home/pilot/robot", "~/ws/robot"])
@@ -37,14 +44,46 @@ def test_unsafe_workspaces(text: str, part: str) -> None:
     assert part in problem
 
 
-@pytest.mark.parametrize("text", ["robot", "10.0.0.5", "fe80::1%eth0", "jetson.local"])
-def test_logins(text: str) -> None:
-    assert login_problem(text) is None
+PROBLEMS = {
+    "name": name_problem,
+    "address": address_problem,
+    "user": user_problem,
+    "file": key_file_problem,
+}
 
 
-@pytest.mark.parametrize("text", ["", "-oProxyCommand=x", "a b", "a\n", "me@there", "a'b", "x/y"])
-def test_unusable_logins(text: str) -> None:
-    assert login_problem(text) is not None
+@pytest.mark.parametrize(
+    ("what", "texts"),
+    [
+        ("name", ("jetson", "Arm-2", "7", "a" * 63)),
+        ("address", ("robot", "10.0.0.5", "::1", "fe80::1%eth0", "jetson.local", "arm_1")),
+        ("user", ("robot", "a.b", "_ros-2", "müller")),
+        ("file", ("~/.ssh/id", "keys/my %h key", "it's", "..id")),
+    ],
+)
+def test_words_that_can_be_used(what: str, texts: tuple[str, ...]) -> None:
+    assert [text for text in texts if PROBLEMS[what](text) is not None] == []
+
+
+@pytest.mark.parametrize("what", ["name", "address", "user"])
+@pytest.mark.parametrize(
+    "text",
+    ["", "-oProxyCommand=x", "a b", "a\n", "me@there", "a'b", "x/y", "..", "%n", "$(x)", "a;b"],
+)
+def test_words_that_cannot_be_used(what: str, text: str) -> None:
+    assert PROBLEMS[what](text) is not None
+
+
+@pytest.mark.parametrize(
+    ("what", "text"),
+    [
+        *(("name", text) for text in ("a.b", "a_b", "a-", "a" * 64, "müller")),
+        *(("address", text) for text in ("999.1.1.1", f"{'9' * 5000}.1.1.1", "fe80::1%a b", "a:b")),
+        *(("file", text) for text in ('a"b', "a\nb", "a\\b", "${HOME}/id")),
+    ],
+)
+def test_other_words_that_cannot_be_used(what: str, text: str) -> None:
+    assert PROBLEMS[what](text) is not None
 
 
 @pytest.mark.parametrize("text", ["", "0", "7", "007", "101", "232", "0" * 5000])

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import CommandError
+from composer.cli.support.hosts import files_to_copy, write_staying
 from composer.cli.support.options import Namespace, NewFile, examples
-from composer.cli.support.output.terminal import say, write_raw
-from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.cli.support.output.terminal import lines, say, write, write_raw
+from composer.cli.support.system_arguments import RunnableSystem, SystemName, runnable_system
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,6 +70,12 @@ NewPath = Annotated[
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+ListFiles = Annotated[
+    bool,
+    typer.Option(
+        "--list", help="List the files of the project that the image holds, and write nothing."
+    ),
+]
 Image = Annotated[
     str | None,
     typer.Option(
@@ -100,7 +107,7 @@ def export_launch(system: SystemName, *, output: NewFile = None, force: Force = 
     """
     from composer.export.launch_file import launch_file
 
-    declared, path, _ = runnable_system(system)
+    declared, path, _ = _exported_system(system)
     _write(launch_file(declared, path, output), output, replace=force)
 
 
@@ -133,7 +140,7 @@ def export_systemd(
     from composer.export.systemd import Installation, units
     from composer.hosts.remote_command import python_words
 
-    declared, path, result = runnable_system(system)
+    declared, path, result = _exported_system(system)
     python = (sys.executable, "-P", "-m", "composer")
     file = os.path.relpath(path.resolve(), result.project.root)
 
@@ -161,7 +168,12 @@ def export_systemd(
     ),
 )
 def export_docker_compose(
-    system: SystemName, *, image: Image = None, output: NewFolder = None, force: Force = False
+    system: SystemName,
+    *,
+    image: Image = None,
+    output: NewFolder = None,
+    force: Force = False,
+    list_files: ListFiles = False,
 ) -> None:
     """Write a file for docker compose, and a Containerfile.
 
@@ -173,7 +185,10 @@ def export_docker_compose(
 
     from composer.export.docker_compose import compose_file
 
-    declared, path, result = runnable_system(system)
+    declared, path, result = _exported_system(system)
+    if list_files:
+        _list_files(declared, result)
+        return
     contents, name = _image(declared, result, path, image)
     build: dict[str, str] = {}
     if output is not None:
@@ -192,7 +207,12 @@ def export_docker_compose(
     ),
 )
 def export_kubernetes(
-    system: SystemName, *, image: Image = None, output: NewFolder = None, force: Force = False
+    system: SystemName,
+    *,
+    image: Image = None,
+    output: NewFolder = None,
+    force: Force = False,
+    list_files: ListFiles = False,
 ) -> None:
     """Write manifests for Kubernetes, and a Containerfile.
 
@@ -203,7 +223,10 @@ def export_kubernetes(
 
     from composer.export.kubernetes import manifests
 
-    declared, path, result = runnable_system(system)
+    declared, path, result = _exported_system(system)
+    if list_files:
+        _list_files(declared, result)
+        return
     contents, name = _image(declared, result, path, image)
     text = manifests(declared, contents, name, os.environ)
     _write_image_and(output, {"kubernetes.yaml": text}, contents, result, replace=force)
@@ -239,7 +262,7 @@ def export_sros2(
     With --permissions, write what that command makes of the policy: FOLDER/robot1/pipeline/
     permissions.xml, for the ROS domain of ROS_DOMAIN_ID. These files have to be signed.
     """
-    declared = runnable_system(system, namespace=namespace).system
+    declared = _exported_system(system, namespace=namespace).system
     if not permissions:
         from composer.export.sros2 import policy
 
@@ -258,6 +281,16 @@ def export_sros2(
     else:
         files = {f"{path.strip('/')}/permissions.xml": text for path, text in texts.items()}
         _write_all(output, files, replace=force)
+
+
+def _exported_system(text: str, namespace: str | None = None) -> RunnableSystem:
+    """Return a system whose path can be a line of any format. Raises CommandError."""
+    found = runnable_system(text, namespace=namespace)
+    if not str(found.path.resolve()).isprintable():
+        raise CommandError(
+            f"the path '{found.path}' has control characters", hint="rename the file or its folder"
+        )
+    return found
 
 
 def _user() -> str:
@@ -294,9 +327,10 @@ def _image(
     from composer.export.deployment import services
     from composer.interfaces.building import NOT_IN_WHEELS, used_packages
     from composer.interfaces.sources import Bundle, find_packages
-    from composer.model.hosts import private_files
+    from composer.project.copied_files import docker_patterns
 
     root = result.project.root
+    files = files_to_copy(system, root)
     used = sorted(used_packages(system))
     own = find_packages(result.project.interface_folders).folders
     built = [name for name in used if name in NOT_IN_WHEELS and name not in own]
@@ -309,9 +343,19 @@ def _image(
         unknown_interfaces=tuple(
             name for name in used if name not in own and name not in Bundle().packages()
         ),
-        private=private_files(system.hosts, root),
+        ignored=(
+            tuple(docker_patterns(root)),
+            files.docker_patterns,
+        ),
     )
     return contents, name or f"{services(system)[0].label}:latest"
+
+
+def _list_files(system: System, result: LoadResult) -> None:
+    """Write the files of the project that are copied into an image, and those that are not."""
+    files = files_to_copy(system, result.project.root)
+    write(lines(files.copied))
+    write_staying(files)
 
 
 def _write(text: str, output: Path | None, *, replace: bool) -> None:
@@ -361,7 +405,7 @@ def _write_image_and(
     place = PurePosixPath(folder.resolve().relative_to(result.project.root).as_posix(), name)
     files |= {
         str(CONTAINERFILE): containerfile(contents, place),
-        str(IGNORED_FILES): ignored_files(contents),
+        str(IGNORED_FILES): ignored_files(contents, place),
         name: data,
     }
     _write_all(folder, files, replace=replace)

@@ -10,9 +10,11 @@ import typer
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.hosts import (
     check_workspaces,
+    files_to_copy,
     load_for_hosts,
     reported_problems,
     require_hosts,
+    write_staying,
 )
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import lines, write
@@ -43,7 +45,8 @@ def sync(
         ),
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="List the files that would be copied or deleted.")
+        bool,
+        typer.Option("--dry-run", help="List the files that would be copied, deleted or left."),
     ] = False,
     delete: Annotated[
         bool,
@@ -55,14 +58,14 @@ def sync(
     """Copy the project to the hosts of a system.
 
     Copies the folder of the project to the workspace of each host, with rsync over ssh, except for
-    environments, builds, logs, .git and the private keys of the hosts. Nothing outside the
-    workspaces is changed. A folder with files that this command has not copied is refused.
+    environments, builds, logs, .git, private keys, .env files, and what .gitignore or .dockerignore
+    exclude. Nothing outside the workspaces is changed. A folder with files that this command has
+    not copied is refused.
     """
     require_hosts("compose sync", "rsync", "ssh")
     result, declared, _ = load_for_hosts(system)
     from composer.hosts.start import sync_hosts
     from composer.hosts.sync import SyncOptions, root_problem
-    from composer.model.hosts import private_files
     from composer.runtime.process.addresses import is_this_computer
 
     root = result.project.root
@@ -72,10 +75,13 @@ def sync(
     others = [host for host in declared.hosts if not is_this_computer(host.address.value)]
     chosen = _chosen(others, names or [], declared.name.value)
     check_workspaces(chosen)
+    files = files_to_copy(declared, root)
+    if dry_run:
+        write_staying(files)
     with reported_problems():
         sync_hosts(
             chosen,
-            SyncOptions(root, delete, dry_run, private_files(declared.hosts, root)),
+            SyncOptions(root, delete, dry_run, files.rsync_patterns),
             lambda host, changes: _report(host, changes, dry_run=dry_run),
         )
 
