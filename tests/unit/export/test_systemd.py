@@ -71,6 +71,22 @@ def test_a_unit_has_the_command_and_the_variables_of_ros(tmp_path: Path) -> None
     assert "network-online.target" not in unit(system, {}, user=True)
 
 
+def test_no_value_becomes_a_line_of_its_own(tmp_path: Path) -> None:
+    value = "/a\nExecStartPre=/bin/sh\r\u2028\x1b\udcff%h\\"
+    text = unit(system_of(tmp_path), {"PYTHONPATH": value})
+    expected = r"/a\x0aExecStartPre=/bin/sh\x0d\xe2\x80\xa8\x1b\xff%%h"
+    assert f'Environment="PYTHONPATH={expected}\\\\"\n' in text
+
+
+@pytest.mark.parametrize("form", ["launch", "systemd", "docker-compose", "kubernetes"])
+def test_paths_with_control_characters_are_not_exported(tmp_path: Path, form: str) -> None:
+    folder = tmp_path / "a\nRUN x"
+    folder.mkdir()
+    done = compose("export", form, str(system_of(folder)[1]))
+    assert (done.code, done.out) == (1, "")
+    assert "has control characters\n  rename the file or its folder" in done.err
+
+
 def test_a_unit_runs_as_who_exports_it_with_the_files_that_are_set(tmp_path: Path) -> None:
     environment = {
         "FASTRTPS_DEFAULT_PROFILES_FILE": "/home/ada/profiles.xml",
