@@ -6,6 +6,7 @@ import html
 import mimetypes
 from collections.abc import Awaitable, Callable, MutableMapping
 from functools import partial
+from http import HTTPStatus
 from typing import Any
 from urllib.parse import quote
 
@@ -123,6 +124,8 @@ class AccessCheck:
         host = headers.get("host", "")
         response = self._response(request, scope)
         if response is not None:
+            if response.status_code >= HTTPStatus.BAD_REQUEST:
+                response.headers["Connection"] = "close"  # no place for those without the token
             await _secured(response, host)(scope, receive, send)
             return
         if scope["type"] == "websocket":

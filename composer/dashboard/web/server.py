@@ -31,7 +31,8 @@ MAX_MESSAGE = 1024 * 1024
 #: Connections, most of which are free again after the time that each has for a request.
 MAX_OPEN = 160
 REQUEST_WITHIN_S = 5.0
-#: Connections that are accepted at once, before those beyond the limit are ended.
+#: Connections that are accepted at once, before those beyond the limit are ended. There are fewer
+#: than MAX_OPEN, so that each is read once before newer ones can end it.
 BACKLOG = 128
 _MAX_HEADERS = 16 * 1024
 #: A browser that has not answered a ping after this time is disconnected.
@@ -134,19 +135,30 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
 
 
 class _GuardedProtocol(H11Protocol):
-    """Ends connections that do not send a complete request in time, or that are too many."""
+    """Ends connections that do not send a complete request in time, or that are too many.
+
+    A refused request ends its connection, so only those with the token stay open after a request.
+    They keep their places: beyond the limit, the oldest connection without a request is ended.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._check: asyncio.TimerHandle | None = None
         self._last_cycle: Any = None
+        self.opened_at = 0.0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Accept a connection, or end it at once."""
         super().connection_made(transport)
+        self.opened_at = self.loop.time()
         if len(self.connections) > MAX_OPEN:
-            self._refuse(Refusal(503, f"{MAX_OPEN} connections are open already"))
-            return
+            guarded = [item for item in self.connections if isinstance(item, _GuardedProtocol)]
+            waiting = [item for item in guarded if item.cycle is None]  # this one at least
+            oldest = min(waiting, key=lambda item: item.opened_at)
+            oldest._refuse(Refusal(503, f"{MAX_OPEN} connections are open already"))
+            self.connections.discard(oldest)
+            if oldest is self:
+                return
         self._check = self.loop.call_later(REQUEST_WITHIN_S, self._end_if_idle)
 
     def connection_lost(self, exc: Exception | None) -> None:
