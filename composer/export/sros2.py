@@ -41,7 +41,10 @@ _LIFECYCLE_SERVICES = (
     "get_state",
     "get_transition_graph",
 )
-_COMMANDS = ("is_active", "pause", "reset", "restart", "resume", "shutdown", "startup")
+_COMMANDS = (
+    *("is_active", "pause", "reset", "restart", "resume", "shutdown", "startup"),
+    *("resume_all_or_nothing", "startup_all_or_nothing"),
+)
 #: Section, its attribute, and the element of one name, by the kind of a port.
 _RULES = {
     PortKind.PUBLISHER: ("topics", "publish", "topic"),

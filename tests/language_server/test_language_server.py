@@ -36,7 +36,7 @@ WORDS = [
     (NODE_OF + "executable:\n      lifecycle: |", "managed none"),
     (NODE_OF + "external:\n      lifecycle: |", "managed none"),
     (NODE_OF + "log_level: |", "debug info warn error fatal"),
-    ("system: s\nlifecycle:\n  on_failure: |", "restart isolate shutdown"),
+    ("system: s\nlifecycle:\n  on_failure: |", "restart isolate shutdown ignore"),
     ("system: s\nconnections:\n  - topic: t\n    isolation: |", "share copy"),
     (NODE_OF + "lifecycle:\n      autostart: |", "active inactive unconfigured"),
     (NODE_OF + "lifecycle:\n      depends_on:\n        m: |", "active inactive"),

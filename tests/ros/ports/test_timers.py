@@ -150,7 +150,8 @@ def test_invalid_values_are_refused_with_the_reason(
 
 def test_a_change_reaches_the_behavior_and_the_expressions(tmp_path: Path, peer: Peer) -> None:
     with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
-        assert peer.set_parameter("/tuned", "speed", 2) == ""  # an integer is accepted for a double
+        assert "got 'Type.INTEGER'" in peer.set_parameter("/tuned", "speed", 2)  # as in rclpy
+        assert peer.set_parameter("/tuned", "speed", 2.0) == ""
         assert peer.set_parameter("/tuned", "mode", "fast") == ""
         assert peer.set_parameter("/tuned", "offsets", [float("nan"), float("inf")]) == ""
         assert peer.set_parameter("/tuned", "speed", 2.5) == ""
