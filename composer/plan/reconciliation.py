@@ -9,9 +9,11 @@ failed node after a backoff.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 
 from composer.model import PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
+from composer.plan.bringup import start_goals
 from composer.plan.desired_state import Condition, DesiredState
 from composer.plan.steps import Plan, nodes_of, rank
 from composer.plan.transitions import plan_transitions
@@ -168,13 +170,16 @@ def _needs(
 ) -> Iterator[tuple[str, tuple[DependencyEdge, ...]]]:
     """Yield every node in dependency order, with its dependencies.
 
-    Without those on nodes whose failure is ignored.
+    Without those on nodes whose failure is ignored. A client that does not declare that it depends
+    on its server needs it as far as the server starts.
     """
     ignored = {} if desired is None else desired.ignored
     edges = dependency_edges(system)
+    starts = start_goals(system, PrimaryState.ACTIVE)
     needs: dict[str, list[DependencyEdge]] = {}
     for edge in edges:
         if edge.on not in ignored:
-            needs.setdefault(edge.node, []).append(edge)
+            needed = min(edge.state, starts[edge.on], key=rank) if edge.implied else edge.state
+            needs.setdefault(edge.node, []).append(replace(edge, state=needed))
     for name in in_dependency_order(system, edges):
         yield name, tuple(needs.get(name, ()))
