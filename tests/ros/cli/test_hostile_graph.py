@@ -97,8 +97,8 @@ def test_parameter_responses_that_do_not_fit_are_errors(hostile: Peer) -> None:
 STATE = {
     "state": "active", "desired": "active", "since": "1.0", "restarts": "0", "errors": "0",
     "last_error": "", "held_down": "", "condition": "", "sent_hz": "1.0", "received_hz": "1.0",
-    "busy": "0.1", "slowest": "", "overruns": "0", "queue_drops": "0", "qos_events": "lost=1", "depends_on": "",
-    "sent": "", "received": "", "dropped": "", "process": "",
+    "busy": "0.1", "slowest": "", "overruns": "0", "queue_drops": "0", "qos_events": "lost=1",
+    "depends_on": "", "sent": "", "received": "", "dropped": "", "process": "",
 }  # fmt: skip
 
 
