@@ -115,8 +115,9 @@ class BaseLoop(ABC):
         """End a call of code that may block; return whether it has blocked."""
         return False
 
-    def hand_over_blocked(self) -> None:  # noqa: B027  nothing to do is the default
+    def hand_over_blocked(self) -> bool:
         """Let another thread serve the loop if a call that began to block has not ended."""
+        return False
 
     def current_stack(self) -> str:
         """Return the Python stacks of the callbacks that run now; empty if none does."""

@@ -155,10 +155,11 @@ class Loop(Protocol):
     def end_blocking(self, began: Any) -> bool:
         """End a call of code that may block; return whether it has blocked."""
 
-    def hand_over_blocked(self) -> None:
+    def hand_over_blocked(self) -> bool:
         """Let another thread serve an event loop if a call that began to block has not ended.
 
-        It is called periodically: a call that has begun before the last time blocks.
+        It is called periodically: a call that has begun before the last time blocks. Returns
+        whether there is a call that may.
         """
 
     def start(self) -> None:

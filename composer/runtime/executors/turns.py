@@ -144,14 +144,18 @@ class TurnTaking(BaseLoop):
         self._turn.call = None
         return False
 
-    def hand_over_blocked(self) -> None:
-        """Take the turn away from a call that had it at the last call of this method too."""
+    def hand_over_blocked(self) -> bool:
+        """Take the turn away from a call that had it at the last call of this method too.
+
+        Returns whether a call has the turn that may block.
+        """
         call = self._turn.call
         if call and call is self._checked:
             with self._handing_over, suppress(IndexError):  # it has just ended
                 call.pop()
                 self._hand_over()
         self._checked = call
+        return bool(call)
 
     def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
         """Block until ``future`` is done; return false if that takes longer, or the loop stops.
