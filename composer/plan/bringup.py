@@ -45,9 +45,15 @@ def tear_down(system: System, process: str | None = None) -> Plan:
 
 def start_goals(system: System, goal: PrimaryState) -> Mapping[str, PrimaryState]:
     """Return the state in which each node starts when the system as a whole goes to ``goal``."""
+    return start_goals_in_order(system, goal, in_dependency_order(system, dependency_edges(system)))
+
+
+def start_goals_in_order(
+    system: System, goal: PrimaryState, order: Iterable[str]
+) -> Mapping[str, PrimaryState]:
+    """Return the same for nodes whose dependency order is known."""
     goals: dict[str, PrimaryState] = {}
-    edges = dependency_edges(system)
-    for node in nodes_of(system, in_dependency_order(system, edges)):
+    for node in nodes_of(system, order):
         limits = [_limit(dependency, goals) for dependency in node.depends_on]
         own = [] if node.autostart is None else [node.autostart.value]
         goals[node.name.value] = min([goal, *own, *limits], key=rank)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from composer.model import PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
-from composer.plan.bringup import start_goals
+from composer.plan.bringup import start_goals_in_order
 from composer.plan.desired_state import Condition, DesiredState
 from composer.plan.steps import Plan, nodes_of, rank
 from composer.plan.transitions import plan_transitions
@@ -33,6 +33,10 @@ def conditions(
     ``moving`` are the nodes in a transition.
     """
     words: dict[str, str] = {}
+    names = (node.name.value for node in system.nodes)
+    is_at_goal = all(states.get(name) is desired.goals.get(name) for name in names)
+    if is_at_goal and not (desired.down or desired.ignored or moving):
+        return words  # the usual case, without looking at what the nodes depend on
     goals = desired_states(system, desired)
     for name, needs in _needs(system, desired):
         if name in desired.down:
@@ -175,11 +179,12 @@ def _needs(
     """
     ignored = {} if desired is None else desired.ignored
     edges = dependency_edges(system)
-    starts = start_goals(system, PrimaryState.ACTIVE)
+    order = in_dependency_order(system, edges)
+    starts = start_goals_in_order(system, PrimaryState.ACTIVE, order)
     needs: dict[str, list[DependencyEdge]] = {}
     for edge in edges:
         if edge.on not in ignored:
             needed = min(edge.state, starts[edge.on], key=rank) if edge.implied else edge.state
             needs.setdefault(edge.node, []).append(replace(edge, state=needed))
-    for name in in_dependency_order(system, edges):
+    for name in order:
         yield name, tuple(needs.get(name, ()))

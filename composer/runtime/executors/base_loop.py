@@ -107,11 +107,11 @@ class BaseLoop(ABC):
         for done in tuple(self._waits):
             done.set()
 
-    def begin_blocking(self, *, expected: bool) -> Any:  # noqa: ARG002
+    def begin_blocking(self, *, expected: bool) -> Any:  # noqa: ARG002  for event loops
         """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
         return None
 
-    def end_blocking(self, began: Any) -> bool:  # noqa: ARG002
+    def end_blocking(self, began: Any) -> bool:  # noqa: ARG002  for event loops
         """End a call of code that may block; return whether it has blocked."""
         return False
 
