@@ -23,6 +23,7 @@ from composer.model.introspection import (
 )
 from composer.model.periods import Period, PeriodError, PeriodUnit
 from composer.model.ports import (
+    SEVERITIES,
     USE_SIM_TIME,
     ChannelKind,
     Delivery,
@@ -83,6 +84,7 @@ __all__ = [
     "DEFAULT_SUPERVISION",
     "DRIVEN_BY_MANAGER",
     "POSE_TYPES",
+    "SEVERITIES",
     "TF_STATIC_TOPIC",
     "TF_TOPIC",
     "TF_TYPE",

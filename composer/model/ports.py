@@ -95,6 +95,16 @@ class LogLevel(StrEnum):
     FATAL = "fatal"
 
 
+#: The numbers of rcl_interfaces/msg/Log.
+SEVERITIES = {
+    LogLevel.DEBUG: 10,
+    LogLevel.INFO: 20,
+    LogLevel.WARN: 30,
+    LogLevel.ERROR: 40,
+    LogLevel.FATAL: 50,
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Send:
     """A message, request or goal to send through a port."""

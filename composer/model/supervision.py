@@ -72,12 +72,6 @@ class Supervision:
     watch: Watch = Watch()
 
     @property
-    def can_end_system(self) -> bool:
-        """Whether a failure of the node may shut down the system."""
-        gives_up = self.policy is OnFailure.RESTART and self.restart.then is OnFailure.SHUTDOWN
-        return gives_up or self.policy is OnFailure.SHUTDOWN
-
-    @property
     def policy(self) -> OnFailure:
         """How to handle a failure of the node."""
         return OnFailure.ISOLATE if self.on_failure is None else self.on_failure.value

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.observing.log_lines import SEVERITIES
+from composer.dashboard.observing.log_lines import SEVERITIES_BY_NAME
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 
@@ -28,7 +28,9 @@ class LogFeed(Feed):
     def __init__(self, values: Values, declared: Declared | None) -> None:
         """Read the parameters of the channel. Raises BadRequestError."""
         del declared
-        self._severity = SEVERITIES[values.choice("level", tuple(SEVERITIES), "info")]
+        self._severity = SEVERITIES_BY_NAME[
+            values.choice("level", tuple(SEVERITIES_BY_NAME), "info")
+        ]
         self._node = values.text("node", "").lower()
         self._text = values.text("text", "").lower()
         self._history = int(values.number("history", 200, 0, _MAX_HISTORY))
@@ -69,7 +71,9 @@ class LogFeed(Feed):
 
 
 def _as_data(line: LogLine) -> dict[str, Any]:
-    level = next((name for name, least in SEVERITIES.items() if line.severity <= least), "fatal")
+    level = next(
+        (name for name, least in SEVERITIES_BY_NAME.items() if line.severity <= least), "fatal"
+    )
     return {
         "at_s": line.at_s,
         "level": level,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from composer.model import SEVERITIES
 from composer.names import PROGRAM_LOGGER
 from composer.qos import Durability, QosProfile, Reliability
 from composer.run_log import current_domain, find_parts, find_runs, last_records
@@ -29,9 +30,8 @@ _MAX_LINES = 2000
 _MAX_TAKEN = 500
 #: Of each log file, as much as has about that many lines.
 _MAX_BYTES = 500_000
-#: As in rcl_interfaces/msg/Log.
-SEVERITIES = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 _MAX_LENGTH = 4000
+SEVERITIES_BY_NAME = {level.value: number for level, number in SEVERITIES.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ def _lines_of_runs() -> list[LogLine]:
     return [
         LogLine(
             at_s=record.time_ns * 1e-9,
-            severity=SEVERITIES.get(record.level, SEVERITIES["info"]),
+            severity=SEVERITIES_BY_NAME.get(record.level, SEVERITIES_BY_NAME["info"]),
             node=f"/{record.logger.replace('.', '/')}",
             logger=record.logger,
             text=record.message[:_MAX_LENGTH],

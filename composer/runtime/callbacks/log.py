@@ -19,7 +19,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from composer.model import LogLevel
+from composer.model import SEVERITIES, LogLevel
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.stacks import is_internal
@@ -27,14 +27,6 @@ from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
 
-#: The numbers of rcl_interfaces/msg/Log.
-SEVERITIES = {
-    LogLevel.DEBUG: 10,
-    LogLevel.INFO: 20,
-    LogLevel.WARN: 30,
-    LogLevel.ERROR: 40,
-    LogLevel.FATAL: 50,
-}
 #: As rcl_qos_profile_rosout_default: a late joiner gets the last ten seconds.
 _ROSOUT_QOS = QoSProfile(
     depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)

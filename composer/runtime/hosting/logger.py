@@ -10,8 +10,8 @@ from rclpy.impl import rcutils_logger
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import CallerId, RcutilsLogger
 
-from composer.model import LogLevel
-from composer.runtime.callbacks.log import SEVERITIES, Log
+from composer.model import SEVERITIES, LogLevel
+from composer.runtime.callbacks.log import Log
 
 _LEVELS = {severity: level for level, severity in SEVERITIES.items()}
 
