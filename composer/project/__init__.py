@@ -1,9 +1,9 @@
 """Projects: folders with systems, node types and settings.
 
-The root of a project is the nearest folder with a ``composer.yaml``, or with a ``pyproject.toml``
-that has the table ``[tool.composer]``; without either, the folder above the nearest ``nodes``
-folder, else above the nearest ``interfaces`` folder, else above the nearest ``systems`` folder, or
-the folder itself. Files outside the project are never read, not even through symbolic links.
+The root of a project is the nearest folder with a ``composer.yaml``; without one, the folder above
+the nearest ``nodes`` folder, else above the nearest ``interfaces`` folder, else above the nearest
+``systems`` folder, or the folder itself. Files outside the project are never read, not even through
+symbolic links.
 
 The search ends where it finds something that belongs to another user: see
 :mod:`composer.ownership`.
@@ -20,8 +20,14 @@ from composer.diagnostics import Diagnostic, shown
 from composer.fast_dataclass import dataclass
 from composer.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
 from composer.project.rules import FOREIGN_OWNER
-from composer.project.settings import Settings, read_settings
-from composer.project.sources import SETTINGS_FILE, SettingsSource, find_settings
+from composer.project.settings import (
+    SETTINGS_FILE,
+    Settings,
+    SettingsSource,
+    find_settings,
+    is_inside,
+    read_settings,
+)
 from composer.resources import data_folder
 from composer.source import SourceFile, Span, shown_path
 
@@ -72,7 +78,7 @@ class Project:
 
     def holds(self, path: Path) -> bool:
         """Return whether ``path`` is in the project after resolving symbolic links."""
-        return _is_inside(path, self.root)
+        return is_inside(path, self.root)
 
 
 @dataclass(slots=True)
@@ -110,7 +116,7 @@ class _Search:
         if chosen is not None:
             return chosen
         found = self.nearest(name)
-        if found is None or (found.is_symlink() and not _is_inside(found, self.ancestors[-1])):
+        if found is None or (found.is_symlink() and not is_inside(found, self.ancestors[-1])):
             return ()
         return (found,)
 
@@ -156,14 +162,6 @@ def _is_bundled(folder: Path) -> bool:
     """Return whether ``folder`` comes with the composer, so that no settings above it apply."""
     bundled = data_folder()
     return any(folder.is_relative_to(bundled / name) for name in (NODES, SYSTEMS))
-
-
-def _is_inside(path: Path, root: Path) -> bool:
-    try:
-        # Unlike Path.resolve, it handles symbolic link loops the same way on every Python.
-        return Path(os.path.realpath(path)).is_relative_to(root)
-    except (OSError, ValueError):  # not a valid path
-        return False
 
 
 def _has_folder(folder: Path, name: str) -> bool:

@@ -7,7 +7,7 @@ from composer.diagnostics import error, warning
 BAD_SETTING = error(
     code="RC042",
     name="bad-setting",
-    summary="A setting of the project, in composer.yaml or pyproject.toml, is invalid.",
+    summary="A setting of the project, in composer.yaml, is invalid.",
     why=(
         "The setting would silently have no effect: node types would not be found, or the "
         "wrong rule ignored."

@@ -1,19 +1,34 @@
-"""The settings of a project."""
+"""The settings of a project, from the nearest ``composer.yaml``."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Severity, shown
+from composer.document import read_document
+from composer.document.rules import NOT_A_MAP, UNREADABLE_FILE
 from composer.fast_dataclass import dataclass
 from composer.project.rules import BAD_SETTING
-from composer.project.sources import SettingsSource
 from composer.schema import check_schema
-from composer.source import Located, SourceFile
+from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Mapping, Scalar, Sequence
 
+SETTINGS_FILE = "composer.yaml"
+
 _SCHEMA = "project"
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsSource:
+    """The settings file in ``root`` as a located tree. ``tree`` is None if it cannot be read."""
+
+    root: Path
+    source: SourceFile
+    tree: Mapping | None
+    diagnostics: tuple[Diagnostic, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +48,22 @@ class Settings:
     severity: tuple[tuple[Located[str], Severity], ...] = ()
 
 
+def find_settings(folder: Path) -> SettingsSource | None:
+    """Return the settings in ``folder`` or the nearest parent that has any."""
+    # Called for every file and every parent: a Path for each would be slow.
+    root = str(folder)
+    while True:
+        try:
+            status = os.lstat(f"{root}/{SETTINGS_FILE}")
+        except OSError:  # also for folders without permission
+            status = None
+        if status is not None:
+            return _read_file(root or "/", status.st_mtime_ns, status.st_size)
+        if not root.strip("/"):
+            return None
+        root = root.rpartition("/")[0]
+
+
 def read_settings(written: SettingsSource) -> tuple[Settings, list[Diagnostic]]:
     """Return the valid settings and the diagnostics."""
     tree = written.tree
@@ -50,6 +81,36 @@ def read_settings(written: SettingsSource) -> tuple[Settings, list[Diagnostic]]:
         severity=tuple(_severities(tree)),
     )
     return settings, diagnostics
+
+
+def is_inside(path: Path, root: Path) -> bool:
+    """Return whether ``path`` is in ``root`` after resolving symbolic links."""
+    try:
+        # Unlike Path.resolve, it handles symbolic link loops the same way on every Python.
+        return Path(os.path.realpath(path)).is_relative_to(root)
+    except (OSError, ValueError):  # not a valid path
+        return False
+
+
+@lru_cache(maxsize=32)
+def _read_file(folder: str, _time_ns: int, _size: int) -> SettingsSource:
+    """Read the settings in ``folder``, again only if the time or size of the file has changed."""
+    root = Path(folder)
+    path = root / SETTINGS_FILE
+    name = shown_path(path)
+    if not is_inside(path, root):
+        source = SourceFile(name)
+        message = "this is a symbolic link out of the project"
+        problem = Diagnostic(UNREADABLE_FILE, message, Span(source, 1, 1))
+        return SettingsSource(root, source, None, (problem,))
+    tree, source, diagnostics = read_document(path, name)
+    if [diagnostic.rule for diagnostic in diagnostics] == [NOT_A_MAP] and _is_empty(source):
+        return SettingsSource(root, source, Mapping((), Span(source, 1, 1)), ())
+    return SettingsSource(root, source, tree, tuple(diagnostics))
+
+
+def _is_empty(source: SourceFile) -> bool:
+    return all(not line.strip() or line.lstrip().startswith("#") for line in source.lines)
 
 
 def _folders(

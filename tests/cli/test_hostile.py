@@ -131,7 +131,7 @@ def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:
     (tmp_path / "nodes").mkdir()
     (tmp_path / "interfaces" / "evil" / "msg").mkdir(parents=True)
     (tmp_path / "interfaces" / "evil" / "package.xml").write_text("<name>evil</name>")
-    pipes = ["p.yaml", "nodes/pipe.yaml", "pyproject.toml", "pipe.py", "interfaces/evil/msg/P.msg"]
+    pipes = ["p.yaml", "nodes/pipe.yaml", "pipe.py", "interfaces/evil/msg/P.msg"]
     for name in pipes:
         os.mkfifo(tmp_path / name)
     text = """\

@@ -17,16 +17,13 @@ from hypothesis import strategies as st
 
 from composer.diagnostics import in_order, registered_rules
 from composer.document import parse_bytes
-from composer.document.files import decode
 from composer.graph import View, build_graph, scene_of
 from composer.graph.output import Engine, Format, render
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import Bundle, Definition
 from composer.loading import load_bytes
 from composer.project.rule_selection import check_rule_settings
-from composer.project.settings import read_settings
-from composer.project.sources import SettingsSource
-from composer.project.toml import read_table
+from composer.project.settings import SettingsSource, read_settings
 from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
 from tests.properties.mutation import mutated, spliced
 from tests.properties.validating import (
@@ -44,26 +41,6 @@ SETTINGS = [
     "nodes: [nodes]\ninterfaces: [interfaces, more]\nstrict: true\n"
     "select: [RC3]\nignore: [qos-implicit, RC412]\n"
     "severity: {publisher-without-subscription: warning}\n",
-]
-TOMLS = [
-    """\
-[project]
-name = "robot"
-[tool.composer]
-nodes = ["nodes", 'more']  # two
-strict = true
-ignore = [
-  "qos-implicit",
-  '''RC4''',
-]
-[tool.composer.severity]
-publisher-without-subscription = "warning"
-[[tool.other]]
-composer = {a.b = 1.5, c = [[1], {d = 07:32:00}]}
-[tool.ruff]
-""",
-    "[tool.composer]\nodd = 1\n",
-    "tool.composer = {strict = true, severity = {\"RC324\" = 'info'}}\n",
 ]
 DEFINITIONS = [
     path.read_text(encoding="utf-8") for path in sorted((ROOT / "interfaces").glob("*/*.*"))
@@ -141,18 +118,7 @@ def _check_definition(data: bytes) -> None:
 
 
 def _check_settings(data: bytes) -> None:
-    _check_read(*parse_bytes(data, "composer.yaml"))
-
-
-def _check_toml(data: bytes) -> None:
-    source, undecoded = decode(data, "pyproject.toml")
-    read = None if undecoded else read_table(source)
-    if read is not None:
-        tree, diagnostics = read
-        _check_read(tree, source, diagnostics)
-
-
-def _check_read(tree: Any, source: Any, diagnostics: Any) -> None:
+    tree, source, diagnostics = parse_bytes(data, "composer.yaml")
     settings, found = read_settings(SettingsSource(ROOT, source, tree, ()))
     found += check_rule_settings(settings, tuple(registered_rules()))
     check_diagnostics(in_order([*diagnostics, *found]))
@@ -190,7 +156,6 @@ SURFACES = {
     "values": Surface(_MUTATED, validate_and_check),
     "lines": Surface(spliced(TEXTS).map(str.encode), validate_and_check),
     "settings": Surface(spliced(SETTINGS).map(str.encode), _check_settings),
-    "toml": Surface(spliced(TOMLS).map(str.encode), _check_toml),
     "definitions": Surface(spliced(DEFINITIONS).map(str.encode), _check_definition),
     "parameter files": Surface(spliced(PARAMETER_FILES).map(str.encode), _check_parameter_file),
     "graphs": Surface(_mutations(DRAWN) | _MUTATED, _check_graph),

@@ -31,7 +31,7 @@ def test_spliced_files(data: bytes) -> None:
     validate_and_check(data)
 
 
-@pytest.mark.parametrize("name", ["settings", "toml", "definitions", "parameter files", "graphs"])
+@pytest.mark.parametrize("name", ["settings", "definitions", "parameter files", "graphs"])
 def test_other_inputs(name: str) -> None:
     surface = SURFACES[name]
 

@@ -4,33 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Diagnostic, Severity
+from composer.diagnostics import Diagnostic
 from composer.loading import load
 from composer.project import Project
-from composer.project.toml import read_table
-from composer.source import SourceFile
-from tests.unit.support.growth import assert_linear
 
-PYPROJECT = """\
-[project]
-name = "robot"
-dependencies = ["ros2-composer"]
-
-[tool.composer]
-nodes = ["parts", 'more "parts"']  # two
-strict = true
-ignore = [
-  "qos-implicit",
-  "RC9",
-]
-
-[tool.composer.severity]
-publisher-without-subscription = "warning"
-RC412 = "eror"
-
-[tool.ruff]
-ignore = ["RC9"]
-"""
 TALKER = "system: talker\nnodes:\n  one: {publishers: {chatter: {type: std_msgs/msg/String}}}\n"
 
 
@@ -42,12 +19,12 @@ def test_the_root_is_where_the_nearest_settings_are(tmp_path: Path) -> None:
     (tmp_path / "composer.yaml").write_text("strict: true\n")
     deep = tmp_path / "a" / "b"
     deep.mkdir(parents=True)
-    (tmp_path / "a" / "pyproject.toml").write_text("[project]\nname = 'no table of ours'\n")
     project = Project.at(deep)
     assert (project.root, project.settings.strict) == (tmp_path, True)
-    (tmp_path / "a" / "pyproject.toml").write_text("[tool.composer]\n")
+    (tmp_path / "a" / "composer.yaml").write_text("# nothing yet\n")
     project = Project.at(deep)
     assert (project.root, project.settings.strict) == (tmp_path / "a", False)
+    assert project.diagnostics == ()
 
 
 def test_without_settings_it_is_the_folder_above_nodes(tmp_path: Path) -> None:
@@ -77,26 +54,6 @@ def test_settings_override_the_defaults(tmp_path: Path) -> None:
     assert project.diagnostics == ()
     assert project.node_folders == (tmp_path / "types", tmp_path / "nodes")
     assert project.interface_folders == (tmp_path / "messages",)
-
-
-def test_a_table_in_pyproject_says_the_same_with_places(tmp_path: Path) -> None:
-    (tmp_path / "pyproject.toml").write_text(PYPROJECT)
-    for name in ("parts", 'more "parts"'):
-        (tmp_path / name).mkdir()
-    project = Project.at(tmp_path)
-    settings = project.settings
-    assert settings.nodes == (tmp_path / "parts", tmp_path / 'more "parts"')
-    assert settings.strict
-    assert [(text.value, str(text.span).rpartition(".toml:")[2]) for text in settings.ignore] == [
-        ("qos-implicit", "9:3"),
-        ("RC9", "10:3"),
-    ]
-    assert [(text.value, severity) for text, severity in settings.severity] == [
-        ("publisher-without-subscription", Severity.WARNING)
-    ]
-    ((line, column, message),) = reported(project.diagnostics)
-    assert (line, column) == (15, 9)
-    assert message.endswith("for 'RC412', found the string 'eror'")
 
 
 @pytest.mark.parametrize(
@@ -144,42 +101,6 @@ def test_settings_may_be_looked_at_alone(tmp_path: Path) -> None:
     assert load(path).diagnostics == []
 
 
-def test_a_table_next_to_a_file_is_not_read(tmp_path: Path) -> None:
-    (tmp_path / "composer.yaml").write_text("# nothing yet\n")
-    (tmp_path / "pyproject.toml").write_text("[tool.composer]\nstrict = true\n")
-    project = Project.at(tmp_path)
-    assert not project.settings.strict
-    assert [diagnostic.message for diagnostic in project.diagnostics] == [
-        "the table [tool.composer] is ignored: the folder also has a composer.yaml"
-    ]
-
-
-@pytest.mark.parametrize(
-    ("text", "line"), [("[tool.composer]\nstrict = yes\n", 2), ("[tool.composer]\n[[[\n", 2)]
-)
-def test_broken_toml_is_a_diagnostic(tmp_path: Path, text: str, line: int) -> None:
-    (tmp_path / "pyproject.toml").write_text(text)
-    (diagnostic,) = Project.at(tmp_path).diagnostics
-    assert diagnostic.message.startswith("this is not TOML: ")
-    assert diagnostic.primary.line == line
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "a = '''\n[tool.composer]\n'''\n",
-        "[tool.composers]\nstrict = true\n",
-        "[project]\ndependencies = ['ros2-composer']\n",
-        "# [tool.composer]\n",
-        "[tool.ruff]\nbroken = [[[\n",
-        "\x00\x01",
-    ],
-)
-def test_other_tables_are_none_of_ours(tmp_path: Path, text: str) -> None:
-    (tmp_path / "pyproject.toml").write_text(text)
-    assert Project.at(tmp_path).settings.source is None
-
-
 def test_settings_are_not_read_from_elsewhere(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -206,86 +127,6 @@ def test_rules_are_ignored_selected_and_weighed_but_errors_stay(tmp_path: Path) 
     assert found("severity: {qos-implicit: error}\nignore: [RC3]") == [("qos-implicit", "error")]
     broken = TALKER.replace("String", "Strin")
     assert ("unknown-interface", "error") in found("select: [RC5]\nignore: [RC3]", broken)
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "message"),
-    [
-        ("strict = " + "1" * 5000, 2, "this number does not fit into 64 bits"),
-        ("strict = 0x" + "f" * 5000, 2, "this number does not fit into 64 bits"),
-        (".".join("a" * 700) + " = 1", 2, "tables and arrays are nested more than 32 levels deep"),
-        (f"a = {'[' * 700}{']' * 700}", 2, "tables and arrays are nested more than 32 levels deep"),
-        (f"a = {'[' * 200_000}", 2, "tables and arrays are nested more than 32 levels deep"),
-        ("[tool.composer." + ".".join("a" * 700) + "]", 2, "tables and arrays are nested more"),
-        ("strict = " + '\\"' * 400_000, 2, "this is not TOML: Invalid value"),
-        ('"\\z" = 1', 2, "this is not TOML: Unescaped"),
-    ],
-    ids=["digits", "hexadecimal", "dotted", "arrays", "open", "header", "quotes", "escape"],
-)
-def test_toml_beyond_limits_is_a_diagnostic(
-    tmp_path: Path, text: str, line: int, message: str
-) -> None:
-    (tmp_path / "pyproject.toml").write_text(f"[tool.composer]\n{text}\n")
-    diagnostic = Project.at(tmp_path).diagnostics[0]
-    assert diagnostic.message.startswith(message)
-    assert diagnostic.primary.line == line
-
-
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("[tool]\ncomposer = 3\n", (2, 1)),
-        ("tool.composer = 'strict'\n", (1, 6)),
-        ("x = '''\n[tool.composer]\n'''\n[[tool.composer]]\nstrict = true\n", (4, 8)),
-    ],
-)
-def test_a_setting_in_place_of_the_table_is_a_diagnostic(
-    tmp_path: Path, text: str, place: tuple[int, int]
-) -> None:
-    (tmp_path / "pyproject.toml").write_text(text)
-    assert reported(Project.at(tmp_path).diagnostics) == [
-        (*place, "'tool.composer' must be a table")
-    ]
-
-
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("[tool]\ncomposer = {strict = true, ignore = ['RC9x']}\n", (2, 38)),
-        ('tool.composer.ignore = ["qos-implicit", "RC9x"]\n', (1, 41)),
-        ("[ 'tool' . \"composer\" ] # 'a\n\"ign\\u006fre\" = [\n# ]\n 'RC9x' ]\n", (4, 2)),
-        ("a = '''\n[tool.composer]\n\"\"\"'''\n[tool.composer]\nignore = ['RC9x']\n", (5, 11)),
-        ("[[a]]\nb = 1.5e3\nc = 07:32:00\n[tool.composer]\nignore=['RC9x',]\n", (5, 9)),
-    ],
-)
-def test_the_table_may_be_written_in_any_way(
-    tmp_path: Path, text: str, place: tuple[int, int]
-) -> None:
-    (tmp_path / "pyproject.toml").write_text(text)
-    (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {on_activate: {log: hi}}}\n")
-    found = load(tmp_path / "a.yaml").diagnostics
-    assert reported(found) == [(*place, "there is no rule 'RC9x'")]
-
-
-def test_keys_are_found_below_their_own_table(tmp_path: Path) -> None:
-    (tmp_path / "pyproject.toml").write_text(
-        "[[tool.composer.odd]]\na = {strict = 1}\n[[tool.composer.odd]]\nstrict = 1\n"
-        "[tool.composer.odd.more]\nnodes = 1\n[tool.composer]\nstrict = 1\n"
-    )
-    found = [item for item in Project.at(tmp_path).diagnostics if "'strict'" in item.message]
-    assert [str(item.primary).rpartition(".toml:")[2] for item in found] == ["8:10"]
-
-
-def test_many_keys_take_linear_time(tmp_path: Path) -> None:
-    def read(count: int) -> None:
-        keys = "".join(f"k{number} = {number}\n" for number in range(count))
-        source = SourceFile("pyproject.toml", f"[tool.composer]\n{keys}")
-        table = read_table(source)
-        assert table is not None
-        assert table[0] is not None
-        assert table[0].entries[-1].key.span.line == count + 1
-
-    assert_linear(read, 200, 1600)
 
 
 def test_interfaces_outside_the_project_are_not_used(tmp_path: Path) -> None:

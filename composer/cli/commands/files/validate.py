@@ -108,8 +108,7 @@ def validate(
     """Check systems and node types.
 
     Nothing is started, and ROS is not needed. Settings for a whole project can be set in its
-    composer.yaml or in the [tool.composer] table of its pyproject.toml: strict, select, ignore,
-    severity, nodes and interfaces.
+    composer.yaml: strict, select, ignore, severity, nodes and interfaces.
 
     The formats json, sarif and github always have all diagnostics.
 
