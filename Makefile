@@ -96,10 +96,12 @@ generate: $(READY)
 	@$(BIN)/python tools/write_rules.py
 	@$(BIN)/python tools/draw_pictures.py
 
-# Not part of generate: they need Chromium, of which no two versions draw the same pixels, and npm packages.
+# Not part of generate: they need Chromium, of which no two versions draw the same pixels, and npm packages,
+# or show the times of a run.
 pictures: $(READY) $(STAMPS)/dev
 	@$(BIN)/python tools/draw_dashboard.py
 	@$(BIN)/python tools/draw_editor.py
+	@$(BIN)/python tools/draw_terminal.py
 
 docs: $(STAMPS)/dev
 	@$(BIN)/mkdocs build --quiet --strict
