@@ -29,10 +29,9 @@ from composer.project.rule_selection import apply_rule_settings, check_rule_sett
 from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, reported, run_checks
+from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
+from composer.rules.node_types import unused_node_types
 from composer.rules.python.type_check import TypeCheck
-from composer.rules.unused.unused_ignore import RULE as UNUSED_IGNORE
-from composer.rules.unused.unused_ignore import without_ignored
-from composer.rules.unused.unused_node_type import unused_node_types
 from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile, Span

@@ -36,3 +36,10 @@ def part_of_path(span: Span, expression: Expression, path: FieldPath, index: int
         start, offset = found, found + len(str(part))
     source_text = span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
     return span.part(start, len(str(path.parts[index]))) if source_text == source else span
+
+
+def class_name_hint(text: str) -> str:
+    """Return the hint for ``text`` in place of ``module:Class``."""
+    module, _, name = text.rstrip(":").rpartition(".")
+    is_dotted = bool(module) and name[:1].isupper()
+    return f"did you mean '{module}:{name}'?" if is_dotted else "write 'module:Class'"

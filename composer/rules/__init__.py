@@ -1,8 +1,9 @@
-"""The rules, in one package per subject.
+"""The rules, in one module per subject.
 
-Every module of these packages with a function ``check`` is found automatically; it has one rule, or
-a few about the same subject. A rule holds its documentation (see CONTRIBUTING for how to add one).
-A check skips input that is itself invalid, because another rule reports that.
+Every function of these modules whose name begins with ``check`` is found automatically. It yields
+the diagnostics of one rule, or of a few about the same values. A rule holds its documentation (see
+CONTRIBUTING for how to add one). A check skips input that is itself invalid, because another rule
+reports that.
 """
 
 from __future__ import annotations
@@ -52,12 +53,16 @@ def _without_repeats(found: list[Diagnostic]) -> list[Diagnostic]:
 
 @cache
 def all_checks() -> tuple[Check, ...]:
-    """Return the ``check`` function of every rule, sorted by module name."""
+    """Return the checks of all modules, sorted by module and name."""
     folder = Path(__file__).parent
-    files = sorted(folder.rglob("[a-z]*.py"), key=lambda path: path.stem)
-    names = (".".join(path.relative_to(folder).with_suffix("").parts) for path in files)
-    modules = (import_module(f"{__name__}.{name}") for name in names)
-    return tuple(module.check for module in modules if hasattr(module, "check"))
+    files = (path.relative_to(folder).with_suffix("") for path in folder.rglob("[a-z]*.py"))
+    modules = [import_module(".".join((__name__, *file.parts))) for file in sorted(files)]
+    return tuple(
+        function
+        for module in modules
+        for name, function in sorted(vars(module).items())
+        if name.startswith("check") and getattr(function, "__module__", "") == module.__name__
+    )
 
 
 __all__ = ["Check", "Context", "all_checks", "reported", "run_checks"]

@@ -17,10 +17,11 @@ from composer.python_code.problems import Family, Problem
 from composer.python_code.source import BehaviorSource, Module
 from composer.python_code.source.trees import start_span, walk
 from composer.rules.behaviors import blocking, handlers
-from composer.rules.messages import index_out_of_range, invalid_value, unknown_field
+from composer.rules.expressions import INDEX_OUT_OF_RANGE
+from composer.rules.fields import INVALID_VALUE, UNKNOWN_FIELD
 from composer.rules.python import plain_python, uses_of_nodes
 from composer.rules.python.definitions import as_warning
-from composer.rules.transforms import frame_id_slash
+from composer.rules.transforms import FRAME_ID_SLASH
 from composer.source import Span
 
 #: What a Python file is for: a behavior, or an rclpy class.
@@ -28,9 +29,9 @@ What: TypeAlias = Literal["behavior", "class"]
 
 RULE_OF: Mapping[Family, Rule] = {
     Family.PORT: uses_of_nodes.UNKNOWN_ATTRIBUTE,
-    Family.FIELD: unknown_field.RULE,
-    Family.VALUE: invalid_value.RULE,
-    Family.INDEX: index_out_of_range.RULE,
+    Family.FIELD: UNKNOWN_FIELD,
+    Family.VALUE: INVALID_VALUE,
+    Family.INDEX: INDEX_OUT_OF_RANGE,
     Family.MESSAGE_TYPE: uses_of_nodes.WRONG_MESSAGE_TYPE,
     Family.AWAIT: uses_of_nodes.MISSING_AWAIT,
     Family.NAME: plain_python.UNDEFINED_NAME,
@@ -47,7 +48,7 @@ RULE_OF: Mapping[Family, Rule] = {
     Family.ASYNCIO: uses_of_nodes.ASYNCIO_CALL,
     Family.BLOCKING: blocking.BLOCKING_CALL,
     Family.EARLY: uses_of_nodes.TOO_EARLY,
-    Family.FRAME: frame_id_slash.RULE,
+    Family.FRAME: FRAME_ID_SLASH,
     Family.SELF: plain_python.MISSING_SELF,
     Family.SIGNATURE: handlers.HANDLER_SIGNATURE,
     Family.PARAMETER: uses_of_nodes.UNDECLARED_PARAMETER,

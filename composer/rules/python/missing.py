@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.analysis.context import is_unresolved
-from composer.analysis.endpoints.references import class_name_hint
-from composer.analysis.spans import part_of
+from composer.analysis.spans import class_name_hint, part_of
 from composer.diagnostics import Diagnostic, Rule, suggestion
 from composer.model import BehaviorReference
 from composer.project import Project

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.analysis.context import Context
-from composer.analysis.timing.rates import rates
+from composer.analysis.rates import rates
 from composer.loading import load
 
 HEAD = "system: demo\nnodes:\n"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from composer.analysis.timing import publications
+from composer.analysis import rates as publications
 from composer.graph.scenes import rates
 from composer.model import BehaviorReference
 from composer.python_code.source import find_behavior

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.rules.unused.unused_ignore import ignores_in
+from composer.rules.ignore_comments import ignores_in
 from composer.source import SourceFile
 from tests.unit.support.checking import diagnostics_in, quoted, rules_broken
 from tests.unit.support.growth import assert_linear

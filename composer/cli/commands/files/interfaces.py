@@ -100,7 +100,7 @@ def _check(folders: tuple[Path, ...], packages: dict[str, Path | None]) -> None:
     """Check the definitions of the packages as 'compose validate' does. Raises typer.Exit."""
     from composer.interfaces import Interfaces
     from composer.report.text import render
-    from composer.rules.messages.unknown_interface import invalid_definitions
+    from composer.rules.interfaces import invalid_definitions
 
     own = [name for name, folder in packages.items() if folder is not None]
     diagnostics = list(invalid_definitions(Interfaces.load(folders), own))

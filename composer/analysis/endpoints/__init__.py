@@ -1,1 +1,0 @@
-"""Which ports belong together: by their names, types and QoS."""

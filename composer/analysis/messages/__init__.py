@@ -1,1 +1,0 @@
-"""The messages that expressions read and reactions fill."""

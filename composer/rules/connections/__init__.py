@@ -1,1 +1,0 @@
-"""Ports without a counterpart, and counterparts that disturb each other."""

@@ -1,0 +1,181 @@
+"""How processes discover each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import is_misspelled
+from composer.diagnostics import Diagnostic, Label, error
+from composer.model import DiscoveryKind
+from composer.model.discovery import (
+    host_of,
+    interface_problem,
+    is_loopback,
+    peer_problem,
+    server_problem,
+)
+from composer.source import Located
+
+DISCOVERY_SETTING = error(
+    code="RC496",
+    name="discovery-setting",
+    summary="A setting of discovery is missing, or has no effect with its kind.",
+    why=(
+        "Processes that look for each other in different ways do not find each other. A server "
+        "without an address cannot be found either."
+    ),
+    bad="""\
+system: lights
+discovery: {kind: multicast, address: 192.168.1.10}
+nodes:
+  lamp: {on_activate: {log: started}}
+""",
+    good="""\
+system: lights
+discovery: {kind: server, address: 192.168.1.10}
+nodes:
+  lamp: {on_activate: {log: started}}
+""",
+)
+_NEEDED = {DiscoveryKind.SERVER: "address", DiscoveryKind.PEERS: "peers"}
+_KIND_OF_KEY = {
+    "interfaces": DiscoveryKind.MULTICAST,
+    "address": DiscoveryKind.SERVER,
+    "port": DiscoveryKind.SERVER,
+    "start": DiscoveryKind.SERVER,
+    "peers": DiscoveryKind.PEERS,
+}
+
+
+def check_discovery_setting(context: Context) -> Iterator[Diagnostic]:
+    """Check that the keys of discovery are those of its kind."""
+    discovery = context.system.discovery
+    if discovery is None:
+        return
+    kind = discovery.kind.value
+    given = {key.value for key in discovery.given}
+    others = [key for key in discovery.given if _KIND_OF_KEY.get(key.value, kind) is not kind]
+    needed = _NEEDED.get(kind)
+    if needed is not None and needed not in given:
+        if not is_misspelled(context, needed, discovery.kind.span):
+            yield _missing_setting(discovery.kind, needed, others)
+        return
+    for key in others:
+        yield Diagnostic(
+            DISCOVERY_SETTING,
+            f"'{key}' has no effect with discovery of kind '{kind}'",
+            key.span,
+            hint=f"remove it, or set 'kind: {_KIND_OF_KEY[key.value]}'",
+        )
+
+
+def _missing_setting(
+    kind: Located[DiscoveryKind], needed: str, others: Sequence[Located[str]]
+) -> Diagnostic:
+    """Report a key that is missing, and those that have no effect because of the same mistake."""
+    hint = "list the other computers of the system"
+    if kind.value is DiscoveryKind.SERVER:
+        hint = "name the computer of the server"
+    if others:
+        hint = f"{hint}, or set 'kind: {_KIND_OF_KEY[others[0].value]}'"
+    labels = tuple(Label(key.span, "this has no effect") for key in others)
+    message = f"discovery of kind '{kind}' needs '{needed}'"
+    return Diagnostic(DISCOVERY_SETTING, message, kind.span, labels, hint)
+
+
+DISCOVERY_ADDRESS = error(
+    code="RC497",
+    name="discovery-address",
+    summary="An address or an interface of discovery is not valid, or is repeated.",
+    why=(
+        "Fast DDS ignores what it cannot read: nodes would start, and never discover each "
+        "other. The position of a server in the list is part of its identity."
+    ),
+    bad="""\
+system: lights
+discovery: {kind: server, address: "192.168.1.10:118110"}
+nodes:
+  lamp: {on_activate: {log: started}}
+""",
+    good="""\
+system: lights
+discovery: {kind: server, address: "192.168.1.10:11811"}
+nodes:
+  lamp: {on_activate: {log: started}}
+""",
+)
+
+
+def check_discovery_address(context: Context) -> Iterator[Diagnostic]:
+    """Check the addresses and interfaces of discovery."""
+    discovery = context.system.discovery
+    if discovery is not None:
+        yield from _check_all("address", discovery.addresses, server_problem)
+        yield from _check_all("peer", discovery.peers, peer_problem)
+        yield from _check_all("interface", discovery.interfaces, interface_problem)
+
+
+def _check_all(
+    what: str, written: tuple[Located[str], ...], find_problem: Callable[[str], str | None]
+) -> Iterator[Diagnostic]:
+    first: dict[str, Located[str]] = {}
+    for text in written:
+        if is_unresolved(text.value):
+            continue
+        problem = find_problem(text.value)
+        earlier = first.setdefault(text.value, text)
+        if problem is not None:
+            yield Diagnostic(DISCOVERY_ADDRESS, f"{what} '{text}' {problem}", text.span)
+        elif earlier is not text:
+            label = Label(earlier.span, "the first one")
+            yield Diagnostic(DISCOVERY_ADDRESS, f"{what} '{text}' is repeated", text.span, (label,))
+
+
+LOCAL_DISCOVERY = error(
+    code="RC498",
+    name="local-discovery",
+    summary="Processes of other computers are to use a local address for discovery.",
+    why=(
+        "For each computer, 127.0.0.1 and localhost are the computer itself, so its processes "
+        "would look for the server, or for their peers, in the wrong place."
+    ),
+    bad="""\
+system: robot
+discovery: {kind: server, address: localhost, start: true}
+hosts: {jetson: {workspace: ~/robot}}
+processes: {vision: {nodes: [camera], host: jetson}}
+nodes:
+  camera: {on_activate: {log: started}}
+  arm: {on_activate: {log: started}}
+""",
+    good="""\
+system: robot
+discovery: {kind: server, address: 192.168.1.10, start: true}
+hosts: {jetson: {workspace: ~/robot}}
+processes: {vision: {nodes: [camera], host: jetson}}
+nodes:
+  camera: {on_activate: {log: started}}
+  arm: {on_activate: {log: started}}
+""",
+)
+
+
+def check_local_discovery(context: Context) -> Iterator[Diagnostic]:
+    """Check the addresses of discovery in a system of several computers."""
+    system = context.system
+    discovery = system.discovery
+    addresses = {host.name.value: host.address.value for host in system.hosts}
+    hosts = [process.host for process in system.processes if process.host is not None]
+    host = next((item for item in hosts if not is_loopback(addresses.get(item.value, ""))), None)
+    if discovery is None or host is None:
+        return
+    for text in (*discovery.addresses, *discovery.peers):
+        if is_loopback(host_of(text.value)):
+            yield Diagnostic(
+                LOCAL_DISCOVERY,
+                f"'{text}' is not the same computer for all processes",
+                text.span,
+                (Label(host.span, "a process on another computer"),),
+                hint="use the address of the computer in the network",
+            )

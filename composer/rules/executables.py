@@ -1,0 +1,261 @@
+"""Programs of executables: which one is meant, and whether it exists."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import is_misspelled
+from composer.diagnostics import Diagnostic, error, info, suggestion
+from composer.executables import executable_names, find_executable, find_program, has_package
+from composer.model import Executable, ExecutableKind, LifecycleKind
+from composer.source import Located, Span
+
+UNKNOWN_EXECUTABLE = error(
+    code="RC471",
+    name="unknown-executable",
+    summary="The executable of a node does not exist.",
+    why="The node cannot be configured: there is no program to start.",
+    bad="""\
+# file: system.yaml
+system: scripts
+nodes:
+  driver:
+    executable: {command: [python3, scripts/drver.py]}
+# file: scripts/driver.py
+import rclpy
+""",
+    good="""\
+# file: system.yaml
+system: scripts
+nodes:
+  driver:
+    executable: {command: [python3, scripts/driver.py]}
+# file: scripts/driver.py
+import rclpy
+""",
+)
+
+#: Arguments with these suffixes are files, and are looked for.
+_SCRIPTS = (".py", ".sh")
+
+
+def check_unknown_executable(context: Context) -> Iterator[Diagnostic]:
+    """Check packages that are installed, and paths."""
+    for node in context.system.nodes:
+        executable = node.executable
+        if executable is None or node.external is not None:
+            continue
+        if executable.command:
+            yield from _command(executable)
+        elif executable.package is not None and executable.name is not None:
+            yield from _executable_of_package(executable.package, executable.name)
+        folder = _folder(executable)
+        if folder is not None and not folder.is_dir() and executable.working_directory:
+            written = executable.working_directory
+            yield Diagnostic(UNKNOWN_EXECUTABLE, f"folder '{written}' does not exist", written.span)
+
+
+def _command(executable: Executable) -> Iterator[Diagnostic]:
+    program, *arguments = executable.command
+    folder = _folder(executable)
+    if is_unresolved(program.value) or folder is None:
+        return
+    if "/" in program.value and find_program(program.value, executable.folder, os.environ) is None:
+        exists = (executable.folder / program.value).is_file()
+        what = "is not executable" if exists else "does not exist"
+        hint = f"run 'chmod +x {program}', or name its interpreter first" if exists else None
+        yield Diagnostic(UNKNOWN_EXECUTABLE, f"program '{program}' {what}", program.span, hint=hint)
+    for script in arguments[:1]:
+        path = folder / script.value
+        if script.value.endswith(_SCRIPTS) and folder.is_dir() and not path.is_file():
+            hint = suggestion(path.name, _file_names(path.parent))
+            yield Diagnostic(
+                UNKNOWN_EXECUTABLE, f"file '{script}' does not exist", script.span, hint=hint
+            )
+
+
+def _executable_of_package(package: Located[str], name: Located[str]) -> Iterator[Diagnostic]:
+    if is_unresolved(package.value) or is_unresolved(name.value):
+        return
+    if not has_package(package.value, os.environ):
+        return  # see executable_not_installed.py
+    if find_executable(package.value, name.value, os.environ) is None:
+        yield Diagnostic(
+            UNKNOWN_EXECUTABLE,
+            f"package '{package}' has no executable '{name}'",
+            name.span,
+            hint=suggestion(name.value, executable_names(package.value, os.environ)),
+        )
+
+
+def _folder(executable: Executable) -> Path | None:
+    """Return the folder that a command runs in; None if it is not known."""
+    written = executable.working_directory
+    if written is None:
+        return executable.folder
+    return None if is_unresolved(written.value) else executable.folder / written.value
+
+
+def _file_names(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()] if folder.is_dir() else []
+
+
+EXECUTABLE_NOT_INSTALLED = info(
+    code="RC472",
+    name="executable-not-installed",
+    summary="The package or the program of an executable is not installed on this computer.",
+    why=(
+        "The node cannot be started on a computer without it. If it is installed where the "
+        "system runs, ignore this."
+    ),
+    bad="""\
+system: lights
+nodes:
+  lamp:
+    executable: {package: lamp_driver_for_mars, name: driver}
+""",
+    good="""\
+system: lights
+nodes:
+  lamp:
+    executable: {command: [sh, -c, "sleep 1"], kind: task}
+""",
+)
+
+
+def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
+    """Look for the packages, and for programs in PATH."""
+    for node in context.system.nodes:
+        executable = node.executable
+        if executable is None or node.external is not None:
+            continue
+        package = executable.package
+        if executable.command:
+            program = executable.command[0]
+            is_path = "/" in program.value or is_unresolved(program.value)
+            if not is_path and find_program(program.value, executable.folder, os.environ) is None:
+                yield Diagnostic(
+                    EXECUTABLE_NOT_INSTALLED, f"program '{program}' is not in PATH", program.span
+                )
+        elif package is not None and not (
+            is_unresolved(package.value) or has_package(package.value, os.environ)
+        ):
+            yield Diagnostic(
+                EXECUTABLE_NOT_INSTALLED, f"package '{package}' is not installed", package.span
+            )
+
+
+INCOMPLETE_EXECUTABLE = error(
+    code="RC473",
+    name="incomplete-executable",
+    summary="An executable does not have exactly one of command, or package and name.",
+    why="There is no program to start, or it is not clear which one.",
+    bad="""\
+system: maps
+nodes:
+  map_server:
+    executable: {name: map_server, lifecycle: managed}
+""",
+    good="""\
+# file: system.yaml
+system: maps
+nodes:
+  map_server:
+    executable: {command: [sh, driver.sh], lifecycle: managed}
+# file: driver.sh
+exec driver
+""",
+)
+
+
+def check_incomplete_executable(context: Context) -> Iterator[Diagnostic]:
+    """Check which keys the executables have."""
+    for node in context.system.nodes:
+        if node.executable is not None:
+            yield from _programs(context, node.executable)
+
+
+def _programs(context: Context, executable: Executable) -> Iterator[Diagnostic]:
+    spans: dict[str, Span] = {key.value: key.span for key in executable.given}
+    if "command" in spans:
+        for name in ("package", "name"):
+            if name in spans:
+                yield Diagnostic(
+                    INCOMPLETE_EXECUTABLE,
+                    f"the executable has a 'command' and a '{name}'",
+                    spans[name],
+                    hint="keep either 'command', or 'package' and 'name'",
+                )
+        return
+    if is_misspelled(context, "command", executable.span) or _has_unknown_key(context, executable):
+        return
+    missing = [
+        name
+        for name in ("package", "name")
+        if name not in spans and not is_misspelled(context, name, executable.span)
+    ]
+    if missing:
+        what = "'package' and 'name'" if len(missing) == 2 else f"'{missing[0]}'"
+        yield Diagnostic(
+            INCOMPLETE_EXECUTABLE,
+            f"the executable has no {what}",
+            executable.span,
+            hint="write 'executable: {package: ..., name: ...}' or 'executable: {command: [...]}'",
+        )
+
+
+def _has_unknown_key(context: Context, executable: Executable) -> bool:
+    """Return whether an earlier error is on the line of the executable, behind its key."""
+    start = executable.span
+    return any(
+        (span.file.path, span.line) == (start.file.path, start.line) and span.column > start.column
+        for span in context.refused
+    )
+
+
+MANAGED_TASK = error(
+    code="RC475",
+    name="managed-task",
+    summary="A task is managed by lifecycle services.",
+    why=(
+        "A task is done once its process has exited; a managed node runs until it is shut "
+        "down, and is driven by the services that it has while it runs."
+    ),
+    bad="""\
+# file: system.yaml
+system: calibration
+nodes:
+  calibrate:
+    executable: {command: [sh, driver.sh], kind: task, lifecycle: managed}
+# file: driver.sh
+exec driver
+""",
+    good="""\
+# file: system.yaml
+system: calibration
+nodes:
+  calibrate:
+    executable: {command: [sh, driver.sh], kind: task}
+# file: driver.sh
+exec driver
+""",
+)
+
+
+def check_managed_task(context: Context) -> Iterator[Diagnostic]:
+    """Check the tasks."""
+    for node in context.system.nodes:
+        executable = node.executable
+        if executable is None or executable.kind is not ExecutableKind.TASK:
+            continue
+        if executable.lifecycle is LifecycleKind.MANAGED:
+            spans = {key.value: key.span for key in executable.given}
+            yield Diagnostic(
+                MANAGED_TASK,
+                f"task '{node.name}' cannot be managed: it exits when it is done",
+                spans.get("lifecycle", executable.span),
+                hint="remove 'lifecycle: managed', or 'kind: task'",
+            )

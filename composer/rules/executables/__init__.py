@@ -1,1 +1,0 @@
-"""Nodes that are programs of their own: executables, and what they cannot do."""

@@ -1,0 +1,440 @@
+"""Executors: their nodes, threads, CPUs and load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.formatting import number
+from composer.analysis.rates import Cause, Rates, rates
+from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.fast_dataclass import dataclass
+from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
+from composer.source import Located, Span
+
+UNKNOWN_EXECUTOR = error(
+    code="RC207",
+    name="unknown-executor",
+    summary="A node runs on an executor that is not declared under executors.",
+    why="The callbacks of the node would never run.",
+    bad="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {executor: percepton, on_activate: {log: started}}
+  detector: {executor: perception, on_activate: {log: started}}
+""",
+    good="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {executor: perception, on_activate: {log: started}}
+  detector: {executor: perception, on_activate: {log: started}}
+""",
+)
+
+
+def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
+    """Check the executor of every node that names one."""
+    known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
+    for node in context.system.nodes if not context.is_partial else ():
+        name = node.executor
+        if name is None or name.value in known or is_unresolved(name.value):
+            continue
+        yield Diagnostic(
+            UNKNOWN_EXECUTOR,
+            f"node '{node.name}' runs on '{name}', which is not an executor of this system",
+            name.span,
+            hint=suggestion(name.value, known),
+        )
+
+
+UNUSED_EXECUTOR = info(
+    code="RC245",
+    name="unused-executor",
+    summary="No node runs on a declared executor.",
+    why="The executor is left over, or a node that was meant for it runs on another one.",
+    bad="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {on_activate: {log: started}}
+""",
+    good="""\
+system: threads
+executors:
+  perception: {kind: multi_threaded, threads: 4}
+nodes:
+  camera: {executor: perception, on_activate: {log: started}}
+""",
+)
+
+
+def check_unused_executor(context: Context) -> Iterator[Diagnostic]:
+    """Compare the executors with the nodes. An executor named ``default`` runs all other nodes."""
+    used = {
+        node.executor.value if node.executor else DEFAULT_EXECUTOR for node in context.system.nodes
+    }
+    known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
+    if not used <= known or context.once(earlier_errors).any:
+        return  # an unknown name may be a misspelling of the unused one
+    for executor in context.system.executors:
+        if executor.name.value not in used:
+            yield Diagnostic(
+                UNUSED_EXECUTOR, f"no node runs on '{executor.name}'", executor.name.span
+            )
+
+
+SINGLE_THREAD = warning(
+    code="RC417",
+    name="single-thread",
+    summary="An executor has one thread, but is declared as if it had several.",
+    why=(
+        "With one thread, callbacks never run at the same time. A multi_threaded executor with "
+        "one thread still costs the locking of several; the other kinds ignore 'threads'."
+    ),
+    bad="""\
+system: threads
+executors: {perception: {kind: multi_threaded, threads: 1}}
+nodes:
+  camera: {executor: perception, on_activate: {log: started}}
+""",
+    good="""\
+system: threads
+executors: {perception: {kind: multi_threaded, threads: 2}}
+nodes:
+  camera: {executor: perception, on_activate: {log: started}}
+""",
+)
+
+
+def check_single_thread(context: Context) -> Iterator[Diagnostic]:
+    """Check the numbers of threads."""
+    for executor in context.system.executors:
+        if executor.kind is ExecutorKind.MULTI_THREADED and executor.threads == 1:
+            yield Diagnostic(
+                SINGLE_THREAD,
+                f"executor '{executor.name}' is multi_threaded, but has one thread",
+                executor.threads_span or executor.name.span,
+                hint="use two or more threads, or 'kind: events'",
+            )
+        elif executor.kind is not ExecutorKind.MULTI_THREADED and _declares_several_threads(
+            executor
+        ):
+            yield Diagnostic(
+                SINGLE_THREAD,
+                f"executor '{executor.name}' has one thread, as its kind is {executor.kind}",
+                executor.threads_span or executor.name.span,
+                hint="add 'kind: multi_threaded', or remove 'threads'",
+            )
+
+
+def _declares_several_threads(executor: Executor) -> bool:
+    """Return whether several threads are written; the default does not count."""
+    return executor.threads_span is not None and executor.threads > 1
+
+
+SPLIT_EXECUTOR = info(
+    code="RC480",
+    name="split-executor",
+    summary="Nodes of several processes run on the same executor.",
+    why=(
+        "Each process has an executor of its own with these settings. The nodes of different "
+        "processes do not share its threads, and their callbacks may run at the same time."
+    ),
+    bad="""\
+system: robot
+processes: {control: {nodes: [arm]}}
+executors: {motion: {kind: events, priority: 50}}
+nodes:
+  arm: {executor: motion, on_activate: {log: started}}
+  base: {executor: motion, on_activate: {log: started}}
+""",
+    good="""\
+system: robot
+processes: {control: {nodes: [arm, base]}}
+executors: {motion: {kind: events, priority: 50}}
+nodes:
+  arm: {executor: motion, on_activate: {log: started}}
+  base: {executor: motion, on_activate: {log: started}}
+""",
+)
+
+
+def check_split_executor(context: Context) -> Iterator[Diagnostic]:
+    """Compare the processes of the nodes on each executor, except for the default one."""
+    first: dict[str, Node] = {}
+    reported: set[str] = set()
+    for node in context.system.nodes:
+        if node.executor is None or node.executor.value == DEFAULT_EXECUTOR:
+            continue
+        name = node.executor.value
+        other = first.setdefault(name, node)
+        if other.process == node.process or name in reported:
+            continue
+        reported.add(name)
+        at = node.executor.span if other.executor is None else other.executor.span
+        yield Diagnostic(
+            SPLIT_EXECUTOR,
+            f"'{name}' is one executor in {_process_text(node)} "
+            f"and another one in {_process_text(other)}",
+            node.executor.span,
+            (Label(at, f"in {_process_text(other)}"),),
+        )
+
+
+def _process_text(node: Node) -> str:
+    return "the process of the system" if node.process is None else f"process '{node.process}'"
+
+
+EXECUTOR_OUTSIDE_PROCESS = warning(
+    code="RC481",
+    name="executor-outside-process",
+    summary="An executor runs on CPUs that are not among those of its process.",
+    why=(
+        "The CPUs of an executor take precedence, so its threads run where the process was not "
+        "meant to run."
+    ),
+    bad="""\
+system: robot
+processes: {control: {nodes: [arm], cpus: [1]}}
+executors: {motion: {kind: events, cpus: [2]}}
+nodes:
+  arm: {executor: motion, on_activate: {log: started}}
+""",
+    good="""\
+system: robot
+processes: {control: {nodes: [arm], cpus: [1, 2]}}
+executors: {motion: {kind: events, cpus: [2]}}
+nodes:
+  arm: {executor: motion, on_activate: {log: started}}
+""",
+)
+
+
+def check_executor_outside_process(context: Context) -> Iterator[Diagnostic]:
+    """Compare the CPUs of the executors with those of the processes of their nodes."""
+    system = context.system
+    processes = {process.name.value: process for process in system.processes}
+    executors = {executor.name.value: executor for executor in system.executors}
+    reported: set[tuple[str, str]] = set()
+    for node in system.nodes:
+        if node.process is None or node.executor is None:
+            continue
+        process = processes.get(node.process.value)
+        executor = executors.get(node.executor.value)
+        if process is None or executor is None or not process.cpus:
+            continue
+        outside = sorted(set(executor.cpus) - set(process.cpus))
+        pair = (process.name.value, executor.name.value)
+        if not outside or pair in reported:
+            continue
+        reported.add(pair)
+        yield Diagnostic(
+            EXECUTOR_OUTSIDE_PROCESS,
+            f"executor '{executor.name}' runs on {_cpu_text(outside)}, "
+            f"but process '{process.name}' only on {_cpu_text(process.cpus)}",
+            executor.name.span,
+            (Label(process.name.span, "the process"),),
+            "add them to 'cpus' of the process, or change those of the executor",
+        )
+
+
+def _cpu_text(numbers: tuple[int, ...] | list[int]) -> str:
+    word = "CPU" if len(numbers) == 1 else "CPUs"
+    return f"{word} {', '.join(map(str, numbers))}"
+
+
+#: Maximum number of callbacks in a message and its labels, highest load first.
+SHOWN = 4
+
+
+@dataclass(frozen=True, slots=True)
+class CallbackLoad:
+    """The load of one callback: ``rate_hz`` times ``budget_ms``."""
+
+    name: str  # "motor.step"
+    rate_hz: float
+    budget_ms: Located[float]
+    reentrant: bool
+
+    @property
+    def load(self) -> float:
+        """Seconds per second."""
+        return self.rate_hz * self.budget_ms.value / 1000.0
+
+    def __str__(self) -> str:
+        return f"{self.name} {number(self.rate_hz)} Hz x {number(self.budget_ms.value)} ms"
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutorLoad:
+    """The total load of callbacks that share ``threads`` threads."""
+
+    what: str  # "executor 'control'"
+    span: Span
+    threads: int
+    shares: tuple[CallbackLoad, ...]
+
+    @property
+    def ratio(self) -> float:
+        """The load relative to the available threads."""
+        return sum(share.load for share in self.shares) / self.threads
+
+    @property
+    def primary(self) -> Span:
+        """The budget of a callback that alone needs more time than there is, or the executor."""
+        heaviest = self._ordered()[0]
+        return heaviest.budget_ms.span if heaviest.load > 1.0 else self.span
+
+    @property
+    def formula(self) -> str:
+        """The sum, as shown in messages."""
+        ordered = self._ordered()
+        terms = [str(share) for share in ordered[:SHOWN]]
+        if len(ordered) > SHOWN:
+            terms.append(f"{len(ordered) - SHOWN} more")
+        of = f" of {self.threads} threads" if self.threads > 1 else ""
+        return f"{' + '.join(terms)} = {number(self.ratio * 100)} %{of}"
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """The budgets of the callbacks with the highest load."""
+        return tuple(
+            Label(share.budget_ms.span, f"{share} = {number(share.load * 100)} %")
+            for share in self._ordered()[:SHOWN]
+        )
+
+    def _ordered(self) -> list[CallbackLoad]:
+        return sorted(self.shares, key=lambda share: (-share.load, share.name))
+
+
+def executor_loads(context: Context) -> tuple[ExecutorLoad, ...]:
+    """Return the load of every executor on which a callback has a budget and a known rate.
+
+    The callbacks of a node run one at a time unless they are reentrant. So on an executor with
+    several threads, each node has a load of its own as well.
+    """
+    known = context.once(rates)
+    declared = {executor.name.value: executor for executor in context.system.executors}
+    shares: dict[str, list[CallbackLoad]] = {}
+    found = []
+    for node in context.system.nodes:
+        name = node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
+        of_node = tuple(_shares(known, node))
+        shares.setdefault(name, []).extend(of_node)
+        alone = tuple(share for share in of_node if not share.reentrant)
+        if alone and name in declared and _threads(declared[name]) > 1:
+            found.append(
+                ExecutorLoad(f"node '{node.name}' (one at a time)", node.name.span, 1, alone)
+            )
+    for name, executor in declared.items():
+        of_executor = tuple(shares.pop(name, ()))
+        if of_executor:
+            what = f"executor '{name}'"
+            found.append(ExecutorLoad(what, executor.name.span, _threads(executor), of_executor))
+    if shares.get(DEFAULT_EXECUTOR):
+        what = f"executor '{DEFAULT_EXECUTOR}'"
+        found.append(ExecutorLoad(what, context.system.span, 1, tuple(shares[DEFAULT_EXECUTOR])))
+    return tuple(found)
+
+
+def _threads(executor: Executor) -> int:
+    return max(executor.threads, 1) if executor.kind is ExecutorKind.MULTI_THREADED else 1
+
+
+def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
+    callbacks: list[tuple[Timer | Port, Cause]] = []
+    callbacks += [(timer, Cause(timer=timer)) for timer in node.timers]
+    callbacks += [(port, Cause(port=port)) for port in node.ports]
+    for callback, cause in callbacks:
+        budget_ms = callback.budget_ms
+        rate_hz = known.callback_hz(node, cause) if budget_ms is not None else None
+        if budget_ms is not None and rate_hz is not None:
+            yield CallbackLoad(
+                f"{node.name}.{callback.name}", rate_hz, budget_ms, callback.reentrant
+            )
+
+
+EXECUTOR_OVERLOADED = error(
+    code="RC413",
+    name="executor-overloaded",
+    summary="The callbacks of an executor may need more time than it has.",
+    why=(
+        "The sum of rate times 'budget_ms' over the callbacks of an executor exceeds the "
+        "capacity of its threads: timers fire later and later, and queues overflow."
+    ),
+    bad="""\
+system: load
+nodes:
+  motor:
+    timers: {control: {rate_hz: 100, budget_ms: 8, log: control}}
+  camera:
+    timers: {frame: {rate_hz: 30, budget_ms: 10, log: frame}}
+""",
+    good="""\
+system: load
+executors:
+  perception: {kind: single_threaded}
+nodes:
+  motor:
+    timers: {control: {rate_hz: 100, budget_ms: 6, log: control}}
+  camera:
+    executor: perception
+    timers: {frame: {rate_hz: 30, budget_ms: 10, log: frame}}
+""",
+)
+
+
+def check_executor_overloaded(context: Context) -> Iterator[Diagnostic]:
+    """Add up the budgets of every executor."""
+    for load in context.once(executor_loads):
+        if load.ratio > 1.0:
+            yield Diagnostic(
+                EXECUTOR_OVERLOADED,
+                f"callbacks of {load.what} may need more time than it has: {load.formula}",
+                load.primary,
+                load.labels,
+                "lower a rate or a budget, or move nodes to another executor",
+            )
+
+
+EXECUTOR_BUSY = warning(
+    code="RC414",
+    name="executor-busy",
+    summary="The callbacks of an executor may use more than 70 % of its time.",
+    why=(
+        "Above that, callbacks that are due together wait for each other, and there is no "
+        "margin for unexpected load."
+    ),
+    bad="""\
+system: load
+nodes:
+  motor:
+    timers: {control: {rate_hz: 100, budget_ms: 8, log: control}}
+""",
+    good="""\
+system: load
+nodes:
+  motor:
+    timers: {control: {rate_hz: 100, budget_ms: 5, log: control}}
+""",
+)
+
+_BUSY = 0.7
+
+
+def check_executor_busy(context: Context) -> Iterator[Diagnostic]:
+    """Add up the budgets of every executor that is not overloaded."""
+    for load in context.once(executor_loads):
+        if _BUSY < load.ratio <= 1.0:
+            yield Diagnostic(
+                EXECUTOR_BUSY,
+                f"callbacks of {load.what} may use most of its time: {load.formula}",
+                load.span,
+                load.labels,
+            )

@@ -1,0 +1,176 @@
+"""Names in expressions, and indices of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.expressions import EVENT_NAMES, ExpressionSite, expression_sites, reactions
+from composer.analysis.spans import part_of_path
+from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.expressions import FieldPath
+from composer.model import Node
+from composer.source import Span
+
+UNKNOWN_NAME = error(
+    code="RC209",
+    name="unknown-name",
+    summary="An expression uses a name that is not in scope.",
+    why=(
+        "The available names depend on the event: 'message' in a subscription, 'request' in a "
+        "service, 'response' in on_response, and so on. 'parameters', 'state', 'count', 'now' "
+        "and 'node' are always available."
+    ),
+    bad="""\
+system: names
+nodes:
+  listener:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{msg.data}"}
+""",
+    good="""\
+system: names
+nodes:
+  listener:
+    subscriptions:
+      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
+""",
+)
+
+
+def check_unknown_name(context: Context) -> Iterator[Diagnostic]:
+    """Check the first part of every path."""
+    for site in context.once(expression_sites):
+        for path in site.expression.paths:
+            if path.root in site.names:
+                continue
+            yield Diagnostic(
+                UNKNOWN_NAME,
+                f"name '{path.root}' is not available here",
+                part_of_path(site.span, site.expression, path),
+                hint=_name_hint(path.root, site),
+            )
+
+
+def _name_hint(name: str, site: ExpressionSite) -> str | None:
+    if site.node.parameter(name) is not None and "parameters" in site.names:
+        return f"write 'parameters.{name}'"
+    if any(known.value == name for known, _ in site.node.state) and "state" in site.names:
+        return f"write 'state.{name}'"
+    own = EVENT_NAMES.get(site.event) if site.event is not None else None
+    if own and any(name in names for names in EVENT_NAMES.values()):
+        return f"use '{own[0]}' here"
+    return suggestion(name, site.names)
+
+
+UNKNOWN_STATE = error(
+    code="RC210",
+    name="unknown-state",
+    summary="A reaction uses or sets a state variable that the node does not declare.",
+    why="State variables are declared with their initial value, so that they always have one.",
+    bad="""\
+system: memory
+nodes:
+  counter:
+    state: {last: 0.0}
+    timers: {tick: {period_ms: 100, set: {lost: "{now}"}}}
+""",
+    good="""\
+system: memory
+nodes:
+  counter:
+    state: {last: 0.0}
+    timers: {tick: {period_ms: 100, set: {last: "{now}"}}}
+""",
+)
+
+
+#: Maximum number of further uses of a variable to show.
+_SHOWN_USES = 3
+
+
+def check_unknown_state(context: Context) -> Iterator[Diagnostic]:
+    """Check the state that reactions set and expressions read."""
+    errors = context.once(earlier_errors)
+    known = {
+        node.name.value: frozenset(name.value for name, _ in node.state)
+        for node in context.system.nodes
+    }
+    unknown: dict[tuple[str, str], list[Span]] = {}
+    nodes = {}
+    for node, name, span in _state_uses(context):
+        of_node = node.name.value
+        if name not in known[of_node] and not errors.may_declare(of_node, "state"):
+            nodes[of_node] = node
+            unknown.setdefault((of_node, name), []).append(span)
+    for (of_node, name), spans in unknown.items():
+        first, *others = sorted(spans, key=lambda span: (span.file.path, span.line, span.column))
+        names = [declared.value for declared, _ in nodes[of_node].state]
+        hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
+        labels = tuple(Label(span, "also here") for span in others[:_SHOWN_USES])
+        yield Diagnostic(
+            UNKNOWN_STATE, f"the node does not declare state '{name}'", first, labels, hint
+        )
+
+
+def _state_uses(context: Context) -> Iterator[tuple[Node, str, Span]]:
+    for found in reactions(context.system):
+        for name, _ in found.reaction.state:
+            yield found.node, name.value, name.span
+    for site in context.once(expression_sites):
+        for path in site.expression.paths:
+            if path.root == "state" and "state" in site.names and len(path.parts) > 1:
+                span = part_of_path(site.span, site.expression, path, 1)
+                yield site.node, str(path.parts[1]), span
+
+
+INDEX_OUT_OF_RANGE = warning(
+    code="RC308",
+    name="index-out-of-range",
+    summary="An element of a list or an array parameter is read that does not exist.",
+    why=(
+        "Reading it fails, unless a parameter is set to a longer array "
+        "while the node runs. Indices count from 0."
+    ),
+    bad="""\
+system: indices
+nodes:
+  robot:
+    parameters: {goal: {type: double_array, default: [1.0, 2.0]}}
+    on_activate: {log: "driving to y = {parameters.goal[2]}"}
+""",
+    good="""\
+system: indices
+nodes:
+  robot:
+    parameters: {goal: {type: double_array, default: [1.0, 2.0]}}
+    on_activate: {log: "driving to y = {parameters.goal[1]}"}
+""",
+)
+
+
+def check_index_out_of_range(context: Context) -> Iterator[Diagnostic]:
+    """Compare the indices in expressions with the initial values of the parameters."""
+    for site in context.once(expression_sites):
+        for path in site.expression.paths:
+            yield from _out_of_range(site, path)
+
+
+def _out_of_range(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]:
+    if path.root != "parameters" or len(path.parts) != 3:
+        return
+    name, index = str(path.parts[1]), path.parts[2]
+    parameter = site.node.parameter(name)
+    if parameter is None or parameter.value is None or not isinstance(index, int):
+        return
+    value = parameter.value.value
+    if isinstance(value, list) and not -len(value) <= index < len(value):
+        count = f"{len(value)} element" + ("" if len(value) == 1 else "s")
+        yield Diagnostic(
+            INDEX_OUT_OF_RANGE,
+            f"parameter '{name}' has no element {index}: it has {count}",
+            part_of_path(site.span, site.expression, path, 2),
+            (Label(parameter.value.span, "its value"),),
+            f"indices count from 0, so the last one is {len(value) - 1}" if value else None,
+        )

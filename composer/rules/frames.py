@@ -1,0 +1,320 @@
+"""Frames and the trees that they form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.formatting import listed
+from composer.analysis.frames import (
+    Broadcast,
+    FrameTree,
+    Gap,
+    complete_trees,
+    cycles,
+    frame_trees,
+    gaps,
+    nearest_parent,
+    place,
+)
+from composer.diagnostics import Diagnostic, Label, error, nearest, warning
+from composer.spelling import is_typo
+
+UNKNOWN_FRAME = error(
+    code="RC512",
+    name="unknown-frame",
+    summary="A node looks up a frame that no node broadcasts.",
+    why=(
+        "Every lookup of the frame fails. Frames of external nodes are declared as well: in "
+        "the 'transforms' of the external node or executable that broadcasts them."
+    ),
+    bad="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static: {laser: {parent: base_link, translation_m: {z: 0.3}}}
+  viewer:
+    external: true
+    transforms: {lookup: [base_link, lasr]}
+""",
+    good="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static: {laser: {parent: base_link, translation_m: {z: 0.3}}}
+  viewer:
+    external: true
+    transforms: {lookup: [base_link, laser]}
+""",
+)
+
+
+def check_unknown_frame(context: Context) -> Iterator[Diagnostic]:
+    """Check the frames that nodes look up, in YAML and in behaviors."""
+    for tree in complete_trees(context):
+        known = frozenset(tree.frames)
+        in_cycles = {item.child for cycle in cycles(tree) for item in cycle}
+        for lookup in tree.lookups:
+            roots = [tree.root(frame.value) for frame in lookup.frames if frame.value in known]
+            has_cycle = bool(in_cycles) and all(root in in_cycles for root in roots)
+            for frame in lookup.frames:
+                if frame.value in known or frame.value.startswith("/"):
+                    continue
+                close = nearest(frame.value, tree.frames)
+                is_alone = close is not None or any(other.value in known for other in lookup.frames)
+                span, labels = place(lookup.node, frame, is_alone=is_alone)
+                if has_cycle and close is None:
+                    continue  # probably the parent that a frame of the cycle should have
+                hint = "declare it in 'transforms' of the node that broadcasts it"
+                if close is not None:
+                    hint = f"did you mean '{close}'?"
+                message = f"no node broadcasts the frame '{frame}' on {tree.topic}"
+                yield Diagnostic(UNKNOWN_FRAME, message, span, labels, hint)
+
+
+CONFLICTING_TRANSFORMS = error(
+    code="RC510",
+    name="conflicting-transforms",
+    summary="A frame has several parents, or several nodes broadcast it.",
+    why=(
+        "A frame has one parent and one broadcaster (REP 105). With several, tf2 uses the last "
+        "message, and the frame jumps back and forth."
+    ),
+    bad="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static: {laser: {parent: base_link, translation_m: {z: 0.3}}}
+  calibration:
+    transforms:
+      static: {laser: {parent: mast, translation_m: {z: 0.1}}}
+""",
+    good="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static: {mast: {parent: base_link, translation_m: {z: 0.2}}}
+  calibration:
+    transforms:
+      static: {laser: {parent: mast, translation_m: {z: 0.1}}}
+""",
+)
+
+
+def check_conflicting_transforms(context: Context) -> Iterator[Diagnostic]:
+    """Report each transform of a frame after its first one."""
+    for tree in context.once(frame_trees):
+        for broadcast in tree.broadcasts:
+            first = tree.by_child[broadcast.child]
+            if first is not broadcast:
+                yield _conflict(first, broadcast)
+
+
+def _conflict(first: Broadcast, second: Broadcast) -> Diagnostic:
+    child = second.declared.child
+    message = f"frame '{child}' is broadcast by {_broadcasters(first, second)}"
+    hint = "let one of them broadcast it"
+    if first.parent != second.parent:
+        message = f"frame '{child}' has two parents: '{first.parent}' and '{second.parent}'"
+        hint = "remove one of them, or rename the frame"
+    elif first.kind != second.kind:
+        message = f"frame '{child}' is both static and dynamic"
+    span, labels = place(second.node, child)
+    own = first.declared.child.span
+    other = Label(own, f"node '{first.node.name}' broadcasts it to '{first.parent}'")
+    if own == span and own.file == span.file:  # two nodes of one type, or two copies
+        other = Label(first.node.name.span, f"node '{first.node.name}' broadcasts it as well")
+    return Diagnostic(CONFLICTING_TRANSFORMS, message, span, (*labels, other), hint)
+
+
+def _broadcasters(first: Broadcast, second: Broadcast) -> str:
+    if first.node is second.node:
+        return f"node '{first.node.name}' twice"
+    return f"nodes '{first.node.name}' and '{second.node.name}'"
+
+
+FRAME_CYCLE = error(
+    code="RC511",
+    name="frame-cycle",
+    summary="Frames are parents of each other in a cycle.",
+    why=(
+        "Frames form a tree. In a cycle, tf2 finds no transform, and reports that a frame is "
+        "its own parent."
+    ),
+    bad="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static:
+        laser: {parent: mast, translation_m: {z: 0.1}}
+        mast: {parent: laser, translation_m: {z: 0.2}}
+""",
+    good="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static:
+        laser: {parent: mast, translation_m: {z: 0.1}}
+        mast: {parent: base_link, translation_m: {z: 0.2}}
+""",
+)
+
+
+def check_frame_cycle(context: Context) -> Iterator[Diagnostic]:
+    """Report each cycle once."""
+    for tree in context.once(frame_trees):
+        for cycle in cycles(tree):
+            first, *others = _from_the_system(cycle)
+            path = " -> ".join((*(item.child for item in (first, *others)), first.child))
+            message = f"frames are parents of each other in a cycle: {path}"
+            if not others:
+                message = f"frame '{first.child}' is its own parent"
+            span, labels = place(first.node, first.declared.parent)
+            steps = tuple(
+                Label(item.declared.parent.span, f"the parent of '{item.child}'") for item in others
+            )
+            yield Diagnostic(
+                FRAME_CYCLE, message, span, (*labels, *steps), "change one of the parents"
+            )
+
+
+def _from_the_system(cycle: tuple[Broadcast, ...]) -> tuple[Broadcast, ...]:
+    """Return a cycle from its first transform that no node type declares, if there is one."""
+    start = next((at for at, item in enumerate(cycle) if _is_of_system(item)), 0)
+    return cycle[start:] + cycle[:start]
+
+
+def _is_of_system(item: Broadcast) -> bool:
+    return item.declared.parent.span.file == item.node.name.span.file
+
+
+UNCONNECTED_FRAMES = error(
+    code="RC513",
+    name="unconnected-frames",
+    summary="A node looks up frames that no chain of transforms connects.",
+    why=(
+        "There is a transform between two frames only if they have a common ancestor. Every "
+        "lookup between these frames fails."
+    ),
+    bad="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static:
+        laser: {parent: base_link, translation_m: {z: 0.3}}
+        camera: {parent: base, translation_m: {x: 0.1}}
+  viewer:
+    external: true
+    transforms: {lookup: [laser, camera]}
+""",
+    good="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static:
+        laser: {parent: base_link, translation_m: {z: 0.3}}
+        camera: {parent: base_link, translation_m: {x: 0.1}}
+  viewer:
+    external: true
+    transforms: {lookup: [laser, camera]}
+""",
+)
+
+
+def check_unconnected_frames(context: Context) -> Iterator[Diagnostic]:
+    """Check the frames of each lookup."""
+    for tree in complete_trees(context):
+        for gap in gaps(tree):
+            yield _unconnected(tree, gap)
+
+
+def _unconnected(tree: FrameTree, gap: Gap) -> Diagnostic:
+    (first, first_root), (second, root) = gap.ends
+    span, labels = place(gap.node, second)
+    message = (
+        f"frames '{first}' and '{second}' are not connected: their trees begin at "
+        f"'{first_root}' and '{root}'"
+    )
+    begin = next(item.declared.parent for item in tree.broadcasts if item.parent == root)
+    begins = (Label(begin.span, "one tree begins here"),)
+    close = nearest_parent(tree, root, lambda name: tree.root(name) == first_root)
+    hint = f"did you mean '{close}' instead of '{root}'?" if close is not None else None
+    return Diagnostic(UNCONNECTED_FRAMES, message, span, (*labels, *begins), hint)
+
+
+_PAIR = 2  # of trees
+
+SEVERAL_FRAME_TREES = warning(
+    code="RC514",
+    name="several-frame-trees",
+    summary="The frames of the system form several trees.",
+    why=(
+        "There is no transform between frames of different trees. Often the name of a parent "
+        "is misspelled, or a transform is missing. Robots that share nothing can have topics "
+        "of their own: remap /tf and /tf_static."
+    ),
+    bad="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static:
+        laser: {parent: base_link, translation_m: {z: 0.3}}
+        camera: {parent: base_lnk, translation_m: {x: 0.1}}
+""",
+    good="""\
+system: rover
+nodes:
+  mounts:
+    transforms:
+      static:
+        laser: {parent: base_link, translation_m: {z: 0.3}}
+        camera: {parent: base_link, translation_m: {x: 0.1}}
+""",
+)
+
+
+def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:
+    """Report all trees together, where one of them is probably misspelled, else at the second."""
+    for tree in complete_trees(context):
+        if any(cycles(tree)) or len(tree.by_child) < len(tree.broadcasts):
+            continue
+        reported = {root for gap in gaps(tree) for _, root in gap.ends}
+        roots = tree.roots()
+        others = [root for root in (*roots[1:], *roots[:1]) if root not in reported]
+        if len(roots) > 1 and others:
+            meant = ((root, _meant_frame(tree, root, roots)) for root in others)
+            root, close = next((item for item in meant if item[1]), (others[0], None))
+            yield _several_trees(tree, roots, root, close)
+
+
+def _meant_frame(tree: FrameTree, root: str, roots: tuple[str, ...]) -> str | None:
+    """Return the frame that ``root`` may be meant to be, or None.
+
+    The roots of many trees, such as odom_1 and odom_2, resemble each other on purpose.
+    """
+
+    def is_possible(name: str) -> bool:
+        return tree.root(name) != root and (len(roots) == _PAIR or name in tree.by_child)
+
+    close = nearest_parent(tree, root, is_possible)
+    children = (name for name in tree.by_child if is_possible(name) and is_typo(root, name))
+    return close or next(children, None)
+
+
+def _several_trees(
+    tree: FrameTree, roots: tuple[str, ...], root: str, close: str | None
+) -> Diagnostic:
+    broadcast = next(item for item in tree.broadcasts if item.parent == root)
+    span, labels = place(broadcast.node, broadcast.declared.parent)
+    hint = f"did you mean '{close}'?" if close is not None else f"declare the parent of '{root}'"
+    message = f"the frames form {len(roots)} trees, which begin at {listed(roots)}"
+    return Diagnostic(SEVERAL_FRAME_TREES, message, span, labels, hint)

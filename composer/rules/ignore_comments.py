@@ -1,0 +1,172 @@
+"""Comments that suppress a rule: ``# compose: ignore[rule]``.
+
+A comment applies to its own line or, on a line of its own, to the next line. It suppresses the
+diagnostics that have their primary location, or a related one, on that line. Names and codes of
+rules are separated by commas; a reason may follow the bracket.
+
+Errors cannot be ignored: a system with errors does not run, and a comment must not start a robot.
+
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from composer.diagnostics import (
+    Diagnostic,
+    Rule,
+    Severity,
+    nearest,
+    registered_rules,
+    shown,
+    warning,
+)
+from composer.fast_dataclass import dataclass
+from composer.source import SourceFile, Span
+
+UNUSED_IGNORE = warning(
+    code="RC502",
+    name="unused-ignore",
+    summary="An ignore comment suppresses no diagnostic.",
+    why=(
+        "The problem has been fixed, or the rule's name is misspelled. If the comment stays, "
+        "it hides the next problem on that line. Errors cannot be ignored, because a system "
+        "with errors does not run."
+    ),
+    bad="""\
+system: silence
+nodes:
+  talker:
+    # compose: ignore[publisher-without-subscription]
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+""",
+    good="""\
+system: silence
+nodes:
+  talker:
+    # compose: ignore[publisher-without-subscription] read with ros2 topic echo
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+""",
+)
+
+_MARK = "compose:"
+#: A comment, not the endpoint of a quoted string: no quote follows.
+_COMMENT = re.compile(
+    r"""(?:^|\s)\#\s*(?P<mark>compose:\s*ignore)\b(?:\[(?P<names>[^\]]*)\])?[^"']*$"""
+)
+_NAME = re.compile(r"[^\s,]+")
+_ONLY_COMMENT = re.compile(r"\s*(#.*)?$")
+
+
+@dataclass(frozen=True, slots=True)
+class Ignore:
+    """A rule, by name or code, that is ignored on a line; ``span`` is its span in the comment.
+
+    The rule is empty if the comment names none.
+    """
+
+    rule: str
+    line: int
+    span: Span
+
+    def matches(self, rule: Rule) -> bool:
+        """Return whether ``rule`` is ignored."""
+        return self.rule in {rule.name, rule.code}
+
+
+def without_ignored(
+    diagnostics: Iterable[Diagnostic], source: SourceFile, *, complete: bool
+) -> tuple[list[Diagnostic], set[Span]]:
+    """Return the diagnostics that no comment ignores, and the places of the comments that do.
+
+    Unused comments are reported for ``source`` only, and only if ``complete``: if every rule ran.
+    """
+    table = _Table()
+    used: set[Span] = set()
+    errors: set[Span] = set()
+    kept = []
+    for diagnostic in diagnostics:
+        ignores = {
+            ignore.span
+            for span in (diagnostic.primary, *(label.span for label in diagnostic.related))
+            for ignore in table.at(span)
+            if ignore.matches(diagnostic.rule)
+        }
+        if diagnostic.severity is Severity.ERROR:
+            errors |= ignores
+        else:
+            used |= ignores
+        if diagnostic.severity is Severity.ERROR or not ignores:
+            kept.append(diagnostic)
+    if complete:
+        names = tuple(name for rule in registered_rules() for name in (rule.code, rule.name))
+        unused = (ignore for ignore in ignores_in(source) if ignore.span not in used)
+        kept += [_unused(ignore, names, is_error=ignore.span in errors) for ignore in unused]
+    return kept, used
+
+
+def ignores_in(source: SourceFile) -> Iterator[Ignore]:
+    """Yield the rules that the comments of a file ignore."""
+    if _MARK not in source.text:
+        return
+    waiting: list[tuple[int, re.Match[str]]] = []  # comments about the next line with content
+    for number, text in enumerate(source.lines, start=1):
+        found = _COMMENT.search(text) if _MARK in text else None
+        if _ONLY_COMMENT.match(text) is None:
+            waiting += [] if found is None else [(number, found)]
+            yield from _ignores(waiting, number, source)
+            waiting.clear()
+        elif found is not None:
+            waiting.append((number, found))
+    yield from _ignores(waiting, len(source.lines), source)
+
+
+def _ignores(
+    comments: Iterable[tuple[int, re.Match[str]]], line: int, source: SourceFile
+) -> Iterator[Ignore]:
+    """Yield the rules that ``comments`` ignore on ``line``."""
+    for number, comment in comments:
+        if not (comment["names"] or "").strip():
+            start, end = comment.span("mark")
+            yield Ignore("", line, Span(source, number, start + 1, end - start))
+        for name in _NAME.finditer(comment.string, *comment.span("names")):
+            length = name.end() - name.start()
+            yield Ignore(name[0], line, Span(source, number, name.start() + 1, length))
+
+
+class _Table:
+    """The ignored rules by line, for every file with a diagnostic."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, dict[int, list[Ignore]]] = {}
+
+    def at(self, span: Span) -> list[Ignore]:
+        """Return the rules that are ignored on the line of ``span``."""
+        path = span.file.path
+        if path not in self._files:
+            lines: dict[int, list[Ignore]] = {}
+            for ignore in ignores_in(span.file):
+                lines.setdefault(ignore.line, []).append(ignore)
+            self._files[path] = lines
+        return self._files[path].get(span.line, [])
+
+
+def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagnostic:
+    if not ignore.rule:
+        hint = "write the rule in brackets, as in 'compose: ignore[qos-implicit]'"
+        return Diagnostic(UNUSED_IGNORE, "this comment ignores no rule", ignore.span, hint=hint)
+    if is_error:
+        message = f"'{shown(ignore.rule)}' is an error here"
+        return Diagnostic(
+            UNUSED_IGNORE, message, ignore.span, hint="errors cannot be ignored; fix it"
+        )
+    if ignore.rule in names:
+        message = f"there is no '{ignore.rule}' to ignore here"
+        hint = "remove it, unless a system that includes this file needs it"
+        return Diagnostic(UNUSED_IGNORE, message, ignore.span, hint=hint)
+    close = nearest(ignore.rule, names)
+    hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
+    return Diagnostic(
+        UNUSED_IGNORE, f"no rule is named '{shown(ignore.rule)}'", ignore.span, hint=hint
+    )

@@ -1,0 +1,188 @@
+"""The interfaces of ports."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import a
+from composer.diagnostics import Diagnostic, Label, error, nearest, shown
+from composer.interfaces import Action, Interfaces, InvalidDefinition, Message, Service
+from composer.interfaces.building import how_to_build
+from composer.interfaces.index import similar_interface
+from composer.interfaces.sources import FOLDERS
+from composer.model import ChannelKind, Port
+from composer.source import shown_path
+
+UNKNOWN_INTERFACE = error(
+    code="RC301",
+    name="unknown-interface",
+    summary=(
+        "A port's type is neither installed nor defined in an interface package of the project."
+    ),
+    why="Without the definition, the port cannot be created, and its uses cannot be checked.",
+    bad="""\
+system: types
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/Strin, qos: command, external: true}}
+""",
+    good="""\
+system: types
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+""",
+)
+
+
+def check_unknown_interface(context: Context) -> Iterator[Diagnostic]:
+    """Look up the type of every port."""
+    hints: dict[tuple[str, str], str | None] = {}
+    for node in context.system.nodes:
+        for port in node.ports:
+            name = port.interface
+            if is_unresolved(name.value) or context.interfaces.find(name.value) is not None:
+                continue
+            problem = context.interfaces.problem(name.value)
+            if problem is not None:
+                yield _invalid_definition(context, port, problem)
+                continue
+            key = (name.value, port.kind.channel.interface_folder)
+            if key not in hints:
+                hints[key] = _interface_hint(context, port)
+            yield Diagnostic(
+                UNKNOWN_INTERFACE,
+                f"there is no {_type_word(port)} type '{name}'",
+                name.span,
+                hint=hints[key],
+            )
+
+
+def _invalid_definition(context: Context, port: Port, problem: InvalidDefinition) -> Diagnostic:
+    """Report an error in a definition: in its file, if that is one of the project."""
+    used = port.interface.span
+    if context.interfaces.source_folder(problem.name) is None or not problem.path:
+        return Diagnostic(
+            UNKNOWN_INTERFACE, str(problem), used, hint=f"see {shown(problem.place, limit=300)}"
+        )
+    label = Label(used, f"'{port.name}' has this type")
+    return Diagnostic(UNKNOWN_INTERFACE, str(problem), problem.span, (label,), problem.hint)
+
+
+def invalid_definitions(interfaces: Interfaces, packages: Collection[str]) -> Iterator[Diagnostic]:
+    """Check all definitions of some packages of a project, whether a system uses them or not."""
+    for folder in FOLDERS:
+        for name in interfaces.names(folder):
+            if name.partition("/")[0] in packages and interfaces.find(name) is None:
+                problem = interfaces.problem(name)
+                if problem is not None:
+                    yield Diagnostic(
+                        UNKNOWN_INTERFACE, str(problem), problem.span, hint=problem.hint
+                    )
+
+
+def _type_word(port: Port) -> str:
+    return {"msg": "message"}.get(port.kind.channel.interface_folder, port.kind.channel.value)
+
+
+def _interface_hint(context: Context, port: Port) -> str | None:
+    folder = port.kind.channel.interface_folder
+    name = port.interface.value
+    package, slash, rest = name.partition("/")
+    known = context.interfaces.names(folder)
+    full = f"{package}/{folder}/{rest.rpartition('/')[2]}"
+    if full in known:
+        return f"write '{full}'"
+    incomplete = context.interfaces.folder_without_manifest(package)
+    if incomplete is not None:
+        return f"'{shown_path(incomplete)}' has no package.xml: add one that names '{package}'"
+    hint = similar_interface(full if slash else name, known)
+    if not slash:
+        return hint or f"include the package, as in std_msgs/{folder}/Name"
+    packages = context.interfaces.packages()
+    if hint is not None and (package in packages or nearest(package, packages) is not None):
+        return hint
+    source = "or put its source into the folder 'interfaces'"
+    install = f"install the package '{shown(package)}', {source}"
+    return install if hint is None else f"{install}; {hint}"
+
+
+WRONG_INTERFACE_KIND = error(
+    code="RC302",
+    name="wrong-interface-kind",
+    summary="A port has an interface of the wrong kind, such as a service type on a topic.",
+    why="Topics use message types; services and actions have their own kinds of type.",
+    bad="""\
+system: kinds
+nodes:
+  talker:
+    publishers: {trigger: {type: std_srvs/srv/Trigger, qos: command, external: true}}
+""",
+    good="""\
+system: kinds
+nodes:
+  talker:
+    clients: {trigger: {type: std_srvs/srv/Trigger, external: true}}
+""",
+)
+
+_EXPECTED = {
+    ChannelKind.TOPIC: "a message type",
+    ChannelKind.SERVICE: "a service type",
+    ChannelKind.ACTION: "an action type",
+}
+_KINDS = {
+    Message: ChannelKind.TOPIC,
+    Service: ChannelKind.SERVICE,
+    Action: ChannelKind.ACTION,
+}
+
+
+def check_wrong_interface_kind(context: Context) -> Iterator[Diagnostic]:
+    """Check the kind of every port's type."""
+    for node in context.system.nodes:
+        for port in node.ports:
+            found = context.interfaces.find(port.interface.value)
+            if found is None or _KINDS[type(found)] is port.kind.channel:
+                continue
+            yield Diagnostic(
+                WRONG_INTERFACE_KIND,
+                f"'{port.interface}' is {_EXPECTED[_KINDS[type(found)]]}, "
+                f"but {a(port.kind)} needs {_EXPECTED[port.kind.channel]}",
+                port.interface.span,
+            )
+
+
+OUTDATED_INTERFACE = error(
+    code="RC307",
+    name="outdated-interface",
+    summary="An interface of the project has changed since its package was built.",
+    why=(
+        "Nodes use the installed package. With other fields or types, messages cannot be "
+        "built, and nodes of other processes do not receive them."
+    ),
+    bad="nano interfaces/arm_interfaces/msg/Grip.msg  # and run, without building it again",
+    good="nano interfaces/arm_interfaces/msg/Grip.msg && colcon build",
+)
+
+
+def check_outdated_interface(context: Context) -> Iterator[Diagnostic]:
+    """Compare the project's definitions of all port types with the installed ones, if any."""
+    reported: set[str] = set()
+    for node in context.system.nodes:
+        for port in node.ports:
+            name = port.interface
+            if is_unresolved(name.value):
+                continue
+            outdated = context.interfaces.outdated(name.value)
+            if outdated is None or outdated in reported:
+                continue
+            reported.add(outdated)
+            package = outdated.partition("/")[0]
+            yield Diagnostic(
+                OUTDATED_INTERFACE,
+                f"'{outdated}' has changed since the package '{package}' was built",
+                name.span,
+                hint=how_to_build(package, context.interfaces.source_folder(outdated)),
+            )

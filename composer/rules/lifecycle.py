@@ -1,0 +1,265 @@
+"""Dependencies between nodes, and nodes that are watched for silence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
+from composer.analysis.formatting import number
+from composer.analysis.rates import timed_publishers
+from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.model import Dependency, Node, PortKind, PortOfNode, PrimaryState, System
+from composer.model.dependencies import dependency_cycles
+from composer.source import Located
+
+DEPENDENCY_CYCLE = error(
+    code="RC401",
+    name="dependency-cycle",
+    summary="Nodes depend on each other in a cycle.",
+    why="None of them can start first.",
+    bad="""\
+system: cycle
+nodes:
+  planner: {lifecycle: {depends_on: [mapper]}}
+  mapper: {lifecycle: {depends_on: [planner]}}
+""",
+    good="""\
+system: cycle
+nodes:
+  planner: {lifecycle: {depends_on: [mapper]}}
+  mapper: {on_activate: {log: ready}}
+""",
+)
+
+
+def check_dependency_cycle(context: Context) -> Iterator[Diagnostic]:
+    """Report one cycle for every group of nodes that depend on each other."""
+    for cycle in dependency_cycles(context.system):
+        pairs = list(zip(cycle, (*cycle[1:], cycle[0]), strict=True))
+        steps = [(_dependency(context.system, *pair), *pair) for pair in pairs]
+        path = " -> ".join((*cycle, cycle[0]))
+        message = (
+            f"node '{cycle[0]}' depends on itself"
+            if len(cycle) == 1
+            else f"nodes depend on each other in a cycle: {path}"
+        )
+        yield Diagnostic(
+            DEPENDENCY_CYCLE,
+            message,
+            steps[0][0].node.span,
+            tuple(
+                Label(dependency.node.span, f"'{name}' depends on '{other}'")
+                for dependency, name, other in steps[1:]
+            ),
+            "remove the dependency" if len(cycle) == 1 else "remove one of the dependencies",
+        )
+
+
+def _dependency(system: System, name: str, other: str) -> Dependency:
+    node = system.node(name)
+    found = node.depends_on if node is not None else ()
+    return next(item for item in found if item.node.value == other)
+
+
+DEPENDENCY_NOT_REACHED = warning(
+    code="RC402",
+    name="dependency-not-reached",
+    summary="A node depends on a state that the other node's autostart does not reach.",
+    why=(
+        "The bring-up leaves the dependent node inactive until the other node is moved to "
+        "that state manually."
+    ),
+    bad="""\
+system: waiting
+nodes:
+  planner: {lifecycle: {autostart: inactive}}
+  motor_controller: {lifecycle: {depends_on: [planner]}}
+""",
+    good="""\
+system: waiting
+nodes:
+  planner: {lifecycle: {autostart: inactive}}
+  motor_controller: {lifecycle: {depends_on: {planner: inactive}}}
+""",
+)
+
+_RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
+
+
+def check_dependency_not_reached(context: Context) -> Iterator[Diagnostic]:
+    """Compare the required states with the states that the bring-up reaches."""
+    system = context.system
+    for node in system.nodes:
+        for dependency in node.depends_on:
+            other = system.node(dependency.node.value)
+            if (
+                other is None
+                or other is node
+                or _start_rank(system, node) < _RANK[dependency.state]
+            ):
+                continue
+            if other.autostart is not None and _start_rank(system, other) < _RANK[dependency.state]:
+                yield Diagnostic(
+                    DEPENDENCY_NOT_REACHED,
+                    f"node '{node.name}' needs '{other.name}' to be {dependency.state}, "
+                    f"but '{other.name}' autostarts only to {other.autostart}",
+                    dependency.node.span,
+                    (Label(other.autostart.span, "stays here until moved manually"),),
+                    _autostart_hint(other.autostart.value),
+                )
+
+
+def _start_rank(system: System, node: Node) -> int:
+    """Return the rank of the state that the bring-up moves a node to, dependencies permitting."""
+    own = node.autostart.value if node.autostart is not None else system.autostart
+    return min(_RANK[own], _RANK[system.autostart])
+
+
+def _autostart_hint(reached: PrimaryState) -> str:
+    if reached is PrimaryState.UNCONFIGURED:
+        return "raise its autostart, or remove the dependency"
+    return f"raise its autostart, or depend on it being {reached}"
+
+
+UNKNOWN_WATCHED_PUBLISHER = error(
+    code="RC213",
+    name="unknown-watched-publisher",
+    summary="topic_silence_ms names a publisher that the node does not have.",
+    why="The publisher would not be monitored, and its silence would go unnoticed.",
+    bad="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    lifecycle: {watch: {topic_silence_ms: {scans: 500}}}
+""",
+    good="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    lifecycle: {watch: {topic_silence_ms: {scan: 500}}}
+""",
+)
+
+
+def check_unknown_watched_publisher(context: Context) -> Iterator[Diagnostic]:
+    """Compare the watched publishers with the declared ones."""
+    errors = context.once(earlier_errors)
+    for node in context.system.nodes:
+        if not node.complete or errors.may_declare(node.name.value, *PORT_SECTIONS):
+            continue
+        known = [port.name.value for port in node.ports_of(PortKind.PUBLISHER)]
+        for name, _ in node.supervision.watch.topics:
+            if name.value not in known and not is_unresolved(name.value):
+                yield Diagnostic(
+                    UNKNOWN_WATCHED_PUBLISHER,
+                    f"node '{node.name}' has no publisher '{name}' to watch",
+                    name.span,
+                    hint=suggestion(name.value, known),
+                )
+
+
+NOTHING_TO_WATCH = error(
+    code="RC404",
+    name="nothing-to-watch",
+    summary="topic_silence_ms is set for a node without publishers.",
+    why="A node without publishers is always silent, so it would fail repeatedly.",
+    bad="""\
+system: watching
+nodes:
+  logger:
+    subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
+    lifecycle: {watch: {topic_silence_ms: 500}}
+""",
+    good="""\
+system: watching
+nodes:
+  logger:
+    subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
+    lifecycle: {watch: {callback_ms: 500}}
+""",
+)
+
+
+def check_nothing_to_watch(context: Context) -> Iterator[Diagnostic]:
+    """Check every node that is watched as a whole."""
+    errors = context.once(earlier_errors)
+    for node in context.system.nodes:
+        limit = node.supervision.watch.silence_ms
+        if limit is None or not node.complete or node.ports_of(PortKind.PUBLISHER):
+            continue
+        if errors.may_declare(node.name.value, *PORT_SECTIONS):
+            continue
+        yield Diagnostic(
+            NOTHING_TO_WATCH,
+            f"node '{node.name}' is watched for silence, but has no publishers",
+            limit.span,
+            hint="watch the nodes that publish its input, or set 'callback_ms'",
+        )
+
+
+SILENCE_TOO_SHORT = error(
+    code="RC405",
+    name="silence-too-short",
+    summary="topic_silence_ms is not longer than the publishing period.",
+    why=(
+        "The node would fail although it publishes on time. Timers are never exact, so allow "
+        "for several periods."
+    ),
+    bad="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
+    lifecycle: {watch: {topic_silence_ms: 50}}
+""",
+    good="""\
+system: watching
+nodes:
+  lidar:
+    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
+    timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
+    lifecycle: {watch: {topic_silence_ms: 500}}
+""",
+)
+
+
+def check_silence_too_short(context: Context) -> Iterator[Diagnostic]:
+    """Compare the watched limits with the periods of the publishing timers."""
+    periods: dict[str, dict[str, tuple[PortOfNode, float]]] = {}
+    for endpoint, period_s in context.once(timed_publishers):
+        of_node = periods.setdefault(endpoint.node.name.value, {})
+        of_node[endpoint.port.name.value] = (endpoint, period_s)
+    for node in context.system.nodes:
+        known = periods.get(node.name.value, {})
+        watch = node.supervision.watch
+        for name, limit in watch.topics:
+            if name.value in known:
+                yield from _compare_silence(limit, *known[name.value])
+        if watch.silence_ms is not None and known and len(known) == _publisher_count(node):
+            fastest = min(known.values(), key=lambda item: item[1])
+            yield from _compare_silence(watch.silence_ms, *fastest)
+
+
+def _publisher_count(node: Node) -> int:
+    return len(node.ports_of(PortKind.PUBLISHER))
+
+
+def _compare_silence(
+    limit: Located[float], endpoint: PortOfNode, period_s: float
+) -> Iterator[Diagnostic]:
+    period_ms = period_s * 1000.0
+    deadline_ms = endpoint.port.qos.profile.deadline_ms
+    if limit.value > period_ms or (deadline_ms is not None and deadline_ms < period_ms):
+        return  # a deadline shorter than the period is reported instead
+    yield Diagnostic(
+        SILENCE_TOO_SHORT,
+        f"node '{endpoint.node.name}' counts as silent after {number(limit.value)} ms, "
+        f"but publishes '{endpoint.port.name}' every {number(period_ms)} ms",
+        limit.span,
+        (Label(endpoint.port.name.span, "the watched publisher"),),
+        f"allow for late messages, for example {number(3 * period_ms)}",
+    )

@@ -1,1 +1,0 @@
-"""Dependencies between nodes, and what happens when a node fails."""

@@ -1,1 +1,0 @@
-"""Interfaces and the values of their fields."""

@@ -1,0 +1,432 @@
+"""Names that are not valid in ROS, that collide, or that surprise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.formatting import a, free_name, safe_name
+from composer.diagnostics import Diagnostic, Label, error, info, warning
+from composer.model import Node, Port, System
+from composer.names import (
+    is_hidden,
+    join,
+    namespace_problem,
+    node_name_problem,
+    parameter_name_problem,
+    remapped_name,
+    topic_name_problem,
+)
+from composer.source import Located, Span
+
+INVALID_NODE_NAME = error(
+    code="RC221",
+    name="invalid-node-name",
+    summary="A node name is not valid in ROS.",
+    why=(
+        "Node names consist of letters, digits and underscores and do not start with a digit "
+        "(rmw_validate_node_name). rclpy refuses to create a node with any other name."
+    ),
+    bad="""\
+system: names
+nodes:
+  front-camera: {on_activate: {log: started}}
+""",
+    good="""\
+system: names
+nodes:
+  front_camera: {on_activate: {log: started}}
+""",
+)
+
+
+def check_invalid_node_name(context: Context) -> Iterator[Diagnostic]:
+    """Check the name of every node, and those of inner nodes, which may be in a namespace."""
+    names = {node.ros_name.value for node in context.system.nodes}
+    for node in context.system.nodes:
+        yield from _check_node_name(node.ros_name, names)
+        listed = node.executable.nodes if node.executable is not None else None
+        for name in listed or ():
+            for part in (
+                name.value.removeprefix("/").split("/") if name is not node.own_name else ()
+            ):
+                yield from _check_node_name(Located(part, name.span), names)
+
+
+def _check_node_name(name: Located[str], names: set[str]) -> Iterator[Diagnostic]:
+    problem = node_name_problem(name.value)
+    if problem is not None and not is_unresolved(name.value):
+        yield Diagnostic(
+            INVALID_NODE_NAME,
+            f"node name '{name}' {problem}",
+            name.span,
+            hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
+        )
+
+
+INVALID_NAMESPACE = error(
+    code="RC222",
+    name="invalid-namespace",
+    summary="A namespace is not valid in ROS.",
+    why=(
+        "The parts of a namespace consist of letters, digits and underscores, do not start "
+        "with a digit, and are separated by single slashes (rmw_validate_namespace). The name "
+        "of a system is such a part: its manager node is /<system>/manager."
+    ),
+    bad="""\
+system: names
+nodes:
+  camera: {namespace: robot 1, on_activate: {log: started}}
+""",
+    good="""\
+system: names
+nodes:
+  camera: {namespace: robot_1, on_activate: {log: started}}
+""",
+)
+
+
+def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
+    """Check the namespaces of the system and its nodes; a shared one is reported once."""
+    yield from _invalid_system_name(context.system)
+    system = context.system
+    namespaces = [node.namespace for node in system.nodes]
+    if system.namespace_span is not None:
+        namespaces.append(Located(system.namespace, system.namespace_span))
+    found = [namespace for namespace in namespaces if _is_invalid(namespace.value)]
+    invalid = {namespace.value for namespace in found}
+    for namespace in found:
+        if not any(outer in invalid for outer in _outer(namespace.value)):
+            problem = namespace_problem(namespace.value)
+            yield Diagnostic(
+                INVALID_NAMESPACE, f"namespace '{namespace}' {problem}", namespace.span
+            )
+
+
+def _is_invalid(namespace: str) -> bool:
+    return namespace_problem(namespace) is not None and not is_unresolved(namespace)
+
+
+def _outer(namespace: str) -> Iterator[str]:
+    """Yield the namespaces around a namespace."""
+    while namespace := namespace.rpartition("/")[0]:
+        yield namespace
+
+
+def _invalid_system_name(system: System) -> Iterator[Diagnostic]:
+    name = system.name
+    if system.node_type or is_unresolved(name.value):
+        return
+    problem = node_name_problem(name.value)
+    if problem is None and namespace_problem(system.namespace) is None:
+        problem = namespace_problem(join(system.namespace, name.value))
+    if problem is not None:
+        valid = safe_name(name.value)
+        hint = f"rename it to '{valid}'" if valid != name.value else None
+        yield Diagnostic(INVALID_NAMESPACE, f"system name '{name}' {problem}", name.span, hint=hint)
+
+
+INVALID_ROS_NAME = error(
+    code="RC223",
+    name="invalid-ros-name",
+    summary="The name of a topic, service or action is not valid in ROS.",
+    why=(
+        "The parts of a name consist of letters, digits and underscores, do not start with a "
+        "digit, and are separated by single slashes; '~' is allowed only at the start "
+        "(rcl_validate_topic_name). rclpy refuses any other name."
+    ),
+    bad="""\
+system: names
+nodes:
+  talker:
+    publishers:
+      chatter:
+        {type: std_msgs/msg/String, qos: command, topic: /news//today, external: true}
+""",
+    good="""\
+system: names
+nodes:
+  talker:
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: command, topic: /news/today, external: true}
+""",
+)
+
+
+def check_invalid_ros_name(context: Context) -> Iterator[Diagnostic]:
+    """Check the names of ports, of connections, and in remappings."""
+    for kind, name in _ros_names(context):
+        problem = topic_name_problem(name.value)
+        if problem is not None and not is_unresolved(name.value):
+            yield Diagnostic(INVALID_ROS_NAME, f"{kind} name '{name}' {problem}", name.span)
+
+
+def _ros_names(context: Context) -> Iterator[tuple[str, Located[str]]]:
+    for node in context.system.nodes:
+        for port in node.ports:
+            yield port.kind.channel.value, port.ros_name
+        is_rule_of_rcl = not node.implementation.declares_everything
+        for remapping in node.remappings:
+            yield "remapped", remapping.source.map(remapped_name if is_rule_of_rcl else str)
+            yield "remapped", remapping.target
+    for connection in context.system.connections:
+        if not connection.name.value.startswith("~"):
+            yield connection.kind.value, connection.name
+
+
+INVALID_PARAMETER_NAME = error(
+    code="RC224",
+    name="invalid-parameter-name",
+    summary="A parameter name does not consist of words separated by dots.",
+    why=(
+        "Parameter files, the command line and expressions can refer only to names that "
+        "consist of letters, digits and underscores, separated by dots."
+    ),
+    bad="""\
+system: names
+nodes:
+  motor:
+    parameters: {max velocity: {type: double, default: 1.0}}
+""",
+    good="""\
+system: names
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 1.0}}
+""",
+)
+
+
+def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
+    """Check the name of every declared parameter. rcl passes any name on to other nodes."""
+    for node in context.system.nodes:
+        if node.gets_undeclared:
+            continue
+        names = {parameter.name.value for parameter in node.parameters}
+        for parameter in node.parameters:
+            name = parameter.name
+            problem = parameter_name_problem(name.value)
+            if problem is not None and not is_unresolved(name.value):
+                better = ".".join(safe_name(part) for part in name.value.split(".") if part)
+                yield Diagnostic(
+                    INVALID_PARAMETER_NAME,
+                    f"parameter name '{name}' {problem}",
+                    name.span,
+                    hint=f"rename it to '{free_name(better, names)}'",
+                )
+
+
+PRIVATE_CONNECTION_NAME = error(
+    code="RC233",
+    name="private-connection-name",
+    summary="A connection has a private name, but does not belong to a single node.",
+    why="'~' stands for the node that uses the name, and a connection has no such node.",
+    bad="""\
+system: private
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: ~/chatter, from: talker.chatter, to: listener.chatter}
+""",
+    good="""\
+system: private
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /talker/chatter, from: talker.chatter, to: listener.chatter}
+""",
+)
+
+
+def check_private_connection_name(context: Context) -> Iterator[Diagnostic]:
+    """Check the names of connections."""
+    for connection in context.system.connections:
+        name = connection.name
+        if name.value.startswith("~"):
+            yield Diagnostic(
+                PRIVATE_CONNECTION_NAME,
+                f"{connection.kind} '{name}' is private, but a connection is not part of a node",
+                name.span,
+                hint="use an absolute name, such as '/node/topic'",
+            )
+
+
+DUPLICATE_FULL_NAME = error(
+    code="RC227",
+    name="duplicate-full-name",
+    summary="Two nodes have the same name and namespace in ROS.",
+    why=(
+        "ROS starts both, with a warning. Then requests to parameter and lifecycle services "
+        "reach either node, and tools show only one of them."
+    ),
+    bad="""\
+system: names
+nodes:
+  front: {name: camera, on_activate: {log: started}}
+  rear: {name: camera, on_activate: {log: started}}
+""",
+    good="""\
+system: names
+nodes:
+  front: {name: camera, namespace: front, on_activate: {log: started}}
+  rear: {name: camera, namespace: rear, on_activate: {log: started}}
+""",
+)
+
+
+def check_duplicate_full_name(context: Context) -> Iterator[Diagnostic]:
+    """Compare the full names of all nodes."""
+    first: dict[str, tuple[Node, Span]] = {}
+    for node in context.system.nodes:
+        for name, span in _full_names(node):
+            other, place = first.setdefault(name, (node, span))
+            if other is not node and not is_unresolved(name):
+                yield Diagnostic(
+                    DUPLICATE_FULL_NAME,
+                    f"nodes '{node.name}' and '{other.name}' both have the full name '{name}'",
+                    span,
+                    (Label(place, "the other node"),),
+                    hint="set another 'name' or 'namespace'",
+                )
+
+
+def _full_names(node: Node) -> Iterator[tuple[str, Span]]:
+    yield node.full_name, node.ros_name.span
+    for name in node.inner_nodes:
+        yield name, node.name.span
+
+
+DUPLICATE_PORT_NAME = error(
+    code="RC225",
+    name="duplicate-port-name",
+    summary="Two ports of different kinds have the same name in one node.",
+    why=(
+        "Connections refer to 'node.port' and handlers bind by name, so a name must identify "
+        "one port. The two ports can still share a topic: set it with 'topic:'."
+    ),
+    bad="""\
+system: ports
+nodes:
+  relay:
+    subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command, external: true}}
+    publishers: {speed: {type: std_msgs/msg/Float64, qos: command, topic: ~/speed, external: true}}
+""",
+    good="""\
+system: ports
+nodes:
+  relay:
+    subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command, external: true}}
+    publishers: {limited: {type: std_msgs/msg/Float64, qos: command, external: true}}
+""",
+)
+
+
+def check_duplicate_port_name(context: Context) -> Iterator[Diagnostic]:
+    """Check for names that a node uses twice."""
+    for node in context.system.nodes:
+        first: dict[str, Port] = {}
+        for port in node.ports:
+            earlier = first.setdefault(port.name.value, port)
+            if earlier is not port and not is_unresolved(port.name.value):
+                yield Diagnostic(
+                    DUPLICATE_PORT_NAME,
+                    f"'{port.name}' names both {a(port.kind)} and {a(earlier.kind)} of one node",
+                    port.name.span,
+                    (Label(earlier.name.span, f"the {earlier.kind}"),),
+                    "rename one of them",
+                )
+
+
+DEEP_NAMESPACE = warning(
+    code="RC231",
+    name="deep-namespace",
+    summary="A namespace has more than three levels.",
+    why=(
+        "Two or three levels (robot, subsystem, device) are enough to locate a node. Deeper "
+        "names are easily mistyped or remapped wrongly, and tools truncate them."
+    ),
+    bad="""\
+system: deep
+nodes:
+  driver: {namespace: /robot/front/left/camera, on_activate: {log: started}}
+""",
+    good="""\
+system: deep
+nodes:
+  driver: {namespace: /robot/camera_front_left, on_activate: {log: started}}
+""",
+)
+
+_MAX_LEVELS = 3
+
+
+def check_deep_namespace(context: Context) -> Iterator[Diagnostic]:
+    """Count the levels of every node's namespace."""
+    for node in context.system.nodes:
+        namespace = node.namespace
+        levels = namespace.value.strip("/").count("/") + 1
+        if (
+            levels <= _MAX_LEVELS
+            or is_unresolved(namespace.value)
+            or namespace_problem(namespace.value)
+        ):
+            continue
+        yield Diagnostic(
+            DEEP_NAMESPACE,
+            f"namespace '{namespace}' has {levels} levels, more than {_MAX_LEVELS}",
+            namespace.span,
+            hint="merge or drop levels that do not distinguish nodes",
+        )
+
+
+HIDDEN_NAME = info(
+    code="RC232",
+    name="hidden-name",
+    summary="A part of a name starts with an underscore, so ROS tools hide it.",
+    why=(
+        "ROS reserves a leading underscore for hidden names. 'ros2 topic list', rqt and "
+        "rosbag omit them by default, so they are easily overlooked."
+    ),
+    bad="""\
+system: hidden
+nodes:
+  talker:
+    publishers: {_status: {type: std_msgs/msg/String, qos: state, external: true}}
+""",
+    good="""\
+system: hidden
+nodes:
+  talker:
+    publishers: {status: {type: std_msgs/msg/String, qos: state, external: true}}
+""",
+)
+
+
+def check_hidden_name(context: Context) -> Iterator[Diagnostic]:
+    """Check the names of nodes, ports and connections."""
+    for word, name in _visible_names(context):
+        if (
+            is_hidden(name.value)
+            and not is_unresolved(name.value)
+            and not topic_name_problem(name.value)
+        ):
+            yield Diagnostic(
+                HIDDEN_NAME,
+                f"{word} '{name}' is hidden from ROS tools by its leading underscore",
+                name.span,
+            )
+
+
+def _visible_names(context: Context) -> Iterator[tuple[str, Located[str]]]:
+    for node in context.system.nodes:
+        yield "node", node.ros_name
+        for port in node.ports:
+            yield port.kind.channel.value, port.ros_name
+    for connection in context.system.connections:
+        yield connection.kind.value, connection.name

@@ -1,1 +1,0 @@
-"""Names that are invalid in ROS, that collide, or that surprise."""

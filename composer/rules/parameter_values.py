@@ -1,0 +1,267 @@
+"""Types, ranges and choices of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.formatting import and_others
+from composer.analysis.parameters import (
+    KNOWN_TYPES,
+    ReportedValues,
+    describe,
+    is_wrong_choice,
+    known_values,
+    range_problem,
+    type_problem,
+    valid_values,
+    wrong_choices,
+)
+from composer.diagnostics import Diagnostic, Label, error, suggestion
+from composer.model import USE_SIM_TIME, Parameter, ParameterType
+
+PARAMETER_TYPE = error(
+    code="RC421",
+    name="parameter-type",
+    summary="A parameter's value does not have the declared type.",
+    why=(
+        "ROS parameters are typed, so the node refuses the value at startup. An integer is "
+        "accepted for a double; nothing else is converted."
+    ),
+    bad="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: fast}}
+""",
+    good="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 1.0}}
+""",
+)
+
+
+def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
+    """Check the defaults and the values that instances set."""
+    reported = ReportedValues()
+    for parameter, value in known_values(context):
+        problem = type_problem(value.value, parameter.type.value)
+        if problem is None or is_wrong_choice(parameter, value.value):
+            continue  # another rule reports choices of another type
+        if not reported.add(parameter, value):
+            continue
+        labels: tuple[Label, ...] = ()
+        if value is not parameter.default:
+            labels = (Label(parameter.name.span, f"declared as {parameter.type}"),)
+        yield Diagnostic(
+            PARAMETER_TYPE,
+            f"parameter '{parameter.name}' must be of type {parameter.type}, not {problem}",
+            value.span,
+            labels,
+        )
+
+
+PARAMETER_RANGE = error(
+    code="RC422",
+    name="parameter-range",
+    summary="A parameter's value violates the declared minimum, maximum or step.",
+    why="The node refuses the value at startup.",
+    bad="""\
+system: parameters
+nodes:
+  motor:
+    parameters:
+      max_velocity: {type: double, default: 9.0, minimum: 0.0, maximum: 5.0, unit: m/s}
+""",
+    good="""\
+system: parameters
+nodes:
+  motor:
+    parameters:
+      max_velocity: {type: double, default: 5.0, minimum: 0.0, maximum: 5.0, unit: m/s}
+""",
+)
+
+
+def check_parameter_range(context: Context) -> Iterator[Diagnostic]:
+    """Check numbers against the declared range."""
+    reported = ReportedValues()
+    for parameter, value in valid_values(context):
+        if _is_contradictory(parameter):
+            continue
+        problem = range_problem(parameter, value.value)
+        if problem is not None and reported.add(parameter, value):
+            yield Diagnostic(
+                PARAMETER_RANGE,
+                f"parameter '{parameter.name}': {problem.message}",
+                value.span,
+                (Label(problem.limit.span, "the limit"),),
+            )
+
+
+def _is_contradictory(parameter: Parameter) -> bool:
+    low, high = parameter.minimum, parameter.maximum
+    return low is not None and high is not None and low.value > high.value
+
+
+PARAMETER_CHOICE = error(
+    code="RC423",
+    name="parameter-choice",
+    summary="A parameter's value is not one of the declared choices.",
+    why="The node refuses the value at startup.",
+    bad="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {mode: {type: string, default: fats, choices: [slow, fast]}}
+""",
+    good="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {mode: {type: string, default: fast, choices: [slow, fast]}}
+""",
+)
+
+
+def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
+    """Check values against the choices; each element of a list must be one of them."""
+    reported = ReportedValues()
+    for parameter, value in valid_values(context):
+        choices = parameter.choices
+        if choices is None or value.value in choices.value:
+            continue
+        items = value.value if isinstance(value.value, list) else [value.value]
+        invalid = next((item for item in items if item not in choices.value), None)
+        if invalid is None or not reported.add(parameter, value):
+            continue
+        yield Diagnostic(
+            PARAMETER_CHOICE,
+            f"parameter '{parameter.name}' cannot be {describe(invalid)}",
+            value.span,
+            (Label(choices.span, "the valid choices"),),
+            suggestion(str(invalid), [str(choice) for choice in choices.value]),
+        )
+
+
+PARAMETER_DECLARATION = error(
+    code="RC425",
+    name="parameter-declaration",
+    summary="A parameter's declaration contradicts itself.",
+    why=(
+        "A minimum above the maximum leaves no valid value, a range applies only to numbers, "
+        "and a choice of another type can never be selected."
+    ),
+    bad="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 3.0, minimum: 5.0, maximum: 1.0}}
+""",
+    good="""\
+system: parameters
+nodes:
+  motor:
+    parameters: {max_velocity: {type: double, default: 3.0, minimum: 1.0, maximum: 5.0}}
+""",
+)
+
+_WITH_RANGE = frozenset(
+    {
+        ParameterType.INTEGER,
+        ParameterType.DOUBLE,
+        ParameterType.INTEGER_ARRAY,
+        ParameterType.DOUBLE_ARRAY,
+        ParameterType.BYTE_ARRAY,
+    }
+)
+
+
+def check_parameter_declaration(context: Context) -> Iterator[Diagnostic]:
+    """Check the declarations, not the values."""
+    for node in context.system.nodes:
+        for parameter in node.parameters:
+            yield from _wrong_sim_time(parameter)
+            if parameter.type.value in KNOWN_TYPES:
+                yield from _wrong_range(parameter)
+                yield from _choices_of_other_type(parameter)
+
+
+def _wrong_sim_time(parameter: Parameter) -> Iterator[Diagnostic]:
+    kind = parameter.type
+    if parameter.name.value == USE_SIM_TIME and kind.value in KNOWN_TYPES - {ParameterType.BOOL}:
+        message = (
+            f"parameter '{USE_SIM_TIME}', which every node has, must be of type bool, not {kind}"
+        )
+        yield Diagnostic(PARAMETER_DECLARATION, message, kind.span)
+
+
+def _wrong_range(parameter: Parameter) -> Iterator[Diagnostic]:
+    low, high, step = parameter.minimum, parameter.maximum, parameter.step
+    name = parameter.name
+    if parameter.type.value not in _WITH_RANGE:
+        limits = {"minimum": low, "maximum": high, "step": step}
+        for word, limit in limits.items():
+            if limit is not None:
+                message = f"parameter '{name}' of type {parameter.type} cannot have a {word}"
+                yield Diagnostic(PARAMETER_DECLARATION, message, limit.span)
+        return
+    if low is not None and high is not None and low.value > high.value:
+        yield Diagnostic(
+            PARAMETER_DECLARATION,
+            f"parameter '{name}' has a minimum of {low} above its maximum of {high}",
+            low.span,
+            (Label(high.span, f"the maximum is {high}"),),
+            "swap them",
+        )
+
+
+def _choices_of_other_type(parameter: Parameter) -> Iterator[Diagnostic]:
+    wrong = wrong_choices(parameter)
+    if parameter.choices is not None and wrong:
+        yield Diagnostic(
+            PARAMETER_DECLARATION,
+            f"parameter '{parameter.name}' of type {parameter.type} has "
+            f"{describe(wrong[0])}{and_others(len(wrong) - 1)} among its choices",
+            parameter.choices.span,
+        )
+
+
+PARAMETER_WITHOUT_TYPE = error(
+    code="RC426",
+    name="parameter-without-type",
+    summary="A parameter is declared with a value from which its type cannot be inferred.",
+    why=(
+        "ROS parameters are typed. Most values determine the type, but an empty list fits "
+        "every array type, and a list of mixed types fits none."
+    ),
+    bad="""\
+system: parameters
+nodes:
+  driver:
+    parameters: {waypoints: []}
+""",
+    good="""\
+system: parameters
+nodes:
+  driver:
+    parameters: {waypoints: {type: double_array, default: []}}
+""",
+)
+
+
+def check_parameter_without_type(context: Context) -> Iterator[Diagnostic]:
+    """Check for parameters whose type is neither declared nor inferable."""
+    for node in context.system.nodes:
+        for parameter in node.parameters:
+            if parameter.default is not None and not parameter.type.value:
+                name = parameter.name
+                yield Diagnostic(
+                    PARAMETER_WITHOUT_TYPE,
+                    f"cannot infer the type of parameter '{name}' from "
+                    f"{describe(parameter.default.value)}",
+                    parameter.default.span,
+                    hint=f"write '{name}: {{type: ..., default: ...}}'",
+                )

@@ -1,0 +1,384 @@
+"""Names of parameters: unknown, missing, or similar to others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import PurePath
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.expressions import expression_sites
+from composer.analysis.python_nodes import behaviors
+from composer.analysis.spans import part_of_path
+from composer.diagnostics import (
+    Diagnostic,
+    Label,
+    Severity,
+    error,
+    nearest,
+    shown,
+    suggestion,
+    warning,
+)
+from composer.model import Node, Parameter, UnmatchedParameters
+from composer.names import namespace_problem, split_node_name
+from composer.source import Located, Span
+from composer.spelling import is_typo
+
+UNKNOWN_PARAMETER = error(
+    code="RC206",
+    name="unknown-parameter",
+    summary="A parameter that is not declared is set, or read by an expression.",
+    why=(
+        "A misspelled parameter leaves the real one at its default, which goes unnoticed "
+        "until the robot moves at the wrong speed. A class, an executable or an external node "
+        "may have parameters that it does not declare: without 'only_declared', only a "
+        "probable misspelling is reported, as an info."
+    ),
+    bad="""\
+system: parameters
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+    parameters: {rate: 2.0}
+""",
+    good="""\
+system: parameters
+nodes:
+  source:
+    type: timer_source
+    variables: {message_type: std_msgs/msg/String}
+    publishers: {output: {external: true}}
+    parameters: {rate_hz: 2.0}
+""",
+)
+
+
+_UNKNOWN_PARAMETER_IF_PASSED_ON = replace(UNKNOWN_PARAMETER, severity=Severity.INFO)
+_SEVERAL = 2
+_SHOWN_VALUES = 3
+
+
+def check_unknown_parameter(context: Context) -> Iterator[Diagnostic]:
+    """Check the values that instances set and the parameters that expressions read."""
+    first = {
+        parameter.name.value: node
+        for node in reversed(context.system.nodes)
+        for parameter in node.parameters
+    }
+    for node in context.system.nodes:
+        moved = _of_another_node(node, first)
+        yield from _unknown_values(node) if moved is None else (moved,)
+        yield from _misspelled(node)
+    errors = context.once(earlier_errors)
+    known = {
+        node.name.value: [parameter.name.value for parameter in node.parameters]
+        for node in context.system.nodes
+    }
+    names = {node: frozenset(declared) for node, declared in known.items()}
+    for node_name, name, span in _parameter_uses(context, names):
+        if name not in names[node_name] and not errors.may_declare(node_name, "parameters"):
+            yield Diagnostic(
+                UNKNOWN_PARAMETER,
+                f"the node does not declare parameter '{name}'",
+                span,
+                hint=suggestion(name, known[node_name]),
+            )
+
+
+def _misspelled(node: Node) -> Iterator[Diagnostic]:
+    """Yield the parameters that are passed on, but named like one that is declared."""
+    for undeclared in node.undeclared_parameters:
+        name = undeclared.name
+        known = (parameter.name.value for parameter in node.parameters)
+        meant = next((other for other in known if is_typo(name.value, other)), None)
+        if meant is not None:
+            message = f"node '{node.name}' does not declare parameter '{name}'"
+            hint = f"did you mean '{meant}'?"
+            yield Diagnostic(_UNKNOWN_PARAMETER_IF_PASSED_ON, message, name.span, hint=hint)
+
+
+def _of_another_node(node: Node, first: Mapping[str, Node]) -> Diagnostic | None:
+    """Return one report of several values that are all for the parameters of another node.
+
+    ``first`` are the first nodes with parameters of these names.
+    """
+    unknown = [item for item in node.unknown if item.section == "parameters"]
+    names = {item.name.value for item in unknown}
+    if len(names) < _SEVERAL:
+        return None
+    other = first.get(unknown[0].name.value)
+    if other is None or not all(other.parameter(name) for name in names):
+        return None
+    listed = " and ".join(f"'{item.name}'" for item in unknown[:_SEVERAL])
+    labels = (Label(item.name.span, "nor this one") for item in unknown[1 : 1 + _SHOWN_VALUES])
+    return Diagnostic(
+        UNKNOWN_PARAMETER,
+        f"node '{node.name}' has no parameters {listed}",
+        unknown[0].name.span,
+        tuple(labels),
+        f"node '{other.name}' has them",
+    )
+
+
+def _unknown_values(node: Node) -> Iterator[Diagnostic]:
+    """Yield the unknown names, and each parameter once that gets a map of names."""
+    types = {item.name.value: item.type.value for item in node.parameters}
+    maps: set[str] = set()
+    for unknown in node.unknown:
+        name = unknown.name.value
+        first, dot, _ = name.partition(".")
+        is_map = first in types and not any(other.startswith(f"{first}.") for other in types)
+        if unknown.section != "parameters" or first in maps:
+            continue
+        if dot and is_map:
+            maps.add(first)
+            message = f"parameter '{first}' of node '{node.name}' is a {types[first]}, not a map"
+            yield Diagnostic(UNKNOWN_PARAMETER, message, unknown.name.span)
+        else:
+            yield Diagnostic(
+                UNKNOWN_PARAMETER,
+                f"node '{node.name}' has no parameter '{name}'",
+                unknown.name.span,
+                hint=suggestion(name, unknown.known),
+            )
+
+
+def _parameter_uses(
+    context: Context, known: Mapping[str, frozenset[str]]
+) -> Iterator[tuple[str, str, Span]]:
+    for site in context.once(expression_sites):
+        for path in site.expression.paths:
+            if path.root == "parameters" and len(path.parts) > 1:
+                span = part_of_path(site.span, site.expression, path, 1)
+                node_name = site.node.name.value
+                yield node_name, path.key(known[node_name]) or str(path.parts[1]), span
+
+
+MISSING_PARAMETER = error(
+    code="RC424",
+    name="missing-parameter",
+    summary="A parameter without a default has no value.",
+    why="A parameter without a default is required: the node cannot run without a value.",
+    bad="""\
+system: parameters
+nodes:
+  camera:
+    parameters: {serial_number: {type: string}}
+""",
+    good="""\
+system: parameters
+nodes:
+  camera:
+    parameters: {serial_number: {type: string, default: A-1047}}
+""",
+)
+
+
+def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
+    """Check for parameters without a value. A node type alone does not need them."""
+    if context.system.node_type:
+        return
+    errors = context.once(earlier_errors)
+    for node in context.system.nodes:
+        if errors.may_declare(node.name.value, "parameters"):
+            continue
+        unknown = [item.name.value for item in node.unknown if item.section == "parameters"]
+        for parameter in node.parameters:
+            if parameter.value is None:
+                if nearest(parameter.name.value, unknown) is not None:
+                    continue  # it is probably set, with a misspelled name
+                yield Diagnostic(
+                    MISSING_PARAMETER,
+                    f"node '{node.name}' needs a value for parameter '{parameter.name}'",
+                    node.name.span,
+                    (Label(parameter.name.span, "declared without a default"),),
+                    f"add 'parameters: {{{parameter.name}: ...}}' to the node",
+                )
+
+
+SIMILAR_PARAMETER = warning(
+    code="RC216",
+    name="similar-parameter",
+    summary="A derived node type declares an unused parameter, named like one of its base.",
+    why=(
+        "A value in 'parameters' sets a parameter of the base type, or declares a new one. "
+        "If the name is misspelled, the real parameter silently keeps its default."
+    ),
+    bad="""\
+# file: nodes/fast.yaml
+node: fast
+extends: base
+parameters: {sped: 2.0}
+# file: nodes/base.yaml
+node: base
+parameters: {speed: 1.0}
+on_activate: {log: "at {parameters.speed} m/s"}
+""",
+    good="""\
+# file: nodes/fast.yaml
+node: fast
+extends: base
+parameters: {speed: 2.0}
+# file: nodes/base.yaml
+node: base
+parameters: {speed: 1.0}
+on_activate: {log: "at {parameters.speed} m/s"}
+""",
+)
+
+
+def check_similar_parameter(context: Context) -> Iterator[Diagnostic]:
+    """Compare the unused parameters of derived types with those of their base types."""
+    nodes = context.system.nodes
+    # What uses the parameters of a program is unknown.
+    derived = [
+        node for node in nodes if len(_declaring_files(node)) > 1 and not node.gets_undeclared
+    ]
+    if not derived:
+        return
+    used = {
+        (site.node.name.value, str(path.parts[1]))
+        for site in context.once(expression_sites)
+        for path in site.expression.paths
+        if path.root == "parameters" and len(path.parts) > 1
+    }
+    code = {
+        node.name.value: "\n".join(module.source.text for module in source.own_modules)
+        for node, source in behaviors(context)
+    }
+    for node in derived:
+        # The file of a derived type comes before those of its base types.
+        own = node.type_files[0].name if node.type_files else context.system.source.path
+        text = code.get(node.name.value, "")
+        for parameter in node.parameters:
+            name = parameter.name.value
+            is_own = PurePath(parameter.name.span.file.path).name == PurePath(own).name
+            if is_own and (node.name.value, name) not in used and name not in text:
+                yield from _similar(node, parameter)
+
+
+def _declaring_files(node: Node) -> set[str]:
+    return {parameter.name.span.file.path for parameter in node.parameters}
+
+
+def _similar(node: Node, parameter: Parameter) -> Iterator[Diagnostic]:
+    name, file = parameter.name.value, parameter.name.span.file.path
+    for other in node.parameters:
+        meant = other.name.value
+        if other.name.span.file.path == file or other.type.value != parameter.type.value:
+            continue
+        if is_typo(name, meant):
+            yield Diagnostic(
+                SIMILAR_PARAMETER,
+                f"'{name}' is a new parameter that nothing uses",
+                parameter.name.span,
+                (Label(other.name.span, "a parameter of the base type"),),
+                f"did you mean '{meant}'?",
+            )
+            return
+
+
+UNMATCHED_PARAMETERS = warning(
+    code="RC246",
+    name="unmatched-parameters",
+    summary="A parameter file sets values for a node or parameter that does not exist.",
+    why=(
+        "Parameter files use the full ROS names of nodes, with the namespace and the prefixes "
+        "of includes. Values under any other name are ignored, and the node keeps its "
+        "defaults."
+    ),
+    bad="""\
+# file: system.yaml
+system: parameters
+parameter_files: [robot.yaml]
+nodes:
+  motor: {namespace: control, parameters: {speed: {type: double, default: 1.0}}}
+# file: robot.yaml
+/motor: {ros__parameters: {speed: 2.0}}
+""",
+    good="""\
+# file: system.yaml
+system: parameters
+parameter_files: [robot.yaml]
+nodes:
+  motor: {namespace: control, parameters: {speed: {type: double, default: 1.0}}}
+# file: robot.yaml
+/control/motor: {ros__parameters: {speed: 2.0}}
+""",
+)
+
+
+#: A program may create a node with the name of the section, and gets its values.
+_UNMATCHED_FOR_PROGRAMS = replace(UNMATCHED_PARAMETERS, severity=Severity.INFO)
+_SHOWN_SECTIONS = 3
+
+
+def check_unmatched_parameters(context: Context) -> Iterator[Diagnostic]:
+    """Check the names of nodes, and the parameters below names with wildcards."""
+    # With an invalid namespace, no name matches; another rule reports it.
+    names = (context.system.namespace, *(node.full_name for node in context.system.nodes))
+    is_named = namespace_problem(names[0]) is None and not any(map(is_unresolved, names))
+    is_known = is_named and not context.is_partial
+    has_programs = any(node.gets_undeclared and node.executable for node in context.system.nodes)
+    of_programs: dict[str, list[Located[str]]] = {}
+    for unmatched in context.system.unmatched_parameters if is_known else ():
+        if unmatched.parameter is not None:
+            name = unmatched.parameter.value
+            yield Diagnostic(
+                UNMATCHED_PARAMETERS,
+                f"no node that '{unmatched.section}' matches has a parameter '{shown(name)}'",
+                unmatched.parameter.span,
+                hint=suggestion(name, unmatched.known),
+            )
+        elif has_programs and not _is_misspelled_section(unmatched):
+            section = unmatched.section
+            of_programs.setdefault(section.span.file.path, []).append(section)
+        else:
+            yield Diagnostic(
+                UNMATCHED_PARAMETERS,
+                _section_message(unmatched),
+                unmatched.section.span,
+                hint=_section_hint(unmatched),
+            )
+    for first, *others in of_programs.values():
+        yield Diagnostic(
+            _UNMATCHED_FOR_PROGRAMS,
+            f"no node of this system is known to have the name '{shown(first.value)}'",
+            first.span,
+            tuple(Label(other.span, "nor this one") for other in others[:_SHOWN_SECTIONS]),
+            "if a program creates it, list it under 'nodes' of its executable",
+        )
+
+
+def _is_misspelled_section(unmatched: UnmatchedParameters) -> bool:
+    """Return whether a section is most likely meant for a node, perhaps in another namespace."""
+    name = unmatched.section.value
+    last = split_node_name(name)[1]
+    return unmatched.renamed is not None or any(
+        is_typo(name, other) or split_node_name(other)[1] == last for other in unmatched.known
+    )
+
+
+def _section_message(unmatched: UnmatchedParameters) -> str:
+    name = shown(unmatched.section.value)
+    if unmatched.renamed is not None:
+        return f"'{name}' does not match '{unmatched.renamed}', named with the prefix of an include"
+    if "*" in name:
+        return f"no node of this system matches '{name}'"
+    return f"no node of this system is named '{name}'"
+
+
+def _section_hint(unmatched: UnmatchedParameters) -> str | None:
+    name = unmatched.section.value
+    if unmatched.renamed is not None:
+        own_name = unmatched.renamed.rpartition("/")[2]
+        return f"write '{name.rpartition('/')[0]}/{own_name}'"
+    if "*" in name:
+        nodes = suggestion(name, unmatched.known, limit=3)
+        meaning = "'*' stands for one part of a name, '**' for any number"
+        return f"{meaning}; {nodes}" if nodes is not None else meaning
+    return suggestion(name, unmatched.known)

@@ -1,1 +1,0 @@
-"""Types, ranges and declarations of parameters."""

@@ -1,0 +1,301 @@
+"""The processes of a system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.earlier_errors import earlier_errors
+from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.model import Channel
+from composer.names import topic_name_problem
+from composer.source import Located
+
+UNKNOWN_PROCESS = error(
+    code="RC478",
+    name="unknown-process",
+    summary="A node names an unknown process, or a process an unknown node.",
+    why="No process would run the node.",
+    bad="""\
+system: robot
+processes: {vision: {nodes: [camra]}}
+nodes:
+  camera: {on_activate: {log: started}}
+  detector: {process: vison, on_activate: {log: started}}
+""",
+    good="""\
+system: robot
+processes: {vision: {nodes: [camera]}}
+nodes:
+  camera: {on_activate: {log: started}}
+  detector: {process: vision, on_activate: {log: started}}
+""",
+)
+
+
+def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
+    """Check the processes of nodes, and the nodes of processes."""
+    system = context.system
+    if context.is_partial:
+        return
+    processes = [process.name.value for process in system.processes]
+    for node in system.nodes:
+        name = node.process
+        if name is None or name.value in processes or is_unresolved(name.value):
+            continue
+        yield Diagnostic(
+            UNKNOWN_PROCESS,
+            f"node '{node.name}' runs in '{name}', which is not a process of this system",
+            name.span,
+            hint=suggestion(name.value, processes),
+        )
+    nodes = [node.name.value for node in system.nodes]
+    known = frozenset(nodes)
+    for process in system.processes:
+        for node_name in process.nodes:
+            if node_name.value in known or is_unresolved(node_name.value):
+                continue
+            yield Diagnostic(
+                UNKNOWN_PROCESS,
+                f"process '{process.name}' names '{node_name}', which is not a node of this system",
+                node_name.span,
+                hint=suggestion(node_name.value, nodes),
+            )
+
+
+CONFLICTING_PROCESS = error(
+    code="RC479",
+    name="conflicting-process",
+    summary="A node is in two processes, or a process has no node or no valid name.",
+    why=(
+        "Two processes with the same node would publish everything twice. A process is part of "
+        "names in ROS, and one without nodes does nothing."
+    ),
+    bad="""\
+system: robot
+processes: {vision: {nodes: [camera]}, control: {nodes: ["*"]}}
+nodes:
+  camera: {on_activate: {log: started}}
+  arm: {on_activate: {log: started}}
+""",
+    good="""\
+system: robot
+processes: {vision: {nodes: [camera]}, control: {nodes: [arm]}}
+nodes:
+  camera: {on_activate: {log: started}}
+  arm: {on_activate: {log: started}}
+""",
+)
+
+
+def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
+    """Check that the processes share no node, and that each has one."""
+    system = context.system
+    named: dict[str, Located[str]] = {}
+    first: dict[str, tuple[str, Located[str]]] = {}
+    for node in system.nodes:
+        if node.process is not None:
+            named[node.name.value] = node.process
+    for process in system.processes:
+        for node_name in process.nodes:
+            known = first.setdefault(node_name.value, (process.name.value, node_name))
+            other = named.get(node_name.value)
+            if known[0] != process.name.value:
+                where = known[1].span
+                text = known[0]
+            elif other is not None and other.value != process.name.value:
+                where, text = other.span, other.value
+            else:
+                continue
+            yield Diagnostic(
+                CONFLICTING_PROCESS,
+                f"node '{node_name}' is in the processes '{text}' and '{process.name}'",
+                node_name.span,
+                related=(Label(where, f"in '{text}'"),),
+                hint="name it in one of them",
+            )
+    used = {process.value for process in named.values()}
+    known_names = {process.name.value for process in system.processes}
+    has_others = not used <= known_names  # unknown-process reports them
+    for process in system.processes:
+        problem = topic_name_problem(process.name.value)
+        if problem is not None or "/" in process.name.value:
+            what = problem or "contains '/'"
+            yield Diagnostic(
+                CONFLICTING_PROCESS, f"process '{process.name}' {what}", process.name.span
+            )
+        elif (
+            not (process.nodes or process.name.value in used or has_others)
+            and not context.once(earlier_errors).any
+        ):
+            yield Diagnostic(
+                CONFLICTING_PROCESS, f"process '{process.name}' has no nodes", process.name.span
+            )
+
+
+SEPARATE_PROCESS = error(
+    code="RC482",
+    name="separate-process",
+    summary="The environment of a process separates it from the other processes.",
+    why=(
+        "A process in another ROS domain, or without discovery, cannot be brought up, and its "
+        "nodes receive nothing from the others."
+    ),
+    bad="""\
+system: robot
+processes:
+  vision: {nodes: [camera], environment: {ROS_DOMAIN_ID: "7"}}
+nodes:
+  camera: {on_activate: {log: started}}
+""",
+    good="""\
+system: robot
+processes:
+  vision: {nodes: [camera], environment: {OMP_NUM_THREADS: "2"}}
+nodes:
+  camera: {on_activate: {log: started}}
+""",
+)
+_DOMAIN, _DISCOVERY_RANGE = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"
+
+
+def check_separate_process(context: Context) -> Iterator[Diagnostic]:
+    """Check the variables that the processes set."""
+    for process in context.system.processes:
+        for name, value in process.environment:
+            if name.value == _DOMAIN:
+                yield Diagnostic(
+                    SEPARATE_PROCESS,
+                    f"process '{process.name}' would be in a ROS domain of its own",
+                    name.span,
+                    hint=f"set {_DOMAIN} for 'compose run' instead, which all processes inherit",
+                )
+            elif name.value == _DISCOVERY_RANGE and value == "OFF":
+                yield Diagnostic(
+                    SEPARATE_PROCESS,
+                    f"process '{process.name}' would discover no other process",
+                    name.span,
+                    hint="remove it",
+                )
+
+
+ISOLATION_BETWEEN_PROCESSES = info(
+    code="RC541",
+    name="isolation-between-processes",
+    summary="A connection whose ports are in different processes has 'isolation'.",
+    why=(
+        "Between processes, messages go through DDS: each receiver has an object of its own, "
+        "and none is shared. The setting has no effect. With 'share', the nodes were probably "
+        "meant to be in one process, for example to exchange images without copies."
+    ),
+    bad="""\
+system: robot
+processes: {vision: {nodes: [camera]}}
+nodes:
+  camera:
+    publishers: {image: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 100, publish: {image: {data: picture}}}}
+  detector:
+    subscriptions: {image: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+connections:
+  - {topic: /image, from: camera.image, to: detector.image, isolation: share}
+""",
+    good="""\
+system: robot
+processes: {vision: {nodes: [camera, detector]}}
+nodes:
+  camera:
+    publishers: {image: {type: std_msgs/msg/String, qos: command}}
+    timers: {tick: {period_ms: 100, publish: {image: {data: picture}}}}
+  detector:
+    subscriptions: {image: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+connections:
+  - {topic: /image, from: camera.image, to: detector.image, isolation: share}
+""",
+)
+
+
+def check_isolation_between_processes(context: Context) -> Iterator[Diagnostic]:
+    """Check the connections with 'isolation', with all ports of their topics."""
+    channel_of = {
+        (end.node.name.value, end.port.name.value): channel
+        for channel in context.channels
+        for end in channel.ends
+    }
+    for connection in context.system.connections:
+        if connection.isolation is None:
+            continue
+        ports = connection.ends
+        found = [channel_of.get((end.node, end.port)) for end in ports]
+        known = [channel for channel in found if channel is not None]
+        if len(known) < len(found) or not known or any(map(_has_pair_in_process, known)):
+            continue
+        if not all(channel.sources and channel.sinks for channel in known):
+            continue
+        yield Diagnostic(
+            ISOLATION_BETWEEN_PROCESSES,
+            f"'isolation' of '{connection.name}' has no effect: no two of its nodes are in the "
+            "same process",
+            connection.isolation.span,
+            hint="assign them to one process, or remove 'isolation'",
+        )
+
+
+def _has_pair_in_process(channel: Channel) -> bool:
+    """Return whether messages of the channel may stay in a process."""
+    return any(
+        source.node.implementation.in_process
+        and sink.node.implementation.in_process
+        and source.node.process == sink.node.process
+        for source in channel.sources
+        for sink in channel.sinks
+    )
+
+
+MANY_SERVICES = warning(
+    code="RC488",
+    name="many-services",
+    summary="The processes of a system have so many services for tools that it may not start.",
+    why=(
+        "A node has about 28 endpoints for tools: services for parameters and its lifecycle, "
+        "and publishers of its log and its changes. Each process compares its own endpoints "
+        "with those of all others, so the time to start grows with the square of their number. "
+        "On two processors, ten processes with 200 nodes take half a minute, and 400 nodes do "
+        "not come up. Commands of compose need none of these services."
+    ),
+    bad="""\
+system: fleet
+processes: {second: {nodes: ["robot_*"]}}
+nodes:
+  station: {on_activate: {log: started}}
+  "robot_${index}": {for_each: {index: 200}, on_activate: {log: started}}
+""",
+    good="""\
+system: fleet
+introspection: {parameters: false, type_description: false, lifecycle_services: false}
+processes: {second: {nodes: ["robot_*"]}}
+nodes:
+  station: {on_activate: {log: started}}
+  "robot_${index}": {for_each: {index: 200}, on_activate: {log: started}}
+""",
+)
+#: Of about 180 nodes with all services.
+_MOST_ENDPOINTS = 5000
+
+
+def check_many_services(context: Context) -> Iterator[Diagnostic]:
+    """Check the services of nodes if they are in several processes."""
+    system = context.system
+    if not system.processes:
+        return
+    found = [
+        node.introspection.endpoints for node in system.nodes if node.implementation.in_process
+    ]
+    if sum(found) > _MOST_ENDPOINTS:
+        yield Diagnostic(
+            MANY_SERVICES,
+            f"the nodes have about {sum(found)} endpoints for tools: their processes may not start "
+            "within the time limit",
+            system.name.span,
+            hint="disable those that no tool uses, in 'introspection' of the system",
+        )

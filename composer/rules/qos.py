@@ -1,0 +1,384 @@
+"""QoS that does not suit what is published."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from composer.analysis.context import Context
+from composer.analysis.formatting import number, port_name
+from composer.analysis.rates import rates, timed_publishers
+from composer.diagnostics import Diagnostic, Label, info, warning
+from composer.model import ChannelKind, Port, PortKind, PortOfNode
+from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
+
+_PERIOD_EXAMPLE = """\
+system: timing
+nodes:
+  robot:
+    publishers:
+      pose: {type: geometry_msgs/msg/Pose, qos: {%s}, external: true}
+    timers: {step: {period_ms: 100, publish: {pose: {}}}}
+"""
+
+DEADLINE_TOO_SHORT = warning(
+    code="RC312",
+    name="deadline-too-short",
+    summary="A publisher's deadline is shorter than its publishing period.",
+    why="Every message is late, and every subscription reports a missed deadline.",
+    bad=_PERIOD_EXAMPLE % "deadline_ms: 50",
+    good=_PERIOD_EXAMPLE % "deadline_ms: 150",
+)
+LIFESPAN_TOO_SHORT = warning(
+    code="RC313",
+    name="lifespan-too-short",
+    summary="A publisher's lifespan is shorter than its publishing period.",
+    why=(
+        "Between an expired message and the next one there is no message: a late joiner or a "
+        "slow subscription receives nothing."
+    ),
+    bad=_PERIOD_EXAMPLE % "lifespan_ms: 50",
+    good=_PERIOD_EXAMPLE % "lifespan_ms: 200",
+)
+
+
+def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
+    """Compare deadlines and lifespans with the periods of the publishing timers."""
+    for endpoint, period_s in context.once(timed_publishers):
+        qos, name, period_ms = endpoint.port.qos, endpoint.port.name, period_s * 1000.0
+        if not qos.known:
+            continue
+        deadline_ms, lifespan_ms = qos.profile.deadline_ms, qos.profile.lifespan_ms
+        if deadline_ms is not None and deadline_ms < period_ms:
+            yield Diagnostic(
+                DEADLINE_TOO_SHORT,
+                f"publisher '{name}' offers a deadline of {number(deadline_ms)} ms, "
+                f"but publishes every {number(period_ms)} ms",
+                qos.policy_span("deadline_ms"),
+                hint="make the deadline longer than the period, with some margin",
+            )
+        if lifespan_ms is not None and lifespan_ms < period_ms:
+            yield Diagnostic(
+                LIFESPAN_TOO_SHORT,
+                f"messages of '{name}' expire after {number(lifespan_ms)} ms, "
+                f"but are published every {number(period_ms)} ms",
+                qos.policy_span("lifespan_ms"),
+                hint="make the lifespan longer than the period",
+            )
+
+
+LEASE_TOO_SHORT = warning(
+    code="RC319",
+    name="lease-too-short",
+    summary="A publisher's liveliness lease is shorter than its publishing period.",
+    why=(
+        "With 'liveliness: manual_by_topic', each message renews the lease. If it ends "
+        "before the next message, every subscription reports that the publisher is not "
+        "alive."
+    ),
+    bad="""\
+system: liveliness
+nodes:
+  robot:
+    publishers:
+      pose:
+        type: geometry_msgs/msg/Pose
+        qos: {liveliness: manual_by_topic, liveliness_lease_duration_ms: 50}
+        external: true
+    timers: {step: {period_ms: 100, publish: {pose: {}}}}
+""",
+    good="""\
+system: liveliness
+nodes:
+  robot:
+    publishers:
+      pose:
+        type: geometry_msgs/msg/Pose
+        qos: {liveliness: manual_by_topic, liveliness_lease_duration_ms: 300}
+        external: true
+    timers: {step: {period_ms: 100, publish: {pose: {}}}}
+""",
+)
+
+
+def check_lease_too_short(context: Context) -> Iterator[Diagnostic]:
+    """Compare the leases that messages renew with the periods of the publishing timers."""
+    for endpoint, period_s in context.once(timed_publishers):
+        qos = endpoint.port.qos
+        lease_ms = qos.profile.liveliness_lease_duration_ms
+        is_manual = qos.profile.liveliness is Liveliness.MANUAL_BY_TOPIC
+        if qos.known and is_manual and lease_ms is not None and lease_ms < period_s * 1000.0:
+            yield Diagnostic(
+                LEASE_TOO_SHORT,
+                f"the lease of publisher '{endpoint.port.name}' ends after {number(lease_ms)} ms, "
+                f"but it publishes every {number(period_s * 1000.0)} ms",
+                qos.policy_span("liveliness_lease_duration_ms"),
+                hint="make the lease longer than the period, with some margin",
+            )
+
+
+SHALLOW_QUEUE = warning(
+    code="RC315",
+    name="shallow-queue",
+    summary="A reliable topic with a high rate has a queue depth of 1.",
+    why=(
+        "Reliable delivery loses no message in transit, but a queue of depth 1 replaces each "
+        "message that is not taken before the next one arrives. If only the latest value "
+        "matters, use best effort or transient local."
+    ),
+    bad="""\
+system: queues
+nodes:
+  robot:
+    publishers:
+      order: {type: std_msgs/msg/String, qos: {extends: command, depth: 1}, external: true}
+    timers: {step: {rate_hz: 50, publish: {order: {data: go}}}}
+""",
+    good="""\
+system: queues
+nodes:
+  robot:
+    publishers:
+      order: {type: std_msgs/msg/String, qos: {extends: command, depth: 10}, external: true}
+    timers: {step: {rate_hz: 50, publish: {order: {data: go}}}}
+""",
+)
+
+#: In hertz; on slower topics a message is taken before the next one arrives.
+FAST_HZ = 10.0
+
+
+def check_shallow_queue(context: Context) -> Iterator[Diagnostic]:
+    """Check the publishers and subscriptions of topics with a known rate."""
+    known = context.once(rates)
+    for node in context.system.nodes:
+        for port in node.ports:
+            if port.kind.channel is not ChannelKind.TOPIC or not port.qos.known:
+                continue
+            rate_hz = known.topic_hz(port.full_name) if _is_shallow(port.qos.profile) else None
+            if rate_hz is not None and rate_hz >= FAST_HZ:
+                yield Diagnostic(
+                    SHALLOW_QUEUE,
+                    f"reliable topic '{port.full_name}' at {number(rate_hz)} Hz "
+                    "has a queue depth of 1",
+                    port.qos.policy_span("depth"),
+                    hint="use a depth of 10, or best effort",
+                )
+
+
+def _is_shallow(profile: QosProfile) -> bool:
+    return (
+        profile.depth == 1
+        and profile.history is History.KEEP_LAST
+        and profile.reliability is Reliability.RELIABLE
+        and profile.durability is Durability.VOLATILE
+    )
+
+
+KEEP_ALL = info(
+    code="RC314",
+    name="keep-all",
+    summary="A publisher or subscription keeps all messages.",
+    why=(
+        "If a subscription is slower than its publisher, the queue grows until memory runs "
+        "out, or a reliable publisher blocks. Set a depth instead."
+    ),
+    bad="""\
+system: queues
+nodes:
+  talker:
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: {history: keep_all}, external: true}
+""",
+    good="""\
+system: queues
+nodes:
+  talker:
+    publishers:
+      chatter: {type: std_msgs/msg/String, qos: {history: keep_last, depth: 100}, external: true}
+""",
+)
+
+
+def check_keep_all(context: Context) -> Iterator[Diagnostic]:
+    """Check the history of every publisher and subscription; a shared profile is reported once."""
+    for node in context.system.nodes:
+        for port in node.ports:
+            qos = port.qos
+            if port.kind.channel is not ChannelKind.TOPIC or not qos.known:
+                continue
+            if qos.profile.history is History.KEEP_ALL:
+                yield Diagnostic(
+                    KEEP_ALL,
+                    "'keep_all' lets queues grow without limit",
+                    qos.policy_span("history"),
+                    hint="use 'keep_last' with a depth",
+                )
+
+
+RELIABLE_SENSOR_STREAM = info(
+    code="RC317",
+    name="reliable-sensor-stream",
+    summary="High-rate sensor data is published reliably.",
+    why=(
+        "Resending a lost image delays all that follow, and the old image is no longer "
+        "needed. The 'sensor_data' preset is best effort."
+    ),
+    bad="""\
+system: stream
+nodes:
+  camera:
+    publishers: {image: {type: sensor_msgs/msg/Image, qos: command, external: true}}
+    timers: {frame: {rate_hz: 30, publish: {image: {}}}}
+""",
+    good="""\
+system: stream
+nodes:
+  camera:
+    publishers: {image: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}}
+    timers: {frame: {rate_hz: 30, publish: {image: {}}}}
+""",
+)
+
+_SENSOR_PACKAGE = "sensor_msgs/msg/"
+#: Messages of that package that are small, and whose consumers usually request reliable QoS.
+_STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"})
+
+
+def check_reliable_sensor_stream(context: Context) -> Iterator[Diagnostic]:
+    """Check publishers of sensor messages with a known rate."""
+    known = context.once(rates)
+    for channel in context.channels:
+        if channel.kind is not ChannelKind.TOPIC:
+            continue
+        sinks = tuple(end for end in channel.sinks if _is_reliable(end.port))
+        for source in channel.sources:
+            rate_hz = known.publisher_hz(source) if _is_reliable(source.port) else None
+            if _is_stream(source.port.interface.value) and (rate_hz or 0.0) >= FAST_HZ:
+                yield _reliable_stream(source.port, rate_hz or 0.0, sinks)
+
+
+def _is_stream(interface: str) -> bool:
+    return interface.startswith(_SENSOR_PACKAGE) and interface not in _STATES
+
+
+def _is_reliable(port: Port) -> bool:
+    return port.qos.known and port.qos.profile.reliability is Reliability.RELIABLE
+
+
+def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) -> Diagnostic:
+    """Report a publisher; if it were best effort, it would not match the reliable ``sinks``."""
+    if port.external:
+        # Other consumers may request it reliably, and would no longer match.
+        hint = "let subscriptions use 'qos: sensor_data'; a reliable publisher serves them too"
+    elif sinks:
+        hint = "use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"
+    else:
+        hint = "use 'qos: sensor_data'"
+    return Diagnostic(
+        RELIABLE_SENSOR_STREAM,
+        f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
+        port.qos.policy_span("reliability"),
+        tuple(
+            Label(sink.port.qos.policy_span("reliability"), f"'{port_name(sink)}' requests it")
+            for sink in sinks
+        ),
+        hint,
+    )
+
+
+UNRELIABLE_COMMAND = info(
+    code="RC316",
+    name="unreliable-command",
+    summary="A topic whose name suggests commands is best effort.",
+    why=(
+        "A lost reading is followed by the next one; a lost command is never executed. The "
+        "'command' preset is reliable."
+    ),
+    bad="""\
+system: orders
+nodes:
+  planner:
+    publishers:
+      motor_commands: {type: geometry_msgs/msg/Twist, qos: sensor_data, external: true}
+""",
+    good="""\
+system: orders
+nodes:
+  planner:
+    publishers:
+      motor_commands: {type: geometry_msgs/msg/Twist, qos: command, external: true}
+""",
+)
+
+_COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")
+
+
+def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:
+    """Check the reliability of publishers whose topic name suggests commands."""
+    for node in context.system.nodes:
+        for port in node.ports_of(PortKind.PUBLISHER):
+            if not port.qos.known or port.qos.profile.reliability is Reliability.RELIABLE:
+                continue
+            if _COMMAND.search(port.full_name):
+                yield Diagnostic(
+                    UNRELIABLE_COMMAND,
+                    f"'{port.full_name}' carries commands, but is best effort and may lose them",
+                    port.qos.policy_span("reliability"),
+                    hint="use 'qos: command'",
+                )
+
+
+UNRELIABLE_STATE = info(
+    code="RC532",
+    name="unreliable-state",
+    summary="A publisher or subscription is transient local, but best effort.",
+    why=(
+        "Messages from before a subscription existed are sent to it as lost ones are: again. "
+        "Best effort sends nothing again, so late joiners do not get the last message. PX4 "
+        "uses both by convention, and a node that communicates with it may have to."
+    ),
+    bad="""\
+system: state
+nodes:
+  robot:
+    publishers:
+      mode:
+        type: std_msgs/msg/String
+        qos: {durability: transient_local, reliability: best_effort}
+        external: true
+""",
+    good="""\
+system: state
+nodes:
+  robot:
+    publishers:
+      mode:
+        type: std_msgs/msg/String
+        qos: {durability: transient_local, reliability: reliable}
+        external: true
+""",
+)
+
+
+def check_unreliable_state(context: Context) -> Iterator[Diagnostic]:
+    """Check the QoS that nodes set; a shared profile is reported once."""
+    for node in context.system.nodes:
+        if not node.implementation.declares_everything:
+            continue  # its QoS is only described
+        for port in node.ports:
+            qos = port.qos
+            if port.kind.channel is ChannelKind.TOPIC and qos.known and _is_lost(qos.profile):
+                yield Diagnostic(
+                    UNRELIABLE_STATE,
+                    "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
+                    qos.policy_span("reliability"),
+                    hint="use 'reliable' or 'volatile', unless an external node requires both",
+                )
+
+
+def _is_lost(profile: QosProfile) -> bool:
+    return (profile.durability, profile.reliability) == (
+        Durability.TRANSIENT_LOCAL,
+        Reliability.BEST_EFFORT,
+    )

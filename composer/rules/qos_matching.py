@@ -1,0 +1,297 @@
+"""Endpoints that do not match because of their QoS, and which of them is probably wrong."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import IntEnum
+from pathlib import Path
+
+from composer.analysis.context import Context, location
+from composer.analysis.formatting import listed, port_name
+from composer.diagnostics import Diagnostic, Label, error, warning
+from composer.fast_dataclass import dataclass
+from composer.model import Channel, ChannelKind, Node, Port, PortOfNode
+from composer.qos import Incompatibility, QosProfile, incompatibilities
+from composer.resources import nodes_folder
+from composer.source import Span
+
+_Groups = Mapping[QosProfile, list[PortOfNode]]
+
+
+class _Origin(IntEnum):
+    """The file that gives a port its QoS, nearest to the user first."""
+
+    SYSTEM = 0
+    INCLUDED = 1
+    NODE_TYPE = 2
+    BUILT_IN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class QosConflict:
+    """Endpoints with one profile that offer less than others request."""
+
+    problems: tuple[Incompatibility, ...]
+    offers: tuple[PortOfNode, ...]
+    requests: tuple[PortOfNode, ...]
+    is_offer_wrong: bool  # probably
+    place: Span  # where to change it
+
+    @property
+    def policy(self) -> str:
+        """The first policy that does not match."""
+        return self.problems[0].policy
+
+
+def qos_conflicts(context: Context, channel: Channel) -> Iterator[list[QosConflict]]:
+    """Yield the conflicts of a channel, those with the same cause together."""
+    if not (channel.sources and channel.sinks and _has_one_type(channel)):
+        return  # another rule reports different types
+    sources, sinks = _by_profile(channel.sources), _by_profile(channel.sinks)
+    yield from _direction(context, sources, sinks)
+    if channel.kind is not ChannelKind.TOPIC:
+        yield from _direction(context, sinks, sources)
+
+
+def _has_one_type(channel: Channel) -> bool:
+    return len({endpoint.port.interface.value for endpoint in channel.ends}) == 1
+
+
+def _by_profile(endpoints: Iterable[PortOfNode]) -> _Groups:
+    groups: dict[QosProfile, list[PortOfNode]] = defaultdict(list)
+    for endpoint in endpoints:
+        if endpoint.port.qos.known:
+            groups[endpoint.port.qos.profile].append(endpoint)
+    return groups
+
+
+def _direction(
+    context: Context, offering: _Groups, requesting: _Groups
+) -> Iterator[list[QosConflict]]:
+    for offered, offers in offering.items():
+        found = [
+            (problems, requests)
+            for requested, requests in requesting.items()
+            if (problems := tuple(incompatibilities(offered, requested)))
+        ]
+        all_requests = [endpoint for _, requests in found for endpoint in requests]
+        by_place: dict[tuple[str, int, int], list[QosConflict]] = defaultdict(list)
+        for problems, requests in found:
+            fits_others = len(found) < len(requesting)
+            is_offer = not (fits_others and _is_of_streams(problems)) and _is_offer_wrong(
+                context, problems, offers, all_requests
+            )
+            place = _place(context, (offers if is_offer else requests)[0], problems[0].policy)
+            conflict = QosConflict(problems, tuple(offers), tuple(requests), is_offer, place)
+            by_place[location(place)].append(conflict)
+        yield from by_place.values()
+
+
+def _is_of_streams(problems: Sequence[Incompatibility]) -> bool:
+    """Return whether both policies differ that distinguish a stream from a latched value."""
+    return {"durability", "reliability"} <= {item.policy for item in problems}
+
+
+def _is_offer_wrong(
+    context: Context,
+    problems: Sequence[Incompatibility],
+    offers: Sequence[PortOfNode],
+    requests: Sequence[PortOfNode],
+) -> bool:
+    """Return whether the offer is probably wrong, not the requests.
+
+    It is a guess: built-in types are not edited, several endpoints that agree are right more often
+    than one, the file of the system is nearer to what a user changes than a file that several
+    systems share, and transient-local is never requested by default.
+    """
+    policy = problems[0].policy
+    offer, request = (_origin(context, ends[0], policy) for ends in (offers, requests))
+    if _Origin.BUILT_IN in (offer, request):
+        return request is _Origin.BUILT_IN and offer is not _Origin.BUILT_IN
+    offered, requested = (
+        {location(end.port.qos.own_span(policy)) for end in ends} for ends in (offers, requests)
+    )
+    if min(len(offered), len(requested)) == 1 != max(len(offered), len(requested)):
+        return len(offered) == 1
+    if offer is not request:
+        return offer < request
+    return any(item.policy == "durability" for item in problems)
+
+
+def _origin(context: Context, endpoint: PortOfNode, policy: str) -> _Origin:
+    path = Path(endpoint.port.qos.own_span(policy).file.path)
+    if str(path) == context.system.source.path:
+        return _Origin.SYSTEM
+    resolved = path.resolve()
+    if resolved.parent == nodes_folder().resolve():
+        return _Origin.BUILT_IN
+    of_type = {file.resolve() for file in endpoint.node.type_files}
+    return _Origin.NODE_TYPE if resolved in of_type else _Origin.INCLUDED
+
+
+def _place(context: Context, endpoint: PortOfNode, policy: str) -> Span:
+    """Return where the QoS of a port is set; of a built-in type, where it is connected or used."""
+    if _origin(context, endpoint, policy) is not _Origin.BUILT_IN:
+        return endpoint.port.qos.own_span(policy)
+    name = f"{endpoint.node.name}.{endpoint.port.name}"
+    for connection in context.system.connections:
+        for end in connection.ends:
+            if end.text.value == name:
+                return end.text.span
+    return endpoint.node.name.span
+
+
+QOS_INCOMPATIBLE = error(
+    code="RC311",
+    name="qos-incompatible",
+    summary="One endpoint of a topic or service requests more than the other offers.",
+    why=(
+        "A subscription requests, a publisher offers, and they match only if the offer is at "
+        "least as strong as the request: a best-effort publisher never reaches a reliable "
+        "subscription, while a reliable publisher does reach a best-effort one. Requests and "
+        "responses of services follow the same rule in both directions. Endpoints that do not "
+        "match exchange no data, and ROS logs a warning at most."
+    ),
+    bad="""\
+system: quality
+nodes:
+  lidar:
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+  mapper:
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: command}}
+""",
+    good="""\
+system: quality
+nodes:
+  lidar:
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+  mapper:
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+""",
+)
+
+#: Maximum number of further endpoints to show for one problem.
+_SHOWN_ENDPOINTS = 3
+
+
+def check_qos_incompatible(context: Context) -> Iterator[Diagnostic]:
+    """Compare the profiles on every channel, and report each cause once."""
+    for channel in context.all_channels:
+        for conflicts in qos_conflicts(context, channel):
+            yield _incompatible(channel, conflicts)
+
+
+def _incompatible(channel: Channel, conflicts: list[QosConflict]) -> Diagnostic:
+    first = conflicts[0]
+    offer, request = first.offers[0], first.requests[0]
+    wrong, other = (offer, request) if first.is_offer_wrong else (request, offer)
+    verbs = ("offers", "requests") if first.is_offer_wrong else ("requests", "offers")
+    pairs = [(item.policy, item.offered, item.requested) for item in first.problems]
+    if not first.is_offer_wrong:
+        pairs = [(policy, requested, offered) for policy, offered, requested in pairs]
+    message = (
+        f"{wrong.port.kind} '{port_name(wrong)}' {verbs[0]} "
+        f"{' and '.join(f'{policy} {value}' for policy, value, _ in pairs)} "
+        f"on '{channel.name}', but {other.port.kind} '{port_name(other)}' {verbs[1]} "
+        f"{' and '.join(value for _, _, value in pairs)}"
+    )
+    hints = (f"offer {item.requested}, or request {item.offered}" for item in first.problems)
+    labels = [label for conflict in conflicts for label in _labels(conflict)]
+    return Diagnostic(QOS_INCOMPATIBLE, message, first.place, tuple(labels), "; ".join(hints))
+
+
+def _labels(conflict: QosConflict) -> Iterator[Label]:
+    """Yield the other endpoints of a conflict, and where a shared profile sets the policy."""
+    policy, problem = conflict.policy, conflict.problems[0]
+    wrong = (conflict.offers if conflict.is_offer_wrong else conflict.requests)[0]
+    for verb, value, endpoints in (
+        ("offers", problem.offered, conflict.offers),
+        ("requests", problem.requested, conflict.requests),
+    ):
+        is_wrong = wrong is endpoints[0]
+        shown = (
+            endpoints[1 : 1 + _SHOWN_ENDPOINTS] if is_wrong else endpoints[: 1 + _SHOWN_ENDPOINTS]
+        )
+        for endpoint in shown:
+            text = f"{endpoint.port.kind} '{port_name(endpoint)}' {verb} {value}"
+            too = " too" if is_wrong else ""
+            yield Label(endpoint.port.qos.own_span(policy), f"{text}{too}")
+    shared = wrong.port.qos.policy_span(policy)
+    if location(shared) != location(wrong.port.qos.own_span(policy)):
+        yield Label(shared, f"{policy} is set here")
+
+
+OUTSIDE_QOS = warning(
+    code="RC531",
+    name="outside-qos",
+    summary="A connection sets another QoS than a port of a program or external node declares.",
+    why=(
+        "The composer cannot set the QoS of nodes outside its process. They keep their own, so "
+        "the other ports of the connection may not match them."
+    ),
+    bad="""\
+system: lidar
+nodes:
+  lidar:
+    external: true
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+  mapper:
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, log: received}}
+connections:
+  - {topic: /scan, from: lidar.scan, to: mapper.scan, qos: command}
+""",
+    good="""\
+system: lidar
+nodes:
+  lidar:
+    external: true
+    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
+  mapper:
+    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: command, log: received}}
+connections:
+  - {topic: /scan, from: lidar.scan, to: mapper.scan, qos: sensor_data}
+""",
+)
+
+#: The policies that decide whether two endpoints match.
+_POLICIES = (
+    "reliability",
+    "durability",
+    "deadline_ms",
+    "liveliness",
+    "liveliness_lease_duration_ms",
+)
+
+
+def check_outside_qos(context: Context) -> Iterator[Diagnostic]:
+    """Compare the QoS of connections with that of ports outside the process."""
+    reported: set[Span] = set()
+    for node in context.system.nodes:
+        if node.implementation.in_process:
+            continue
+        for port in node.ports:
+            if port.kind.channel is ChannelKind.TOPIC and port.qos.span not in reported:
+                found = list(_own_qos(node, port))
+                reported.update(item.primary for item in found)
+                yield from found
+
+
+def _own_qos(node: Node, port: Port) -> Iterator[Diagnostic]:
+    declared = port.declared_qos
+    if declared is None or not (declared.explicit and declared.known and port.qos.known):
+        return
+    different = _different_policies(declared.profile, port.qos.profile)
+    if different:
+        yield Diagnostic(
+            OUTSIDE_QOS,
+            f"'{node.name}.{port.name}' keeps its own {listed(different)}: "
+            f"the node runs outside the process",
+            port.qos.span,
+            (Label(declared.span, "its own QoS"),),
+            "use the QoS of that port for the connection",
+        )
+
+
+def _different_policies(first: QosProfile, second: QosProfile) -> tuple[str, ...]:
+    return tuple(name for name in _POLICIES if getattr(first, name) != getattr(second, name))

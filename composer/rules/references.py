@@ -1,0 +1,414 @@
+"""The ports and nodes that connections, chains, reactions and dependencies name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.analysis.context import Context, is_unresolved, location
+from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
+from composer.analysis.expressions import sends
+from composer.analysis.formatting import a, either
+from composer.analysis.spans import part_of
+from composer.diagnostics import Diagnostic, Label, error, suggestion
+from composer.fast_dataclass import dataclass
+from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
+
+
+def endpoints(system: System) -> Iterator[Endpoint]:
+    """Yield the ports that connections and chains refer to."""
+    for connection in system.connections:
+        yield from connection.sources
+        yield from connection.sinks
+    for chain in system.chains:
+        yield from chain.through
+
+
+UNKNOWN_NODE = error(
+    code="RC202",
+    name="unknown-node",
+    summary="A connection, a dependency or --set names a node that is not in this system.",
+    why="The connection would have no effect, and the dependency could never be met.",
+    bad="""\
+system: dependency
+nodes:
+  planner: {on_activate: {log: ready}}
+  motor_controller: {lifecycle: {depends_on: [planer]}}
+""",
+    good="""\
+system: dependency
+nodes:
+  planner: {on_activate: {log: ready}}
+  motor_controller: {lifecycle: {depends_on: [planner]}}
+""",
+)
+
+
+def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
+    """Check the endpoints of connections, the dependencies of nodes, and the command line."""
+    if context.is_partial:
+        return
+    for endpoint in endpoints(context.system):
+        yield from _node_of_endpoint(context, endpoint)
+    for node in context.system.nodes:
+        yield from _unknown_dependencies(context, node)
+    for unknown in context.system.unknown:
+        yield Diagnostic(
+            UNKNOWN_NODE,
+            f"'{unknown.name}' is not a node of this system",
+            unknown.name.span,
+            hint=suggestion(unknown.name.value, unknown.known),
+        )
+
+
+def _node_of_endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
+    name = endpoint.node
+    if is_unresolved(endpoint.text.value) or context.system.node(name) is not None:
+        return
+    if not name:
+        message = f"'{endpoint.text}' is not of the form 'node.port'"
+        yield Diagnostic(UNKNOWN_NODE, message, endpoint.text.span)
+        return
+    yield Diagnostic(
+        UNKNOWN_NODE,
+        f"'{endpoint.text}' names node '{name}', which is not a node of this system",
+        part_of(endpoint.text, 0, len(name)),
+        hint=suggestion(name, context.once(_node_names)),
+    )
+
+
+def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
+    for dependency in node.depends_on:
+        name = dependency.node
+        if is_unresolved(name.value) or context.system.node(name.value) is not None:
+            continue
+        yield Diagnostic(
+            UNKNOWN_NODE,
+            f"node '{node.name}' depends on '{name}', which is not a node of this system",
+            name.span,
+            hint=suggestion(name.value, context.once(_node_names)),
+        )
+
+
+def _node_names(context: Context) -> tuple[str, ...]:
+    return tuple(node.name.value for node in context.system.nodes)
+
+
+UNKNOWN_PORT = error(
+    code="RC203",
+    name="unknown-port",
+    summary="A connection, a reaction or a node with a type names a port that does not exist.",
+    why="No data would flow: a port must be declared by the node or by its type.",
+    bad="""\
+system: ports
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+    timers: {tick: {period_ms: 1000, publish: {chattter: {data: hello}}}}
+""",
+    good="""\
+system: ports
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
+    timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
+""",
+)
+
+_PORT_SECTIONS = frozenset(kind.section for kind in PortKind)
+_SENDERS = {
+    "publish": (PortKind.PUBLISHER,),
+    "call": (PortKind.CLIENT, PortKind.ACTION_CLIENT),
+}
+
+
+def check_unknown_port(context: Context) -> Iterator[Diagnostic]:
+    """Check the ports that connections, chains, reactions and overrides refer to."""
+    errors = context.once(earlier_errors)
+    for endpoint in endpoints(context.system):
+        if not errors.may_declare(endpoint.node, *PORT_SECTIONS):
+            yield from _port_of_endpoint(context, endpoint)
+    for site, key, send in sends(context.system):
+        name = send.port
+        if not site.node.complete or is_unresolved(name.value):
+            continue
+        if errors.may_declare(site.node.name.value, *PORT_SECTIONS):
+            continue
+        if site.node.port(name.value) is not None:
+            continue
+        candidates = [port.name.value for port in site.node.ports_of(*_SENDERS[key])]
+        yield Diagnostic(
+            UNKNOWN_PORT,
+            f"'{key}' names port '{name}', which the node does not have",
+            name.span,
+            hint=suggestion(name.value, candidates),
+        )
+    for node in context.system.nodes:
+        yield from _overridden_ports(node)
+
+
+def _port_of_endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
+    node = context.system.node(endpoint.node)
+    if node is None or not node.complete or node.port(endpoint.port) is not None:
+        return
+    name = endpoint.port
+    if is_unresolved(endpoint.text.value):
+        return
+    yield Diagnostic(
+        UNKNOWN_PORT,
+        f"node '{node.name}' has no port '{name}'",
+        part_of(endpoint.text, len(endpoint.node) + 1, len(name)),
+        hint=suggestion(name, [port.name.value for port in node.ports]),
+    )
+
+
+def _overridden_ports(node: Node) -> Iterator[Diagnostic]:
+    for unknown in node.unknown:
+        if unknown.section not in _PORT_SECTIONS:
+            continue
+        name = unknown.name
+        other = node.port(name.value)
+        hint = (
+            f"'{name}' is declared under '{other.kind.section}'"
+            if other is not None
+            else suggestion(name.value, unknown.known)
+        )
+        yield Diagnostic(
+            UNKNOWN_PORT,
+            f"node type '{node.type_name}' has no port '{name}' under '{unknown.section}'",
+            name.span,
+            hint=hint,
+        )
+
+
+PORT_CONNECTED_TWICE = error(
+    code="RC212",
+    name="port-connected-twice",
+    summary="A port is twice in a connection, or in two with different names or QoS profiles.",
+    why=(
+        "A port has one name and one QoS profile in ROS, so one of the connections would have "
+        "no effect."
+    ),
+    bad="""\
+system: split
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  left:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+  right:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /left/chatter, from: talker.chatter, to: left.chatter}
+  - {topic: /right/chatter, from: talker.chatter, to: right.chatter}
+""",
+    good="""\
+system: split
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  left:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+  right:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: [left.chatter, right.chatter]}
+""",
+)
+
+
+def check_port_connected_twice(context: Context) -> Iterator[Diagnostic]:
+    """Compare each later connection of a port with its first one."""
+    first: dict[str, tuple[Connection, Endpoint]] = {}
+    reported: set[tuple[str, int, int]] = set()  # a pattern stands for several ports
+    for connection in context.system.connections:
+        for endpoint in connection.ends:
+            if context.system.port(endpoint) is None or is_unresolved(endpoint.text.value):
+                continue
+            if is_unresolved(connection.name.value):
+                continue
+            earlier, place = first.setdefault(endpoint.text.value, (connection, endpoint))
+            difference = _difference(earlier, connection)
+            later = location(endpoint.text.span)
+            if place is not endpoint and _is_named_twice(place, endpoint, connection):
+                yield Diagnostic(
+                    PORT_CONNECTED_TWICE,
+                    f"port '{endpoint.text}' is named twice",
+                    endpoint.text.span,
+                    (Label(place.text.span, "here too"),),
+                    "did you mean another port?",
+                )
+            elif difference is not None and later not in reported:
+                reported.add(later)
+                yield Diagnostic(
+                    PORT_CONNECTED_TWICE,
+                    f"port '{endpoint.text}' is connected twice, with {difference}",
+                    endpoint.text.span,
+                    (Label(place.text.span, f"connected to '{earlier.name}' here"),),
+                    "put all ports that share a name into one connection",
+                )
+
+
+def _is_named_twice(first: Endpoint, second: Endpoint, connection: Connection) -> bool:
+    """Return whether one connection names a port twice, both times without a pattern."""
+    written = {first.text.span.text, second.text.span.text}
+    is_within = any(end is first for end in connection.ends)
+    is_elsewhere = location(first.text.span) != location(second.text.span)
+    return is_within and is_elsewhere and written == {second.text.value}
+
+
+def _difference(earlier: Connection, later: Connection) -> str | None:
+    if earlier.kind is not later.kind:
+        return None  # the wrong kind of port is reported by another rule
+    if earlier.name.value.lstrip("/") != later.name.value.lstrip("/"):
+        return f"the names '{earlier.name}' and '{later.name}'"
+    if earlier.qos is not None and later.qos is not None and earlier.qos != later.qos:
+        return f"the QoS profiles '{earlier.qos}' and '{later.qos}'"
+    return None
+
+
+WRONG_PORT_KIND = error(
+    code="RC211",
+    name="wrong-port-kind",
+    summary="A port is used where a port of another kind is required.",
+    why=(
+        "Messages go from publishers to subscriptions, requests from clients to services. In "
+        "the other direction, no data can flow."
+    ),
+    bad="""\
+system: swapped
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: talker.chatter}
+""",
+    good="""\
+system: swapped
+nodes:
+  talker:
+    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
+  listener:
+    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
+connections:
+  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
+""",
+)
+
+#: For each kind of channel, the keys of a connection and the kinds of port they accept.
+_ENDS = {
+    ChannelKind.TOPIC: (("from", PortKind.PUBLISHER), ("to", PortKind.SUBSCRIPTION)),
+    ChannelKind.SERVICE: (("server", PortKind.SERVICE), ("clients", PortKind.CLIENT)),
+    ChannelKind.ACTION: (("server", PortKind.ACTION_SERVER), ("clients", PortKind.ACTION_CLIENT)),
+}
+
+
+def check_wrong_port_kind(context: Context) -> Iterator[Diagnostic]:
+    """Check the endpoints of connections and the ports that reactions send through."""
+    for connection in context.system.connections:
+        yield from _wrong_ports_of_connection(context, connection)
+    for chain in context.system.chains:
+        yield from _wrong_ports_of_chain(context, chain)
+    for site, key, send in sends(context.system):
+        port = site.node.port(send.port.value)
+        allowed = _SENDERS[key]
+        if port is not None and port.kind not in allowed:
+            yield Diagnostic(
+                WRONG_PORT_KIND,
+                f"'{key}' needs {either(allowed)}, but '{port.name}' is {a(port.kind)}",
+                send.port.span,
+                (Label(port.name.span, f"declared as {a(port.kind)}"),),
+                _sending_hint(port.kind),
+            )
+
+
+def _wrong_ports_of_chain(context: Context, chain: Chain) -> Iterator[Diagnostic]:
+    for endpoint in chain.through:
+        port = context.system.port(endpoint)
+        if port is not None and port.kind is not PortKind.PUBLISHER:
+            yield Diagnostic(
+                WRONG_PORT_KIND,
+                f"chain '{chain.name}' consists of publishers, but '{endpoint.text}' "
+                f"is {a(port.kind)}",
+                endpoint.text.span,
+                (Label(port.name.span, f"declared as {a(port.kind)}"),),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class _Slot:
+    """An endpoint of a connection: its key, the kind of port it requires, and the actual port."""
+
+    endpoint: Endpoint
+    key: str
+    expected: PortKind
+    port: Port
+
+    @property
+    def label(self) -> Label:
+        return Label(self.port.name.span, f"'{self.endpoint.text}' is {a(self.port.kind)}")
+
+
+def _wrong_ports_of_connection(context: Context, connection: Connection) -> Iterator[Diagnostic]:
+    slots = list(_slots(context, connection))
+    wrong = [slot for slot in slots if slot.port.kind is not slot.expected]
+    kinds = {slot.port.kind.channel for slot in wrong}
+    if len(wrong) > 1 and len(wrong) == len(slots) and len(kinds) == 1:
+        yield _all_wrong(connection, wrong, kinds.pop())
+        return
+    for slot in wrong:
+        actual = slot.port.kind
+        yield Diagnostic(
+            WRONG_PORT_KIND,
+            f"'{slot.key}' of {connection.kind} '{connection.name}' needs {a(slot.expected)}, "
+            f"but '{slot.endpoint.text}' is {a(actual)}",
+            slot.endpoint.text.span,
+            (Label(slot.port.name.span, f"declared as {a(actual)}"),),
+            _belongs(connection, actual),
+        )
+
+
+def _slots(context: Context, connection: Connection) -> Iterator[_Slot]:
+    groups = (connection.sources, connection.sinks)
+    for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
+        for endpoint in endpoints:
+            port = context.system.port(endpoint)
+            if port is not None:
+                yield _Slot(endpoint, key, kind, port)
+
+
+def _all_wrong(connection: Connection, slots: list[_Slot], kind: ChannelKind) -> Diagnostic:
+    """Report one diagnostic for a connection whose endpoints are all wrong."""
+    (source_key, _), (sink_key, _) = _ENDS[connection.kind]
+    if kind is connection.kind:
+        message = f"the endpoints of {kind} '{connection.name}' are swapped"
+        hint = f"swap '{source_key}' and '{sink_key}'"
+    else:
+        message = (
+            f"'{connection.name}' connects the endpoints of {_channel_with_article(kind)}, "
+            f"not of {_channel_with_article(connection.kind)}"
+        )
+        (source_key, _), (sink_key, _) = _ENDS[kind]
+        hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
+    labels = tuple(slot.label for slot in slots)
+    return Diagnostic(WRONG_PORT_KIND, message, connection.span, labels, hint)
+
+
+def _belongs(connection: Connection, actual: PortKind) -> str:
+    if actual.channel is connection.kind:
+        other = next(key for key, kind in _ENDS[connection.kind] if kind is actual)
+        return f"{a(actual)} belongs under '{other}'"
+    return f"{a(actual)} belongs in a connection that starts with '{actual.channel}:'"
+
+
+def _channel_with_article(kind: ChannelKind) -> str:
+    return f"{'an' if kind.value.startswith('a') else 'a'} {kind}"
+
+
+def _sending_hint(kind: PortKind) -> str | None:
+    if kind is PortKind.PUBLISHER:
+        return "use 'publish' to send a message"
+    if kind in {PortKind.CLIENT, PortKind.ACTION_CLIENT}:
+        return "use 'call' to send a request or a goal"
+    return None

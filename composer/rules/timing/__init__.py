@@ -1,1 +1,0 @@
-"""Periods, latencies, and the load of executors."""
