@@ -143,8 +143,9 @@ def _reachable(
     """Return the goals without those that would activate a node before what it depends on.
 
     A dependency that a user keeps down takes no node down, but no node is activated without it, nor
-    before one without a state, which is in a transition or has failed. A node whose failure is
-    ignored is not brought up again.
+    before one without a state, which is in a transition or has failed. A class is not configured
+    either, because its constructor may wait for the dependency. A node whose failure is ignored is
+    not brought up again.
     """
     reachable = dict(desired_states(system, desired))
     for name, needs in _needs(system, desired):
@@ -153,10 +154,14 @@ def _reachable(
             continue
         if name in desired.ignored:
             reachable[name] = min(reachable.get(name, states[name]), states[name], key=rank)
-        if reachable.get(name) is PrimaryState.ACTIVE and any(
+        if name in reachable and any(
             rank(reachable.get(edge.on, edge.state)) < rank(edge.state) for edge in needs
         ):
-            reachable[name] = max(states[name], PrimaryState.INACTIVE, key=rank)
+            node = system.node(name)
+            is_class = node is not None and node.hosted_class is not None
+            limit = PrimaryState.UNCONFIGURED if is_class else PrimaryState.INACTIVE
+            limit = max(states[name], limit, key=rank)
+            reachable[name] = min(reachable[name], limit, key=rank)
     return reachable
 
 

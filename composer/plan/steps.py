@@ -20,9 +20,9 @@ _UPWARD = ("configure", "activate")
 class Step:
     """One transition of one node. ``number`` counts from 1; ``node`` is its key in the system.
 
-    ``after`` are the numbers of the steps of the same phase that have to finish first. Without
-    ``is_awaited``, only these nodes wait for the step: its node is not required, or something
-    outside the system has to happen for it.
+    ``after`` are the numbers of the steps that have to finish first: of the same phase, or of
+    earlier ones if its node is a class. Without ``is_awaited``, only these nodes wait for the step:
+    its node is not required, or something outside the system has to happen for it.
     """
 
     number: int
@@ -91,8 +91,12 @@ class Phase:
 
 
 def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
-    """Return the numbered steps of the phases, without waits for nodes that come later."""
+    """Return the numbered steps of the phases, without waits for nodes that come later.
+
+    Nodes that are configured after others are active wait for these.
+    """
     steps: list[Step] = []
+    latest: dict[str, int] = {}
     for phase in phases:
         numbers: dict[str, int] = {}
         needed: dict[str, list[str]] = {}
@@ -100,7 +104,9 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
             needed.setdefault(waiting, []).append(other)
         for node in phase.nodes:
             name = node.name.value
-            after = {numbers[other] for other in needed.get(name, ()) if other in numbers}
+            earlier = latest if phase.transition == "configure" else {}
+            numbered = (numbers.get(other, earlier.get(other)) for other in needed.get(name, ()))
+            after = {number for number in numbered if number is not None}
             numbers[name] = len(steps) + 1
             steps.append(
                 Step(
@@ -113,18 +119,19 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
                     _is_awaited(phase.transition, node),
                 )
             )
+        latest |= numbers
     return Plan(tuple(steps))
 
 
 def _is_awaited(transition: TransitionName, node: Node) -> bool:
     """Return whether a plan waits for a transition.
 
-    External nodes have to appear. An executable has to create its ports once it is active.
+    External nodes have to appear, executables of this process have to start.
     """
     if transition not in _UPWARD:
         return True
-    is_started = node.executable is not None and node.process is None and transition == "activate"
-    return node.required and node.external is None and not is_started
+    is_started_here = node.executable is not None and node.process is None
+    return node.required and node.external is None and not is_started_here
 
 
 def upward(edges: Iterable[DependencyEdge], state: PrimaryState) -> Iterable[tuple[str, str]]:

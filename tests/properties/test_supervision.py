@@ -55,7 +55,7 @@ nodes:
   camera: {lifecycle: {on_failure: ignore}}
   viewer: {lifecycle: {depends_on: [camera], on_failure: isolate}}
   operator: {external: true, required: false, lifecycle: {on_failure: shutdown}}
-  teleop: {lifecycle: {depends_on: [operator]}}
+  teleop: {class: "teleop:Teleop", lifecycle: {depends_on: [operator]}}
 """
 #: The nodes, and those that depend on them.
 DEPENDENTS = {
@@ -246,6 +246,8 @@ class World:
 
     def on_step(self, name: str, transition: str) -> None:
         assert name in self.may_move, f"'{transition}' of {name} undoes an external transition"
+        if transition == "configure" and name == "teleop":  # a class, which is constructed now
+            assert not self.nodes[EXTERNAL].is_absent
         if transition == "activate":  # what follows a failure is decided before
             edges = [edge for edge in dependency_edges(SYSTEM) if edge.node == name]
             missing = [edge.on for edge in edges if edge.on in self.broken]

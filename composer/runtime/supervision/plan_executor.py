@@ -108,16 +108,17 @@ class _Phase:
 
     ``processes`` are the other processes of the system, by the nodes that they run. ``done`` are
     the numbers of steps that nothing waits for any more, ``unreached`` of those upward steps among
-    them after which the node is not where others need it. ``ended`` are the numbers of steps that
-    have ended by themselves; until ``check_s``, no other one has to be looked at.
+    them after which the node is not where others need it. All phases of a plan share both.
+    ``ended`` are the numbers of steps that have ended by themselves; until ``check_s``, no other
+    one has to be looked at.
     """
 
     waiting: deque[Step]
     options: ExecutionOptions
     processes: Mapping[str, str]
-    running: dict[int, _RunningStep] = field(default_factory=dict)
     done: set[int] = field(default_factory=set)
     unreached: set[int] = field(default_factory=set)
+    running: dict[int, _RunningStep] = field(default_factory=dict)
     failures: list[StepFailed] = field(default_factory=list)
     ended: deque[int] = field(default_factory=deque)
     check_s: float = math.inf
@@ -213,8 +214,10 @@ class PlanExecutor:
         """Run the steps of a plan; return the failed ones, in the order in which they ended."""
         options = options or ExecutionOptions()
         failures: list[StepFailed] = []
+        done: set[int] = set()
+        unreached: set[int] = set()
         for steps in plan.phases:
-            phase = _Phase(deque(steps), options, self._node_set.process_of)
+            phase = _Phase(deque(steps), options, self._node_set.process_of, done, unreached)
             self._execute(phase)
             options = phase.options  # the time limit may have moved
             failures += phase.failures

@@ -242,6 +242,33 @@ def test_failed_starts_are_rolled_back(
     assert not system.reported(BroughtUp)
 
 
+def test_a_program_that_hangs_in_its_configuration_holds_up_only_its_dependents(
+    tmp_path: Path,
+) -> None:
+    text = f"""
+system: robot
+nodes:
+  driver:
+    executable: {{command: {MANAGED}, lifecycle: managed, sigterm_timeout_ms: 100}}
+    parameters: {{refuse: hang in configure}}
+    required: false
+    lifecycle: {{timeout_ms: 1500}}
+  base: {{}}
+  user: {{lifecycle: {{depends_on: [driver]}}}}
+  viewer: {{class: "viewer:Viewer", lifecycle: {{depends_on: [driver]}}}}
+"""
+    with running(text, tmp_path, viewer="") as system:
+        assert [str(event) for event in system.reported(StateChanged)] == [
+            "/base inactive",
+            "/base active",
+        ]
+        failed = wait_for_failure(system, "/driver")
+        assert "within 1.5 s; its process was ended" in failed.reason
+        wait_until(lambda: system.node("user").state == "inactive", "the configuration")
+        assert system.node("viewer").state == "unconfigured"
+        assert system.stop().exit_code == 0
+
+
 def test_a_task_is_done_before_its_dependents_start(tmp_path: Path) -> None:
     text = """
 system: robot

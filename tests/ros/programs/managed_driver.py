@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import time
 from typing import Any
 
 import rclpy
@@ -34,6 +35,8 @@ class ManagedDriver(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def answer(self, transition: str) -> TransitionCallbackReturn:
+        if self.get_parameter("refuse").value == f"hang in {transition}":
+            time.sleep(60.0)
         if self.get_parameter("refuse").value == transition:
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS

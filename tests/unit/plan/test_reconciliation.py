@@ -132,6 +132,28 @@ def test_no_node_is_activated_before_a_dependency_that_a_user_deactivated() -> N
     ]
 
 
+@pytest.mark.parametrize(
+    ("here", "steps"),
+    [("ui", []), ("uu", []), ("au", ["configure viewer", "activate viewer"])],
+)
+def test_a_class_is_not_configured_before_what_it_depends_on(here: str, steps: list[str]) -> None:
+    system = system_of(
+        """
+        system: robot
+        nodes:
+          sensor: {}
+          viewer: {class: "viewer:Viewer", lifecycle: {depends_on: [sensor]}}
+        """
+    )
+    names = ("sensor", "viewer")
+    desired = DesiredState(dict.fromkeys(names, ACTIVE)).fail(fault("sensor"))
+    at = {name: LETTERS[letter] for name, letter in zip(names, here, strict=True)}
+    if at["sensor"] is ACTIVE:
+        desired = desired.release("sensor")
+    plan = reconcile(system, desired, at, "")
+    assert [f"{step.transition} {step.node}" for step in plan.steps] == steps
+
+
 def test_a_second_fault_of_a_failed_node_is_ignored() -> None:
     desired = DesiredState(states("aaaaa")).fail(fault("sensor"))
     assert decide(robot(), desired, fault("sensor"), NOW_S) is None

@@ -110,3 +110,6 @@ def test_a_class_is_configured_once_what_it_depends_on_is_active() -> None:
         "configure ['planner', 'logger']",
         "activate ['planner', 'logger']",
     ]
+    waits = {f"{step.transition} {step.node}": step.after for step in plan.steps}
+    activated = {step.node: step.number for step in plan.steps if step.transition == "activate"}
+    assert waits["configure planner"] == (activated["filter"],)
