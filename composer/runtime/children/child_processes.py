@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import selectors
+import shutil
 import signal
 import socket
 import subprocess
@@ -27,6 +28,7 @@ _READ_BYTES = 65_536
 #: How long the launcher may take to kill what is left, on a busy machine.
 _LAUNCHER_ENDS_WITHIN_S = 2.0
 _POLL_S = 0.005
+_ROUNDS = 100
 
 
 class StartFailed(Exception):
@@ -172,7 +174,7 @@ class ChildProcesses:
         try:
             running.wait(_LAUNCHER_ENDS_WITHIN_S)
         except subprocess.TimeoutExpired:
-            running.kill()  # Linux kills its children
+            running.kill()  # the thread removes what is left
 
     def _start_launcher(self) -> Path:
         folder = Path(tempfile.mkdtemp(prefix="compose-"))
@@ -188,13 +190,15 @@ class ChildProcesses:
                 ],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
+                # It outlives a killed parent of its own: it has something to end.
+                env={name: text for name, text in os.environ.items() if name != launcher.MARK},
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,  # Ctrl-C is for the composer
             )
         self._connection = ours
         self._selector.register(ours, selectors.EVENT_READ, None)
         self._thread = threading.Thread(
-            target=self._run, args=(ours,), name="child processes", daemon=True
+            target=self._run, args=(ours, folder), name="child processes", daemon=True
         )
         self._thread.start()
         return folder
@@ -210,7 +214,7 @@ class ChildProcesses:
 
     # --- on the thread
 
-    def _run(self, connection: socket.socket) -> None:
+    def _run(self, connection: socket.socket, folder: Path) -> None:
         is_open = True
         while is_open:
             for key, _ in self._selector.select():
@@ -218,7 +222,7 @@ class ChildProcesses:
                     is_open = self._receive(connection)
                 else:
                     self._read(key.data, key.fd)
-        self._on_launcher_ended(connection)
+        self._on_launcher_ended(connection, folder)
 
     def _receive(self, connection: socket.socket) -> bool:
         """Handle a report of the launcher; return false once it has ended."""
@@ -271,12 +275,16 @@ class ChildProcesses:
         else:
             child.ended.set_result(status)
 
-    def _on_launcher_ended(self, connection: socket.socket) -> None:
-        """Forget a launcher that was killed: Linux has killed its children."""
+    def _on_launcher_ended(self, connection: socket.socket, folder: Path) -> None:
+        """Forget a launcher that has ended. If it was killed, Linux has killed its children."""
         self._selector.unregister(connection)
+        if folder.exists():  # else it has removed it, after everything else
+            kill_descendants(folder)
+            shutil.rmtree(folder, ignore_errors=True)
         with self._lock:
-            if self._connection is connection:
+            if self._connection is connection and self._launcher is not None:
                 connection.close()
+                self._launcher.wait()
                 self._connection = self._launcher = self._folder = None
         for child in tuple(self._children.values()):
             pid = child.pid
@@ -284,6 +292,36 @@ class ChildProcesses:
                 self._finish(child, None, "the launcher of child processes has ended")
             else:
                 self._finish(child, -9)
+
+
+def kill_descendants(folder: Path) -> None:
+    """Kill the processes that a killed launcher, or what it has started, has left behind.
+
+    ``folder`` is the folder of the launcher, which they have in their environments.
+    """
+    mark = f"{launcher.MARK}={folder}".encode()
+    for _ in range(_ROUNDS):  # they may start others in the meantime
+        processes = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+        killed = [_kill_if_marked(entry, mark) for entry in processes]
+        if not any(killed):
+            return
+
+
+def _kill_if_marked(entry: Path, mark: bytes) -> bool:
+    """Kill the process of an entry of /proc with ``mark`` in its environment; say if it had it."""
+    try:
+        process = os.pidfd_open(int(entry.name))  # its number may be reused once it has ended
+    except OSError:
+        return False
+    try:
+        if mark not in (entry / "environ").read_bytes().split(b"\0"):
+            return False
+        signal.pidfd_send_signal(process, signal.SIGKILL)
+    except OSError:  # it has ended, or belongs to another user
+        return False
+    finally:
+        os.close(process)
+    return True
 
 
 def _call(on_line: Callable[[str, bool], None], is_error: bool, text: str) -> None:

@@ -7,7 +7,8 @@ the composer itself:
 - However the composer ends, ``kill -9`` included, the socket closes, and the launcher ends every
   child in order: SIGINT, SIGTERM, SIGKILL, each to the whole process group.
 - If the launcher itself is killed, Linux kills the children (PR_SET_PDEATHSIG). This is bound to
-  the thread that starts a child; the launcher has only one.
+  the thread that starts a child; the launcher has only one. The composer kills their descendants:
+  MARK in their environment names the folder of the launcher.
 - Forking a process with many threads is not safe if anything happens between fork and exec.
 - Grandchildren that outlive their parent become children of the launcher (a child subreaper).
 
@@ -38,6 +39,8 @@ from types import FrameType
 from typing import Any
 
 MAX_PACKET = 200_000
+#: The environment variable by which the descendants of a killed launcher are found.
+MARK = "COMPOSE_LAUNCHER"
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _LIBC = ctypes.CDLL(None)
@@ -79,8 +82,9 @@ class _Child:
 class Launcher:
     """Serves the requests of one composer until its socket closes and all children have ended."""
 
-    def __init__(self, connection: socket.socket) -> None:
+    def __init__(self, connection: socket.socket, folder: str) -> None:
         self._connection = connection
+        self._folder = folder
         self._children: dict[int, _Child] = {}
         self._is_orphan = False
         self._wakeup, wakeup = socket.socketpair()
@@ -149,7 +153,7 @@ class Launcher:
         try:
             process = subprocess.Popen(  # noqa: S603  (what the user declares; one thread)
                 request["command"],
-                env={**os.environ, **request["environment"]},
+                env={**os.environ, **request["environment"], MARK: self._folder},
                 cwd=request["folder"],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -224,7 +228,7 @@ def main() -> None:
     connection = socket.socket(fileno=int(sys.argv[1]))
     connection.set_inheritable(False)
     try:
-        Launcher(connection).run()
+        Launcher(connection, sys.argv[2]).run()
     finally:
         shutil.rmtree(sys.argv[2], ignore_errors=True)
 

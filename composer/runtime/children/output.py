@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from composer.model import LogLevel
 
@@ -83,3 +83,20 @@ def parse_line(text: str, *, is_error: bool) -> tuple[LogLevel, str | None, str]
         return LogLevel.WARN if is_error else LogLevel.INFO, None, text
     severity, logger, message = found.groups()
     return LogLevel(severity.lower()), logger, message
+
+
+def attribute_line(
+    text: str, loggers: Sequence[str], *, is_error: bool
+) -> tuple[LogLevel, str, str]:
+    """Return the level, the logger and the message of a line of a process.
+
+    ``loggers`` are the names that the process may log with, and the parents of others; the first
+    one is for lines without a logger. A program can print the name of any logger, so a line with
+    another name has the first logger, and shows that name in its message.
+    """
+    level, logger, message = parse_line(text, is_error=is_error)
+    if logger is None:
+        return level, loggers[0], message
+    if logger in loggers or logger.startswith(tuple(f"{name}." for name in loggers)):
+        return level, logger, message
+    return level, loggers[0], f"[{logger}] {message}"

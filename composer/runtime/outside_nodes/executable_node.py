@@ -19,7 +19,7 @@ from composer.model import Executable, ExecutableKind, LifecycleKind, LogLevel, 
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
-from composer.runtime.children.output import parse_line
+from composer.runtime.children.output import attribute_line
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.outside_nodes.outside_node import (
     INACTIVE,
@@ -268,9 +268,9 @@ class ExecutableNode(OutsideNode):
             self._on_process_end(self._child)
 
     def _log(self, text: str, is_error: bool) -> None:
-        level, logger, message = parse_line(text, is_error=is_error)
+        level, logger, message = attribute_line(text, (self._logger,), is_error=is_error)
         if severity(level) >= severity(self._log_level):
-            self._listener.write_log(level, logger or self._logger, printable(message))
+            self._listener.write_log(level, logger, printable(message))
 
 
 def _status(child: Child) -> int | None:

@@ -13,6 +13,7 @@ import json
 import os
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -45,6 +46,8 @@ _VARIABLES = (
 _TRANSFER_WITHIN_S = 1.0
 _READ_BYTES = 65_536
 _MAX_QUERY_BYTES = 65_536
+#: A command that comes in addition joins the graph itself.
+_MAX_CONNECTIONS = 64
 #: Answers a query: returns plain data for JSON, or None if it is not certain.
 Answer: TypeAlias = Callable[[Any], Any]
 
@@ -55,7 +58,7 @@ def visible(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
 
 
 class QuerySocket:
-    """Answers queries from a thread of its own, one at a time."""
+    """Answers queries, one at a time. Each connection has a thread, which waits for its command."""
 
     def __init__(
         self,
@@ -69,6 +72,8 @@ class QuerySocket:
         """
         self._answers = answers
         self._on_error = on_error
+        self._answering = threading.Lock()
+        self._places = threading.Semaphore(_MAX_CONNECTIONS)
         self._path = socket_path(system)
         self._listener = None if self._path is None else _listen(self._path)
         self._thread: threading.Thread | None = None
@@ -79,15 +84,17 @@ class QuerySocket:
             self._thread.start()
 
     def close(self, timeout_s: float) -> None:
-        """Stop serving; wait for the thread, which may be sending a view."""
+        """Stop serving; wait for an answer that is being computed."""
         if self._path is None or self._listener is None or self._thread is None:
             return
         with suppress(OSError):
             self._path.unlink()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)  # wakes up accept
+        end_s = time.monotonic() + timeout_s
         self._thread.join(timeout_s)
         self._listener.close()
+        self._answering.acquire(timeout=max(0.0, end_s - time.monotonic()))  # kept: no more answers
 
     def _serve(self, listener: socket.socket) -> None:
         while True:
@@ -95,25 +102,36 @@ class QuerySocket:
                 connection, _ = listener.accept()
             except OSError:  # closed
                 return
-            with connection:
-                connection.settimeout(_TRANSFER_WITHIN_S)
-                try:
-                    self._respond(connection)
-                except OSError:  # the command has ended
-                    continue
-                except Exception as error:  # the next command may fare better
-                    self._on_error(error)
+            if self._places.acquire(blocking=False):
+                threading.Thread(
+                    target=self._serve_one, args=(connection,), name="query", daemon=True
+                ).start()
+            else:
+                connection.close()
+
+    def _serve_one(self, connection: socket.socket) -> None:
+        with connection:
+            try:
+                self._respond(connection)
+            except OSError:  # the command has ended, or is too slow
+                pass
+            except Exception as error:  # the next command may fare better
+                self._on_error(error)
+            finally:
+                self._places.release()
 
     def _respond(self, connection: socket.socket) -> None:
         try:
             name, argument = json.loads(_read_line(connection))
             answer = self._answers[name]
-        except (ValueError, TypeError, KeyError):  # of a command of another version
+        except (ValueError, TypeError, KeyError, RecursionError):  # of another version
             return
-        if _has_given_up(connection):
-            return  # an answer may take half a second, for which the next commands would wait
-        document = {"environment": _environment(), "answer": answer(argument)}
-        connection.sendall(json.dumps(document).encode())
+        with self._answering:
+            if _has_given_up(connection):
+                return  # an answer may take half a second, for which the next commands would wait
+            document = {"environment": _environment(), "answer": answer(argument)}
+        connection.settimeout(_TRANSFER_WITHIN_S)
+        connection.sendall(json.dumps(document).encode())  # the limit is for all of it
 
 
 def ask(system: str, query: str, argument: Any, timeout_s: float) -> Any:
@@ -147,8 +165,11 @@ def read_graph(system: str, timeout_s: float) -> GraphView | None:
 
 
 def _read_line(connection: socket.socket) -> bytes:
+    """Return the line that a command sends. Raises OSError if it takes too long."""
     line = b""
+    end_s = time.monotonic() + _TRANSFER_WITHIN_S
     while not line.endswith(b"\n") and len(line) < _MAX_QUERY_BYTES:
+        connection.settimeout(max(0.001, end_s - time.monotonic()))
         received = connection.recv(_READ_BYTES)
         if not received:
             break
@@ -163,8 +184,6 @@ def _has_given_up(connection: socket.socket) -> bool:
         return not connection.recv(1, socket.MSG_PEEK)
     except BlockingIOError:
         return False
-    finally:
-        connection.settimeout(_TRANSFER_WITHIN_S)
 
 
 def _listen(path: Path) -> socket.socket | None:

@@ -190,14 +190,18 @@ def test_no_orphan_whatever_ends_the_composer(number: signal.Signals) -> None:
         wait_until(lambda: not marked(mark), "the end of all children")
 
 
-def test_no_child_survives_the_launcher(children: ChildProcesses) -> None:
-    child = start(children, "exec sleep 60", [])
-    wait_until(child.started.done, "the start")
+def test_nothing_survives_the_launcher(children: ChildProcesses) -> None:
+    folder = children.prepare()
+    lines: list[tuple[str, bool]] = []
+    child = start(children, "(setsid sleep 60 & echo $!); exec sleep 60", lines)
+    wait_until(lambda: lines and child.started.done(), "the number of the daemon")
     process = children._launcher
     assert process is not None
     process.kill()
     wait_until(child.ended.done, "the end")
-    wait_until(lambda: not Path("/proc", str(child.pid)).exists(), "the death of the child")
+    entries = [Path("/proc", pid) for pid in (str(child.pid), lines[0][0])]
+    wait_until(lambda: not any(entry.exists() for entry in entries), "the death of both")
+    assert not folder.exists()
     again = start(children, "exit 0", [])  # by a new launcher
     wait_until(again.ended.done, "the end")
     assert again.ended.result() == 0

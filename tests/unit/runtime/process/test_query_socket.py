@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -144,6 +145,44 @@ def test_a_query_whose_command_has_given_up_is_skipped(
     assert read_graph("/robot", LIMIT_S) == VIEW
     assert answered.acquire(blocking=False)
     assert not answered.acquire(blocking=False)
+
+
+def test_a_slow_command_blocks_only_itself(serve: Callable[..., list[Exception]]) -> None:
+    """Neither one that sends slowly nor one that does not read its answer."""
+    topics = tuple((f"/topic_{number}", ()) for number in range(50_000))
+    serve(lambda: {**VIEW, "topic": topics})
+    with ExitStack() as stack:
+        for sent in (b"[", b'["graph", null]\n') * 20:
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            stack.enter_context(connection)
+            connection.connect(str(socket_path("/robot")))
+            connection.sendall(sent)
+        assert read_graph("/robot", LIMIT_S) is not None
+    # Each ends within its limit, and with it its thread.
+    end_s = time.monotonic() + LIMIT_S
+    while any(thread.name == "query" for thread in threading.enumerate()):
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+
+
+def test_a_command_that_sends_slowly_is_left_in_the_end(
+    serve: Callable[..., list[Exception]],
+) -> None:
+    serve(lambda: VIEW)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+        connection.connect(str(socket_path("/robot")))
+        began_s = time.monotonic()
+        connection.settimeout(0.1)
+        while time.monotonic() < began_s + LIMIT_S:
+            try:
+                connection.sendall(b" ")
+                assert connection.recv(1) == b""
+            except TimeoutError:
+                continue
+            except OSError:
+                break
+            break
+        assert time.monotonic() < began_s + LIMIT_S
 
 
 def test_the_socket_of_a_killed_process_is_replaced(
