@@ -13,7 +13,11 @@ ROOT = Path(__file__).resolve().parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: Folders that are part of the installed package, as in a wheel. With --symlink-install, colcon
 #: builds in a folder that has links to the sources only, and they are not needed.
-SHARED = [name for name in ("interfaces", "nodes", "schemas", "systems") if Path(name).is_dir()]
+SHARED = {
+    f"composer.share.{Path(folder).name}": folder
+    for folder in ("docs/rules", "interfaces", "nodes", "schemas", "systems")
+    if Path(folder).is_dir()
+}
 INDEX = "share/ament_index/resource_index"
 
 
@@ -37,9 +41,9 @@ setup(
     install_requires=[item.partition(";")[0] for item in PROJECT["dependencies"]],
     packages=[
         *find_packages(include=["composer", "composer.*"]),
-        *(f"composer.share.{name}" for name in SHARED),
+        *SHARED,
     ],
-    package_dir={f"composer.share.{name}": name for name in SHARED},
+    package_dir=SHARED,
     package_data={"": ["*", "**/*"]},
     exclude_package_data={"": ["__pycache__/*", "**/__pycache__/*"]},
     data_files=[

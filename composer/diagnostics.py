@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from enum import Enum
-from typing import TypedDict, Unpack
 
 from composer.fast_dataclass import dataclass
 from composer.source import Span
@@ -29,7 +28,7 @@ MAXIMUM_VALUE_LENGTH = 80
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One kind of problem, with what ``compose rule`` and the documentation show about it.
+    """One kind of problem. The page ``docs/rules/<code>.md`` explains it.
 
     ``code`` never changes its meaning and is never reused. Bands: 0xx reading, 1xx schema,
     2xx names and references, 3xx types, QoS and wiring, 4xx lifecycle, timers, parameters and
@@ -39,10 +38,6 @@ class Rule:
     code: str
     name: str
     severity: Severity
-    summary: str
-    why: str
-    bad: str
-    good: str
 
     def matches(self, text: str) -> bool:
         """Return whether ``text`` is the rule's name, its code, or a code prefix (``RC3``)."""
@@ -93,30 +88,20 @@ def register(rule: Rule) -> Rule:
     return rule
 
 
-class RuleTexts(TypedDict):
-    """What a rule says of itself."""
-
-    code: str
-    name: str
-    summary: str
-    why: str
-    bad: str
-    good: str
-
-
-def error(**texts: Unpack[RuleTexts]) -> Rule:
+# Until the texts of all rules are pages, declarations may still have them: ``_texts``.
+def error(code: str, name: str, **_texts: str) -> Rule:
     """Register a rule about what keeps a system from running."""
-    return register(Rule(severity=Severity.ERROR, **texts))
+    return register(Rule(code, name, Severity.ERROR))
 
 
-def warning(**texts: Unpack[RuleTexts]) -> Rule:
+def warning(code: str, name: str, **_texts: str) -> Rule:
     """Register a rule about what is probably wrong."""
-    return register(Rule(severity=Severity.WARNING, **texts))
+    return register(Rule(code, name, Severity.WARNING))
 
 
-def info(**texts: Unpack[RuleTexts]) -> Rule:
+def info(code: str, name: str, **_texts: str) -> Rule:
     """Register a rule about what is only worth knowing."""
-    return register(Rule(severity=Severity.INFO, **texts))
+    return register(Rule(code, name, Severity.INFO))
 
 
 def registered_rules() -> Iterator[Rule]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 
 _INDEX = Path("share", "ament_index", "resource_index", "packages")
 _RUN = "import sys; from {module} import {function} as main; sys.exit(main())"
+
+
+def has_ros_packages(environment: Mapping[str, str]) -> bool:
+    """Return whether any ROS package is installed. Without ROS, a missing one says nothing."""
+    return any((prefix / _INDEX).is_dir() for prefix in _prefixes(environment))
 
 
 def has_package(package: str, environment: Mapping[str, str]) -> bool:
@@ -79,10 +84,14 @@ def _libraries(package: str, environment: Mapping[str, str]) -> Iterator[Path]:
     """Yield the folders of a ROS package's executables, which may not exist."""
     if not package or "/" in package:
         return
-    prefixes: Sequence[str] = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-    for prefix in dict.fromkeys((*filter(None, prefixes), sys.prefix)):
-        if (Path(prefix) / _INDEX / package).is_file():
-            yield Path(prefix, "lib", package)
+    for prefix in _prefixes(environment):
+        if (prefix / _INDEX / package).is_file():
+            yield prefix / "lib" / package
+
+
+def _prefixes(environment: Mapping[str, str]) -> list[Path]:
+    listed = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return [Path(prefix) for prefix in dict.fromkeys((*filter(None, listed), sys.prefix))]
 
 
 def _distribution(package: str) -> Distribution | None:

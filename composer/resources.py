@@ -1,4 +1,4 @@
-"""Folders of data files: JSON Schemas, node types, systems, interfaces.
+"""Folders of data files: JSON Schemas, node types, systems, interfaces, pages of rules.
 
 A wheel has them in ``composer/share/`` (see pyproject.toml). In a checkout or an editable install,
 they are next to the package.
@@ -40,3 +40,9 @@ def systems_folder() -> Path:
 def interfaces_folder() -> Path:
     """Return the source of the ament package composer_interfaces (.srv and .action files)."""
     return _folder("interfaces")
+
+
+def rules_folder() -> Path:
+    """Return the folder of the pages about rules, ``docs/rules`` in a checkout."""
+    in_wheel = _folder("rules")
+    return in_wheel if in_wheel.is_dir() else _folder("docs/rules")

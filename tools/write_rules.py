@@ -1,17 +1,17 @@
-"""Write docs/rules.md from the rules."""
+"""Write docs/rules.md, the list of the rules."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from composer.report.rule_page import all_rules, page
+from composer.report.rule_page import all_rules, index
 
 PAGE = Path(__file__).parents[1] / "docs" / "rules.md"
 
 
 def main() -> None:
     """Write the page."""
-    PAGE.write_text(page(all_rules()), encoding="utf-8")
+    PAGE.write_text(index(all_rules()), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from composer.resources import data_folder
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 #: Besides the package, in a checkout; in an installation, they are in the package.
-_SHARED = ("interfaces", "nodes", "schemas", "systems")
+_SHARED = ("docs/rules", "interfaces", "nodes", "schemas", "systems")
 _ABOUT = "Wheel-Version: 1.0\nGenerator: compose export\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
 
 
@@ -44,7 +44,7 @@ def _package() -> Iterator[tuple[str, bytes]]:
     yield from _below(_PACKAGE, "composer")
     if data_folder() != _PACKAGE / "share":
         for name in _SHARED:
-            yield from _below(data_folder() / name, f"composer/share/{name}")
+            yield from _below(data_folder() / name, f"composer/share/{Path(name).name}")
 
 
 def _below(folder: Path, prefix: str) -> Iterator[tuple[str, bytes]]:

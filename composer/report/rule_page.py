@@ -1,4 +1,4 @@
-"""The documentation of the rules: docs/rules.md, and text for ``compose rule``."""
+"""The pages of the rules in docs/rules, their index, and text for ``compose rule``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import composer.resolve
 import composer.rules
 import composer.schema
 from composer.diagnostics import Rule, registered_rules
+from composer.fast_dataclass import dataclass
+from composer.resources import rules_folder
 
 #: The topic of each code band, by the first digit.
 BANDS = {
@@ -28,7 +30,7 @@ _INTRODUCTION = """\
 # Rules
 
 The rules of `compose validate`. A system with errors does not run; one with warnings or infos does.
-This page is generated from the rules (`make generate`), and every example is tested.
+Each rule has a page with the reason, a wrong example and a right one. Every example is tested.
 
 To ignore a warning or an info, add a comment on the same line, or on a line of its own before it:
 `# compose: ignore[publisher-without-subscription]`. Errors cannot be ignored.
@@ -47,73 +49,76 @@ def find_rule(text: str, rules: Iterable[Rule]) -> Rule | None:
     return next((rule for rule in rules if name in {rule.code.casefold(), rule.name}), None)
 
 
+_PAGE = re.compile(
+    r"# .+\n\n\*\w+\* - (?P<summary>.+)\n\n(?P<why>(?:.+\n)+)\n"
+    r"(?P<bad>(?s:.+))\nUse instead:\n\n(?P<good>(?s:.+))"
+)
+_BLOCK = re.compile(r"(?:`(?P<name>.+)`:\n\n)?```\w*\n(?P<text>(?:.*\n)*?)```\n")
+
+
+@dataclass(frozen=True, slots=True)
+class RulePage:
+    """What the page of a rule says. :func:`files_of` returns the files of an example."""
+
+    summary: str
+    why: str
+    bad: str
+    good: str
+
+
+def page_of(rule: Rule) -> RulePage:
+    """Read the page of a rule. Raises OSError, and ValueError if it has another form."""
+    text = (rules_folder() / f"{rule.code}.md").read_text(encoding="utf-8")
+    page = _PAGE.fullmatch(text)
+    if page is None:
+        raise ValueError(f"the page of {rule.code} has no summary, reason or example")
+    why = " ".join(page["why"].split())
+    return RulePage(page["summary"], why, _example(page["bad"]), _example(page["good"]))
+
+
+def _example(blocks: str) -> str:
+    """Return the code of an example, each of several files under a line with its name."""
+    return "".join(
+        (f"# file: {block['name']}\n" if block["name"] else "") + block["text"]
+        for block in _BLOCK.finditer(blocks)
+    )
+
+
 def explain(rule: Rule) -> str:
     """Return the documentation of a rule, for a terminal."""
+    page = page_of(rule)
     return "\n".join(
         [
             f"{rule.code} {rule.name} ({rule.severity.value})",
             "",
-            rule.summary,
-            rule.why,
+            page.summary,
+            page.why,
             "",
             "Example:",
             "",
-            _indented(rule.bad),
+            _indented(page.bad),
             "",
             "Use instead:",
             "",
-            _indented(rule.good),
+            _indented(page.good),
             "",
         ]
     )
 
 
-def page(rules: Iterable[Rule]) -> str:
-    """Return the page of all rules, in Markdown."""
+def index(rules: Iterable[Rule]) -> str:
+    """Return docs/rules.md, the list of all rules, in Markdown."""
     ordered = sorted(rules, key=lambda rule: rule.code)
     parts = [_INTRODUCTION]
-    for band, found in groupby(ordered, key=lambda rule: rule.code[2]):
-        group = list(found)
-        parts.append(f"## {BANDS[band]}\n")
-        parts.append(_table(group))
-        parts.extend(_section(rule) for rule in group)
-    return "\n".join(parts)
-
-
-def _table(rules: Iterable[Rule]) -> str:
-    rows = [
-        f"| [{rule.code}](#{rule.code}-{rule.name}) "
-        f"| {rule.name} | {rule.severity.value} | {rule.summary} |".replace("#RC", "#rc")
-        for rule in rules
-    ]
-    return "\n".join(["| code | name | severity | summary |", "|---|---|---|---|", *rows, ""])
-
-
-def _section(rule: Rule) -> str:
-    return "\n".join(
-        [
-            f"### {rule.code} {rule.name}",
-            "",
-            f"*{rule.severity.value}* - {rule.summary} {rule.why}",
-            "",
-            _example(rule.bad),
-            "Use instead:",
-            "",
-            _example(rule.good),
+    for band, group in groupby(ordered, key=lambda rule: rule.code[2]):
+        rows = [
+            f"| [{rule.code}](rules/{rule.code}.md) | {rule.name} | {rule.severity.value} "
+            f"| {page_of(rule).summary} |"
+            for rule in group
         ]
-    )
-
-
-def _example(example: str) -> str:
-    files = files_of(example)
-    if not files:
-        return f"```\n{example.rstrip()}\n```\n"
-    blocks = []
-    for name, text in files.items():
-        language = "python" if name.endswith(".py") else "yaml"
-        title = f"`{name}`:\n\n" if len(files) > 1 else ""
-        blocks.append(f"{title}```{language}\n{text.rstrip()}\n```\n")
-    return "\n".join(blocks)
+        table = ["| code | name | severity | summary |", "|---|---|---|---|", *rows, ""]
+        parts += [f"## {BANDS[band]}\n", *table]
+    return "\n".join(parts)
 
 
 def _indented(text: str) -> str:

@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from composer.diagnostics import Diagnostic, Rule, Severity
 from composer.report.fingerprint import fingerprints
+from composer.report.rule_page import page_of
 from composer.report.tool import NAME, tool_version
 from composer.source import Span
 
@@ -45,12 +46,13 @@ def render(diagnostics: Sequence[Diagnostic]) -> str:
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
+    page = page_of(rule)
     return {
         "id": rule.code,
         "name": rule.name,
-        "shortDescription": {"text": rule.summary},
-        "fullDescription": {"text": rule.why},
-        "help": {"text": f"{rule.summary}\n\n{rule.why}\n\nInstead:\n\n{rule.good}"},
+        "shortDescription": {"text": page.summary},
+        "fullDescription": {"text": page.why},
+        "help": {"text": f"{page.summary}\n\n{page.why}\n\nInstead:\n\n{page.good}"},
         "defaultConfiguration": {"level": _LEVELS[rule.severity]},
     }
 

@@ -1,9 +1,9 @@
 """The rules, in one module per subject.
 
 Every function of these modules whose name begins with ``check`` is found automatically. It yields
-the diagnostics of one rule, or of a few about the same values. A rule holds its documentation (see
-CONTRIBUTING for how to add one). A check skips input that is itself invalid, because another rule
-reports that.
+the diagnostics of one rule, or of a few about the same values. The pages in ``docs/rules`` document
+the rules (see CONTRIBUTING for how to add one). A check skips input that is itself invalid, because
+another rule reports that.
 """
 
 from __future__ import annotations

@@ -13,6 +13,10 @@ from composer.fast_dataclass import dataclass
 from composer.model import Chain, Node, Port, PortKind, Timer
 from composer.source import Span
 
+LATENCY_BUDGET = error("RC415", "latency-budget")
+BROKEN_CHAIN = error("RC416", "broken-chain")
+UNMEASURED_CHAIN = warning("RC477", "unmeasured-chain")
+
 
 @dataclass(frozen=True, slots=True)
 class ChainDelay:
@@ -71,36 +75,6 @@ def _budget_delay(name: str, callback: Port | Timer) -> Iterator[ChainDelay]:
         yield ChainDelay(f"{name} may take", budget_ms.value, budget_ms.span)
 
 
-BROKEN_CHAIN = error(
-    code="RC416",
-    name="broken-chain",
-    summary="A node of a chain does not subscribe to the topic of the previous publisher.",
-    why="No data flows through the chain, so its latency is meaningless.",
-    bad="""\
-system: chain
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data, external: true}}
-  brake:
-    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
-chains:
-  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
-""",
-    good="""\
-system: chain
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data}}
-  brake:
-    subscriptions:
-      scan: {type: std_msgs/msg/Float64, qos: sensor_data, publish: {force: "{message}"}}
-    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
-chains:
-  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
-""",
-)
-
-
 def check_broken_chain(context: Context) -> Iterator[Diagnostic]:
     """Check each pair of consecutive ports in every chain."""
     system = context.system
@@ -124,43 +98,6 @@ def check_broken_chain(context: Context) -> Iterator[Diagnostic]:
                     f"subscribe '{node.name}' to it, or add the missing publishers to the chain",
                 )
                 break  # further gaps often follow from the first one
-
-
-LATENCY_BUDGET = error(
-    code="RC415",
-    name="latency-budget",
-    summary="The periods and budgets along a chain add up to more than its latency.",
-    why=(
-        "A node that publishes from a timer delays its input by up to one period. No "
-        "processor can make up for delays that the periods cause."
-    ),
-    bad="""\
-system: chain
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data}}
-  brake:
-    state: {distance: 0.0}
-    subscriptions:
-      scan: {type: std_msgs/msg/Float64, qos: sensor_data, set: {distance: "{message.data}"}}
-    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
-    timers: {step: {period_ms: 100, publish: {force: {data: "{state.distance}"}}}}
-chains:
-  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
-""",
-    good="""\
-system: chain
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/Float64, qos: sensor_data}}
-  brake:
-    subscriptions:
-      scan: {type: std_msgs/msg/Float64, qos: sensor_data, publish: {force: "{message}"}}
-    publishers: {force: {type: std_msgs/msg/Float64, qos: command, external: true}}
-chains:
-  stop: {through: [lidar.scan, brake.force], latency_ms: 50}
-""",
-)
 
 
 def check_latency_budget(context: Context) -> Iterator[Diagnostic]:
@@ -190,43 +127,6 @@ def _latency_hint(delays: Iterable[ChainDelay]) -> str:
     if kinds == {False}:
         return "use shorter budgets, or allow a higher latency"
     return "publish from the subscription, or use shorter timer periods or budgets"
-
-
-UNMEASURED_CHAIN = warning(
-    code="RC477",
-    name="unmeasured-chain",
-    summary="A chain passes through an executable or external node, or several processes.",
-    why=(
-        "The latency of a chain is measured within one process of the system. What another one "
-        "makes of a message cannot be followed, so the chain is checked statically only."
-    ),
-    bad="""\
-system: brake
-nodes:
-  lidar:
-    external: true
-    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data}}
-  brake:
-    subscriptions:
-      scan: {type: std_msgs/msg/String, qos: sensor_data, publish: {commands: {data: stop}}}
-    publishers: {commands: {type: std_msgs/msg/String, qos: command, external: true}}
-chains:
-  stop: {through: [lidar.scan, brake.commands], latency_ms: 50}
-""",
-    good="""\
-system: brake
-nodes:
-  lidar:
-    timers: {tick: {period_ms: 20, publish: {scan: {data: near}}}}
-    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data}}
-  brake:
-    subscriptions:
-      scan: {type: std_msgs/msg/String, qos: sensor_data, publish: {commands: {data: stop}}}
-    publishers: {commands: {type: std_msgs/msg/String, qos: command, external: true}}
-chains:
-  stop: {through: [lidar.scan, brake.commands], latency_ms: 50}
-""",
-)
 
 
 def check_unmeasured_chain(context: Context) -> Iterator[Diagnostic]:

@@ -18,6 +18,11 @@ from composer.rules.remappings import matched_ports, own_name
 from composer.source import Span
 from composer.spelling import vocabulary
 
+CLIENT_WITHOUT_SERVER = warning("RC322", "client-without-server")
+SUBSCRIPTION_WITHOUT_PUBLISHER = warning("RC323", "subscription-without-publisher")
+PUBLISHER_WITHOUT_SUBSCRIPTION = info("RC324", "publisher-without-subscription")
+REQUIRED_PORT_UNCONNECTED = error("RC325", "required-port-unconnected")
+
 #: Topics of ROS itself and of tools; their counterpart is never in the system.
 _EXTERNAL_TOPICS = frozenset(
     {"/clock", "/diagnostics", "/parameter_events", "/robot_description", "/rosout"}
@@ -238,29 +243,6 @@ def _channel_names(context: Context) -> _ChannelNames:
     return found
 
 
-CLIENT_WITHOUT_SERVER = warning(
-    code="RC322",
-    name="client-without-server",
-    summary="No node in the system provides the service or action that a client calls.",
-    why=(
-        "Every call times out. The usual cause is a name that differs between client and "
-        "server. If an external node provides it, set 'external: true'."
-    ),
-    bad="""\
-system: unserved
-nodes:
-  operator:
-    clients: {reset: {type: std_srvs/srv/Trigger}}
-""",
-    good="""\
-system: unserved
-nodes:
-  operator:
-    clients: {reset: {type: std_srvs/srv/Trigger, external: true}}
-""",
-)
-
-
 def check_client_without_server(context: Context) -> Iterator[Diagnostic]:
     """Check for services and actions that have only clients."""
     for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
@@ -275,34 +257,6 @@ def check_client_without_server(context: Context) -> Iterator[Diagnostic]:
                     labels,
                     nearest_channel(context, endpoint) or external_hint(endpoint),
                 )
-
-
-SUBSCRIPTION_WITHOUT_PUBLISHER = warning(
-    code="RC323",
-    name="subscription-without-publisher",
-    summary="No node in the system publishes to a subscribed topic.",
-    why=(
-        "The node waits for messages that never arrive. The usual cause is a name that "
-        "differs between publisher and subscription. If an external node publishes the "
-        "messages, set 'external: true'; if the node works without them, 'required: false'."
-    ),
-    bad="""\
-system: unfed
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-  listener:
-    subscriptions: {chater: {type: std_msgs/msg/String, qos: command}}
-""",
-    good="""\
-system: unfed
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-""",
-)
 
 
 def check_subscription_without_publisher(context: Context) -> Iterator[Diagnostic]:
@@ -320,29 +274,6 @@ def check_subscription_without_publisher(context: Context) -> Iterator[Diagnosti
             )
 
 
-PUBLISHER_WITHOUT_SUBSCRIPTION = info(
-    code="RC324",
-    name="publisher-without-subscription",
-    summary="No node in the system subscribes to a published topic.",
-    why=(
-        "If the topic is for tools or another system, set 'external: true'. Otherwise a name "
-        "is wrong on one side, or the messages are not needed."
-    ),
-    bad="""\
-system: unheard
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-""",
-    good="""\
-system: unheard
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-""",
-)
-
-
 def check_publisher_without_subscription(context: Context) -> Iterator[Diagnostic]:
     """Check for topics that have only publishers."""
     for endpoint in unconnected_ports(context, PortKind.PUBLISHER):
@@ -356,31 +287,6 @@ def check_publisher_without_subscription(context: Context) -> Iterator[Diagnosti
                 labels,
                 external_hint(endpoint),
             )
-
-
-REQUIRED_PORT_UNCONNECTED = error(
-    code="RC325",
-    name="required-port-unconnected",
-    summary="A port with 'required: true' has no counterpart in the system.",
-    why=(
-        "The node declares that it cannot work without the connection: for example, a motor "
-        "without its emergency stop."
-    ),
-    bad="""\
-system: required
-nodes:
-  motor:
-    subscriptions: {stop: {type: std_msgs/msg/Bool, qos: state, required: true}}
-""",
-    good="""\
-system: required
-nodes:
-  button:
-    publishers: {stop: {type: std_msgs/msg/Bool, qos: state}}
-  motor:
-    subscriptions: {stop: {type: std_msgs/msg/Bool, qos: state, required: true}}
-""",
-)
 
 
 def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:

@@ -17,27 +17,10 @@ from composer.model.discovery import (
 )
 from composer.source import Located
 
-DISCOVERY_SETTING = error(
-    code="RC496",
-    name="discovery-setting",
-    summary="A setting of discovery is missing, or has no effect with its kind.",
-    why=(
-        "Processes that look for each other in different ways do not find each other. A server "
-        "without an address cannot be found either."
-    ),
-    bad="""\
-system: lights
-discovery: {kind: multicast, address: 192.168.1.10}
-nodes:
-  lamp: {on_activate: {log: started}}
-""",
-    good="""\
-system: lights
-discovery: {kind: server, address: 192.168.1.10}
-nodes:
-  lamp: {on_activate: {log: started}}
-""",
-)
+DISCOVERY_SETTING = error("RC496", "discovery-setting")
+DISCOVERY_ADDRESS = error("RC497", "discovery-address")
+LOCAL_DISCOVERY = error("RC498", "local-discovery")
+
 _NEEDED = {DiscoveryKind.SERVER: "address", DiscoveryKind.PEERS: "peers"}
 _KIND_OF_KEY = {
     "interfaces": DiscoveryKind.MULTICAST,
@@ -84,29 +67,6 @@ def _missing_setting(
     return Diagnostic(DISCOVERY_SETTING, message, kind.span, labels, hint)
 
 
-DISCOVERY_ADDRESS = error(
-    code="RC497",
-    name="discovery-address",
-    summary="An address or an interface of discovery is not valid, or is repeated.",
-    why=(
-        "Fast DDS ignores what it cannot read: nodes would start, and never discover each "
-        "other. The position of a server in the list is part of its identity."
-    ),
-    bad="""\
-system: lights
-discovery: {kind: server, address: "192.168.1.10:118110"}
-nodes:
-  lamp: {on_activate: {log: started}}
-""",
-    good="""\
-system: lights
-discovery: {kind: server, address: "192.168.1.10:11811"}
-nodes:
-  lamp: {on_activate: {log: started}}
-""",
-)
-
-
 def check_discovery_address(context: Context) -> Iterator[Diagnostic]:
     """Check the addresses and interfaces of discovery."""
     discovery = context.system.discovery
@@ -130,35 +90,6 @@ def _check_all(
         elif earlier is not text:
             label = Label(earlier.span, "the first one")
             yield Diagnostic(DISCOVERY_ADDRESS, f"{what} '{text}' is repeated", text.span, (label,))
-
-
-LOCAL_DISCOVERY = error(
-    code="RC498",
-    name="local-discovery",
-    summary="Processes of other computers are to use a local address for discovery.",
-    why=(
-        "For each computer, 127.0.0.1 and localhost are the computer itself, so its processes "
-        "would look for the server, or for their peers, in the wrong place."
-    ),
-    bad="""\
-system: robot
-discovery: {kind: server, address: localhost, start: true}
-hosts: {jetson: {workspace: ~/robot}}
-processes: {vision: {nodes: [camera], host: jetson}}
-nodes:
-  camera: {on_activate: {log: started}}
-  arm: {on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-discovery: {kind: server, address: 192.168.1.10, start: true}
-hosts: {jetson: {workspace: ~/robot}}
-processes: {vision: {nodes: [camera], host: jetson}}
-nodes:
-  camera: {on_activate: {log: started}}
-  arm: {on_activate: {log: started}}
-""",
-)
 
 
 def check_local_discovery(context: Context) -> Iterator[Diagnostic]:

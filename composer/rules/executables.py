@@ -9,34 +9,20 @@ from pathlib import Path
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import is_misspelled
 from composer.diagnostics import Diagnostic, error, info, suggestion
-from composer.executables import executable_names, find_executable, find_program, has_package
+from composer.executables import (
+    executable_names,
+    find_executable,
+    find_program,
+    has_package,
+    has_ros_packages,
+)
 from composer.model import Executable, ExecutableKind, LifecycleKind
 from composer.source import Located, Span
 
-UNKNOWN_EXECUTABLE = error(
-    code="RC471",
-    name="unknown-executable",
-    summary="The executable of a node does not exist.",
-    why="The node cannot be configured: there is no program to start.",
-    bad="""\
-# file: system.yaml
-system: scripts
-nodes:
-  driver:
-    executable: {command: [python3, scripts/drver.py]}
-# file: scripts/driver.py
-import rclpy
-""",
-    good="""\
-# file: system.yaml
-system: scripts
-nodes:
-  driver:
-    executable: {command: [python3, scripts/driver.py]}
-# file: scripts/driver.py
-import rclpy
-""",
-)
+UNKNOWN_EXECUTABLE = error("RC471", "unknown-executable")
+EXECUTABLE_NOT_INSTALLED = info("RC472", "executable-not-installed")
+INCOMPLETE_EXECUTABLE = error("RC473", "incomplete-executable")
+MANAGED_TASK = error("RC475", "managed-task")
 
 #: Arguments with these suffixes are files, and are looked for.
 _SCRIPTS = (".py", ".sh")
@@ -103,29 +89,6 @@ def _file_names(folder: Path) -> list[str]:
     return [path.name for path in folder.iterdir()] if folder.is_dir() else []
 
 
-EXECUTABLE_NOT_INSTALLED = info(
-    code="RC472",
-    name="executable-not-installed",
-    summary="The package or the program of an executable is not installed on this computer.",
-    why=(
-        "The node cannot be started on a computer without it. If it is installed where the "
-        "system runs, ignore this."
-    ),
-    bad="""\
-system: lights
-nodes:
-  lamp:
-    executable: {package: lamp_driver_for_mars, name: driver}
-""",
-    good="""\
-system: lights
-nodes:
-  lamp:
-    executable: {command: [sh, -c, "sleep 1"], kind: task}
-""",
-)
-
-
 def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
     """Look for the packages, and for programs in PATH."""
     for node in context.system.nodes:
@@ -140,35 +103,12 @@ def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
                 yield Diagnostic(
                     EXECUTABLE_NOT_INSTALLED, f"program '{program}' is not in PATH", program.span
                 )
-        elif package is not None and not (
-            is_unresolved(package.value) or has_package(package.value, os.environ)
-        ):
+        elif package is None or is_unresolved(package.value) or not has_ros_packages(os.environ):
+            continue
+        elif not has_package(package.value, os.environ):
             yield Diagnostic(
                 EXECUTABLE_NOT_INSTALLED, f"package '{package}' is not installed", package.span
             )
-
-
-INCOMPLETE_EXECUTABLE = error(
-    code="RC473",
-    name="incomplete-executable",
-    summary="An executable does not have exactly one of command, or package and name.",
-    why="There is no program to start, or it is not clear which one.",
-    bad="""\
-system: maps
-nodes:
-  map_server:
-    executable: {name: map_server, lifecycle: managed}
-""",
-    good="""\
-# file: system.yaml
-system: maps
-nodes:
-  map_server:
-    executable: {command: [sh, driver.sh], lifecycle: managed}
-# file: driver.sh
-exec driver
-""",
-)
 
 
 def check_incomplete_executable(context: Context) -> Iterator[Diagnostic]:
@@ -214,35 +154,6 @@ def _has_unknown_key(context: Context, executable: Executable) -> bool:
         (span.file.path, span.line) == (start.file.path, start.line) and span.column > start.column
         for span in context.refused
     )
-
-
-MANAGED_TASK = error(
-    code="RC475",
-    name="managed-task",
-    summary="A task is managed by lifecycle services.",
-    why=(
-        "A task is done once its process has exited; a managed node runs until it is shut "
-        "down, and is driven by the services that it has while it runs."
-    ),
-    bad="""\
-# file: system.yaml
-system: calibration
-nodes:
-  calibrate:
-    executable: {command: [sh, driver.sh], kind: task, lifecycle: managed}
-# file: driver.sh
-exec driver
-""",
-    good="""\
-# file: system.yaml
-system: calibration
-nodes:
-  calibrate:
-    executable: {command: [sh, driver.sh], kind: task}
-# file: driver.sh
-exec driver
-""",
-)
 
 
 def check_managed_task(context: Context) -> Iterator[Diagnostic]:

@@ -13,28 +13,13 @@ from composer.fast_dataclass import dataclass
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
 from composer.source import Located, Span
 
-UNKNOWN_EXECUTOR = error(
-    code="RC207",
-    name="unknown-executor",
-    summary="A node runs on an executor that is not declared under executors.",
-    why="The callbacks of the node would never run.",
-    bad="""\
-system: threads
-executors:
-  perception: {kind: multi_threaded, threads: 4}
-nodes:
-  camera: {executor: percepton, on_activate: {log: started}}
-  detector: {executor: perception, on_activate: {log: started}}
-""",
-    good="""\
-system: threads
-executors:
-  perception: {kind: multi_threaded, threads: 4}
-nodes:
-  camera: {executor: perception, on_activate: {log: started}}
-  detector: {executor: perception, on_activate: {log: started}}
-""",
-)
+UNKNOWN_EXECUTOR = error("RC207", "unknown-executor")
+UNUSED_EXECUTOR = info("RC245", "unused-executor")
+EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")
+EXECUTOR_BUSY = warning("RC414", "executor-busy")
+SINGLE_THREAD = warning("RC417", "single-thread")
+SPLIT_EXECUTOR = info("RC480", "split-executor")
+EXECUTOR_OUTSIDE_PROCESS = warning("RC481", "executor-outside-process")
 
 
 def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
@@ -52,28 +37,6 @@ def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
         )
 
 
-UNUSED_EXECUTOR = info(
-    code="RC245",
-    name="unused-executor",
-    summary="No node runs on a declared executor.",
-    why="The executor is left over, or a node that was meant for it runs on another one.",
-    bad="""\
-system: threads
-executors:
-  perception: {kind: multi_threaded, threads: 4}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-    good="""\
-system: threads
-executors:
-  perception: {kind: multi_threaded, threads: 4}
-nodes:
-  camera: {executor: perception, on_activate: {log: started}}
-""",
-)
-
-
 def check_unused_executor(context: Context) -> Iterator[Diagnostic]:
     """Compare the executors with the nodes. An executor named ``default`` runs all other nodes."""
     used = {
@@ -87,29 +50,6 @@ def check_unused_executor(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 UNUSED_EXECUTOR, f"no node runs on '{executor.name}'", executor.name.span
             )
-
-
-SINGLE_THREAD = warning(
-    code="RC417",
-    name="single-thread",
-    summary="An executor has one thread, but is declared as if it had several.",
-    why=(
-        "With one thread, callbacks never run at the same time. A multi_threaded executor with "
-        "one thread still costs the locking of several; the other kinds ignore 'threads'."
-    ),
-    bad="""\
-system: threads
-executors: {perception: {kind: multi_threaded, threads: 1}}
-nodes:
-  camera: {executor: perception, on_activate: {log: started}}
-""",
-    good="""\
-system: threads
-executors: {perception: {kind: multi_threaded, threads: 2}}
-nodes:
-  camera: {executor: perception, on_activate: {log: started}}
-""",
-)
 
 
 def check_single_thread(context: Context) -> Iterator[Diagnostic]:
@@ -138,33 +78,6 @@ def _declares_several_threads(executor: Executor) -> bool:
     return executor.threads_span is not None and executor.threads > 1
 
 
-SPLIT_EXECUTOR = info(
-    code="RC480",
-    name="split-executor",
-    summary="Nodes of several processes run on the same executor.",
-    why=(
-        "Each process has an executor of its own with these settings. The nodes of different "
-        "processes do not share its threads, and their callbacks may run at the same time."
-    ),
-    bad="""\
-system: robot
-processes: {control: {nodes: [arm]}}
-executors: {motion: {kind: events, priority: 50}}
-nodes:
-  arm: {executor: motion, on_activate: {log: started}}
-  base: {executor: motion, on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-processes: {control: {nodes: [arm, base]}}
-executors: {motion: {kind: events, priority: 50}}
-nodes:
-  arm: {executor: motion, on_activate: {log: started}}
-  base: {executor: motion, on_activate: {log: started}}
-""",
-)
-
-
 def check_split_executor(context: Context) -> Iterator[Diagnostic]:
     """Compare the processes of the nodes on each executor, except for the default one."""
     first: dict[str, Node] = {}
@@ -189,31 +102,6 @@ def check_split_executor(context: Context) -> Iterator[Diagnostic]:
 
 def _process_text(node: Node) -> str:
     return "the process of the system" if node.process is None else f"process '{node.process}'"
-
-
-EXECUTOR_OUTSIDE_PROCESS = warning(
-    code="RC481",
-    name="executor-outside-process",
-    summary="An executor runs on CPUs that are not among those of its process.",
-    why=(
-        "The CPUs of an executor take precedence, so its threads run where the process was not "
-        "meant to run."
-    ),
-    bad="""\
-system: robot
-processes: {control: {nodes: [arm], cpus: [1]}}
-executors: {motion: {kind: events, cpus: [2]}}
-nodes:
-  arm: {executor: motion, on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-processes: {control: {nodes: [arm], cpus: [1, 2]}}
-executors: {motion: {kind: events, cpus: [2]}}
-nodes:
-  arm: {executor: motion, on_activate: {log: started}}
-""",
-)
 
 
 def check_executor_outside_process(context: Context) -> Iterator[Diagnostic]:
@@ -360,36 +248,6 @@ def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
             )
 
 
-EXECUTOR_OVERLOADED = error(
-    code="RC413",
-    name="executor-overloaded",
-    summary="The callbacks of an executor may need more time than it has.",
-    why=(
-        "The sum of rate times 'budget_ms' over the callbacks of an executor exceeds the "
-        "capacity of its threads: timers fire later and later, and queues overflow."
-    ),
-    bad="""\
-system: load
-nodes:
-  motor:
-    timers: {control: {rate_hz: 100, budget_ms: 8, log: control}}
-  camera:
-    timers: {frame: {rate_hz: 30, budget_ms: 10, log: frame}}
-""",
-    good="""\
-system: load
-executors:
-  perception: {kind: single_threaded}
-nodes:
-  motor:
-    timers: {control: {rate_hz: 100, budget_ms: 6, log: control}}
-  camera:
-    executor: perception
-    timers: {frame: {rate_hz: 30, budget_ms: 10, log: frame}}
-""",
-)
-
-
 def check_executor_overloaded(context: Context) -> Iterator[Diagnostic]:
     """Add up the budgets of every executor."""
     for load in context.once(executor_loads):
@@ -402,28 +260,6 @@ def check_executor_overloaded(context: Context) -> Iterator[Diagnostic]:
                 "lower a rate or a budget, or move nodes to another executor",
             )
 
-
-EXECUTOR_BUSY = warning(
-    code="RC414",
-    name="executor-busy",
-    summary="The callbacks of an executor may use more than 70 % of its time.",
-    why=(
-        "Above that, callbacks that are due together wait for each other, and there is no "
-        "margin for unexpected load."
-    ),
-    bad="""\
-system: load
-nodes:
-  motor:
-    timers: {control: {rate_hz: 100, budget_ms: 8, log: control}}
-""",
-    good="""\
-system: load
-nodes:
-  motor:
-    timers: {control: {rate_hz: 100, budget_ms: 5, log: control}}
-""",
-)
 
 _BUSY = 0.7
 

@@ -13,30 +13,9 @@ from composer.expressions import FieldPath
 from composer.model import Node
 from composer.source import Span
 
-UNKNOWN_NAME = error(
-    code="RC209",
-    name="unknown-name",
-    summary="An expression uses a name that is not in scope.",
-    why=(
-        "The available names depend on the event: 'message' in a subscription, 'request' in a "
-        "service, 'response' in on_response, and so on. 'parameters', 'state', 'count', 'now' "
-        "and 'node' are always available."
-    ),
-    bad="""\
-system: names
-nodes:
-  listener:
-    subscriptions:
-      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{msg.data}"}
-""",
-    good="""\
-system: names
-nodes:
-  listener:
-    subscriptions:
-      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
-""",
-)
+UNKNOWN_NAME = error("RC209", "unknown-name")
+UNKNOWN_STATE = error("RC210", "unknown-state")
+INDEX_OUT_OF_RANGE = warning("RC308", "index-out-of-range")
 
 
 def check_unknown_name(context: Context) -> Iterator[Diagnostic]:
@@ -62,28 +41,6 @@ def _name_hint(name: str, site: ExpressionSite) -> str | None:
     if own and any(name in names for names in EVENT_NAMES.values()):
         return f"use '{own[0]}' here"
     return suggestion(name, site.names)
-
-
-UNKNOWN_STATE = error(
-    code="RC210",
-    name="unknown-state",
-    summary="A reaction uses or sets a state variable that the node does not declare.",
-    why="State variables are declared with their initial value, so that they always have one.",
-    bad="""\
-system: memory
-nodes:
-  counter:
-    state: {last: 0.0}
-    timers: {tick: {period_ms: 100, set: {lost: "{now}"}}}
-""",
-    good="""\
-system: memory
-nodes:
-  counter:
-    state: {last: 0.0}
-    timers: {tick: {period_ms: 100, set: {last: "{now}"}}}
-""",
-)
 
 
 #: Maximum number of further uses of a variable to show.
@@ -123,31 +80,6 @@ def _state_uses(context: Context) -> Iterator[tuple[Node, str, Span]]:
             if path.root == "state" and "state" in site.names and len(path.parts) > 1:
                 span = part_of_path(site.span, site.expression, path, 1)
                 yield site.node, str(path.parts[1]), span
-
-
-INDEX_OUT_OF_RANGE = warning(
-    code="RC308",
-    name="index-out-of-range",
-    summary="An element of a list or an array parameter is read that does not exist.",
-    why=(
-        "Reading it fails, unless a parameter is set to a longer array "
-        "while the node runs. Indices count from 0."
-    ),
-    bad="""\
-system: indices
-nodes:
-  robot:
-    parameters: {goal: {type: double_array, default: [1.0, 2.0]}}
-    on_activate: {log: "driving to y = {parameters.goal[2]}"}
-""",
-    good="""\
-system: indices
-nodes:
-  robot:
-    parameters: {goal: {type: double_array, default: [1.0, 2.0]}}
-    on_activate: {log: "driving to y = {parameters.goal[1]}"}
-""",
-)
 
 
 def check_index_out_of_range(context: Context) -> Iterator[Diagnostic]:

@@ -12,26 +12,9 @@ from composer.interfaces import Interfaces, Message
 from composer.rules.types import certain_field_problems
 from composer.templates import Constant, Items, Record, Template
 
-UNKNOWN_FIELD = error(
-    code="RC304",
-    name="unknown-field",
-    summary="An expression reads, or a map sets, a field that the message does not have.",
-    why="The reaction would fail on every message.",
-    bad="""\
-system: fields
-nodes:
-  listener:
-    subscriptions:
-      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.text}"}
-""",
-    good="""\
-system: fields
-nodes:
-  listener:
-    subscriptions:
-      chatter: {type: std_msgs/msg/String, qos: command, external: true, log: "{message.data}"}
-""",
-)
+UNKNOWN_FIELD = error("RC304", "unknown-field")
+INVALID_VALUE = error("RC305", "invalid-value")
+UNKNOWN_ENUMERATOR = warning("RC306", "unknown-enumerator")
 
 
 def check_unknown_field(context: Context) -> Iterator[Diagnostic]:
@@ -41,61 +24,11 @@ def check_unknown_field(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(UNKNOWN_FIELD, problem.message, problem.span, hint=problem.hint)
 
 
-INVALID_VALUE = error(
-    code="RC305",
-    name="invalid-value",
-    summary="A constant or an expression does not fit the field it is assigned to.",
-    why=(
-        "Message fields are typed and bounded: 300 does not fit a uint8, text does not fit a "
-        "number, and a condition must be a bool. The reaction would fail at run time."
-    ),
-    bad="""\
-system: values
-nodes:
-  talker:
-    publishers: {level: {type: std_msgs/msg/UInt8, qos: command, external: true}}
-    timers: {tick: {period_ms: 1000, publish: {level: {data: 300}}}}
-""",
-    good="""\
-system: values
-nodes:
-  talker:
-    publishers: {level: {type: std_msgs/msg/UInt8, qos: command, external: true}}
-    timers: {tick: {period_ms: 1000, publish: {level: {data: 200}}}}
-""",
-)
-
-
 def check_invalid_value(context: Context) -> Iterator[Diagnostic]:
     """Report the values in YAML that do not fit."""
     for problem in certain_field_problems(context):
         if not problem.missing:
             yield Diagnostic(INVALID_VALUE, problem.message, problem.span, hint=problem.hint)
-
-
-UNKNOWN_ENUMERATOR = warning(
-    code="RC306",
-    name="unknown-enumerator",
-    summary="A field for which the message defines constants is set to another number.",
-    why=(
-        "A message that defines STATUS_IDLE and STATUS_BUSY expects one of them in its field "
-        "'status'. Subscribers cannot interpret any other number."
-    ),
-    bad="""\
-system: battery
-nodes:
-  battery:
-    publishers: {charge: {type: sensor_msgs/msg/BatteryState, qos: state, external: true}}
-    timers: {tick: {period_ms: 1000, publish: {charge: {power_supply_status: 9}}}}
-""",
-    good="""\
-system: battery
-nodes:
-  battery:
-    publishers: {charge: {type: sensor_msgs/msg/BatteryState, qos: state, external: true}}
-    timers: {tick: {period_ms: 1000, publish: {charge: {power_supply_status: 2}}}}
-""",
-)
 
 
 def check_unknown_enumerator(context: Context) -> Iterator[Diagnostic]:

@@ -20,35 +20,11 @@ from composer.analysis.frames import (
 from composer.diagnostics import Diagnostic, Label, error, nearest, warning
 from composer.spelling import is_typo
 
-UNKNOWN_FRAME = error(
-    code="RC512",
-    name="unknown-frame",
-    summary="A node looks up a frame that no node broadcasts.",
-    why=(
-        "Every lookup of the frame fails. Frames of external nodes are declared as well: in "
-        "the 'transforms' of the external node or executable that broadcasts them."
-    ),
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, translation_m: {z: 0.3}}}
-  viewer:
-    external: true
-    transforms: {lookup: [base_link, lasr]}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, translation_m: {z: 0.3}}}
-  viewer:
-    external: true
-    transforms: {lookup: [base_link, laser]}
-""",
-)
+CONFLICTING_TRANSFORMS = error("RC510", "conflicting-transforms")
+FRAME_CYCLE = error("RC511", "frame-cycle")
+UNKNOWN_FRAME = error("RC512", "unknown-frame")
+UNCONNECTED_FRAMES = error("RC513", "unconnected-frames")
+SEVERAL_FRAME_TREES = warning("RC514", "several-frame-trees")
 
 
 def check_unknown_frame(context: Context) -> Iterator[Diagnostic]:
@@ -72,37 +48,6 @@ def check_unknown_frame(context: Context) -> Iterator[Diagnostic]:
                     hint = f"did you mean '{close}'?"
                 message = f"no node broadcasts the frame '{frame}' on {tree.topic}"
                 yield Diagnostic(UNKNOWN_FRAME, message, span, labels, hint)
-
-
-CONFLICTING_TRANSFORMS = error(
-    code="RC510",
-    name="conflicting-transforms",
-    summary="A frame has several parents, or several nodes broadcast it.",
-    why=(
-        "A frame has one parent and one broadcaster (REP 105). With several, tf2 uses the last "
-        "message, and the frame jumps back and forth."
-    ),
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, translation_m: {z: 0.3}}}
-  calibration:
-    transforms:
-      static: {laser: {parent: mast, translation_m: {z: 0.1}}}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {mast: {parent: base_link, translation_m: {z: 0.2}}}
-  calibration:
-    transforms:
-      static: {laser: {parent: mast, translation_m: {z: 0.1}}}
-""",
-)
 
 
 def check_conflicting_transforms(context: Context) -> Iterator[Diagnostic]:
@@ -137,35 +82,6 @@ def _broadcasters(first: Broadcast, second: Broadcast) -> str:
     return f"nodes '{first.node.name}' and '{second.node.name}'"
 
 
-FRAME_CYCLE = error(
-    code="RC511",
-    name="frame-cycle",
-    summary="Frames are parents of each other in a cycle.",
-    why=(
-        "Frames form a tree. In a cycle, tf2 finds no transform, and reports that a frame is "
-        "its own parent."
-    ),
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static:
-        laser: {parent: mast, translation_m: {z: 0.1}}
-        mast: {parent: laser, translation_m: {z: 0.2}}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static:
-        laser: {parent: mast, translation_m: {z: 0.1}}
-        mast: {parent: base_link, translation_m: {z: 0.2}}
-""",
-)
-
-
 def check_frame_cycle(context: Context) -> Iterator[Diagnostic]:
     """Report each cycle once."""
     for tree in context.once(frame_trees):
@@ -194,41 +110,6 @@ def _is_of_system(item: Broadcast) -> bool:
     return item.declared.parent.span.file == item.node.name.span.file
 
 
-UNCONNECTED_FRAMES = error(
-    code="RC513",
-    name="unconnected-frames",
-    summary="A node looks up frames that no chain of transforms connects.",
-    why=(
-        "There is a transform between two frames only if they have a common ancestor. Every "
-        "lookup between these frames fails."
-    ),
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static:
-        laser: {parent: base_link, translation_m: {z: 0.3}}
-        camera: {parent: base, translation_m: {x: 0.1}}
-  viewer:
-    external: true
-    transforms: {lookup: [laser, camera]}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static:
-        laser: {parent: base_link, translation_m: {z: 0.3}}
-        camera: {parent: base_link, translation_m: {x: 0.1}}
-  viewer:
-    external: true
-    transforms: {lookup: [laser, camera]}
-""",
-)
-
-
 def check_unconnected_frames(context: Context) -> Iterator[Diagnostic]:
     """Check the frames of each lookup."""
     for tree in complete_trees(context):
@@ -251,35 +132,6 @@ def _unconnected(tree: FrameTree, gap: Gap) -> Diagnostic:
 
 
 _PAIR = 2  # of trees
-
-SEVERAL_FRAME_TREES = warning(
-    code="RC514",
-    name="several-frame-trees",
-    summary="The frames of the system form several trees.",
-    why=(
-        "There is no transform between frames of different trees. Often the name of a parent "
-        "is misspelled, or a transform is missing. Robots that share nothing can have topics "
-        "of their own: remap /tf and /tf_static."
-    ),
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static:
-        laser: {parent: base_link, translation_m: {z: 0.3}}
-        camera: {parent: base_lnk, translation_m: {x: 0.1}}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static:
-        laser: {parent: base_link, translation_m: {z: 0.3}}
-        camera: {parent: base_link, translation_m: {x: 0.1}}
-""",
-)
 
 
 def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:

@@ -18,26 +18,10 @@ from composer.model.hosts import (
 )
 from composer.source import Located
 
-UNKNOWN_HOST = error(
-    code="RC490",
-    name="unknown-host",
-    summary="A process names an unknown host.",
-    why="Nothing would start the process, and the system would wait for it.",
-    bad="""\
-system: robot
-hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
-processes: {vision: {host: jetsom}}
-nodes:
-  camera: {process: vision, on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
-processes: {vision: {host: jetson}}
-nodes:
-  camera: {process: vision, on_activate: {log: started}}
-""",
-)
+UNKNOWN_HOST = error("RC490", "unknown-host")
+UNUSED_HOST = warning("RC491", "unused-host")
+INVALID_HOST = error("RC492", "invalid-host")
+ENVIRONMENT_VARIABLE = error("RC494", "environment-variable")
 
 
 def check_unknown_host(context: Context) -> Iterator[Diagnostic]:
@@ -58,27 +42,6 @@ def check_unknown_host(context: Context) -> Iterator[Diagnostic]:
         )
 
 
-UNUSED_HOST = warning(
-    code="RC491",
-    name="unused-host",
-    summary="A host has no process.",
-    why="Nothing of the system runs on it.",
-    bad="""\
-system: robot
-hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-hosts: {jetson: {address: 192.168.1.20, workspace: ~/robot}}
-processes: {vision: {nodes: [camera], host: jetson}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-)
-
-
 def check_unused_host(context: Context) -> Iterator[Diagnostic]:
     """Check that each host has a process; a misspelled one is reported where it is named."""
     system = context.system
@@ -97,30 +60,6 @@ def check_unused_host(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-INVALID_HOST = error(
-    code="RC492",
-    name="invalid-host",
-    summary="A host has an invalid name, address, user, file, workspace or ROS domain.",
-    why=(
-        "'compose sync' copies the project to the workspace and may delete other files there, "
-        "so it must be a folder of its own. Names of hosts become files and settings of "
-        "'compose export'; addresses, users and files are words of command lines."
-    ),
-    bad="""\
-system: robot
-hosts: {jetson: {user: robot, workspace: /home}}
-processes: {vision: {nodes: [camera], host: jetson}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-hosts: {jetson: {user: robot, workspace: /home/robot/vision}}
-processes: {vision: {nodes: [camera], host: jetson}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-)
 _WORKSPACE_HINT = "name a folder that only holds this project, such as ~/robot"
 
 
@@ -160,28 +99,6 @@ def _located(host: Host, text: str | None) -> Located[str] | None:
     return None if text is None else Located(text, host.span)
 
 
-ENVIRONMENT_VARIABLE = error(
-    code="RC494",
-    name="environment-variable",
-    summary="An environment variable has an invalid name.",
-    why=(
-        "Shells, systemd and Kubernetes accept names of letters, digits and underscores that "
-        "do not begin with a digit. Programs cannot be started with other names, or their "
-        "commands and exported files would mean something else."
-    ),
-    bad="""\
-system: robot
-processes: {vision: {nodes: [camera], environment: {OMP-NUM-THREADS: 1}}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-processes: {vision: {nodes: [camera], environment: {OMP_NUM_THREADS: 1}}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-)
 _VARIABLE_HINT = "use letters, digits and '_', and no digit at the start"
 _VARIABLE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 

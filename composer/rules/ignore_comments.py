@@ -25,30 +25,7 @@ from composer.diagnostics import (
 from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 
-UNUSED_IGNORE = warning(
-    code="RC502",
-    name="unused-ignore",
-    summary="An ignore comment suppresses no diagnostic.",
-    why=(
-        "The problem has been fixed, or the rule's name is misspelled. If the comment stays, "
-        "it hides the next problem on that line. Errors cannot be ignored, because a system "
-        "with errors does not run."
-    ),
-    bad="""\
-system: silence
-nodes:
-  talker:
-    # compose: ignore[publisher-without-subscription]
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-""",
-    good="""\
-system: silence
-nodes:
-  talker:
-    # compose: ignore[publisher-without-subscription] read with ros2 topic echo
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-""",
-)
+UNUSED_IGNORE = warning("RC502", "unused-ignore")
 
 _MARK = "compose:"
 #: A comment, not the endpoint of a quoted string: no quote follows.

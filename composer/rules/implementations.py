@@ -11,37 +11,12 @@ from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, error, warning
 from composer.model import ImplementationKind, Isolation, Node, Port, PortKind, System
 from composer.python_code.nodes.behaviors import handlers
-from composer.rules.python.definitions import rclpy_class
 from composer.source import Span
 
-SEVERAL_IMPLEMENTATIONS = error(
-    code="RC470",
-    name="several-implementations",
-    summary="A node has more than one of behavior, class and executable.",
-    why="Only one of them can be the node. What each of them offers is declared by the ports.",
-    bad="""\
-# file: system.yaml
-system: lights
-nodes:
-  lamp:
-    behavior: lamp:Lamp
-    executable: {command: [sh, driver.sh]}
-# file: lamp.py
-class Lamp:
-    pass
-# file: driver.sh
-exec driver
-""",
-    good="""\
-# file: system.yaml
-system: lights
-nodes:
-  lamp:
-    executable: {command: [sh, driver.sh]}
-# file: driver.sh
-exec driver
-""",
-)
+IDLE_PORT = warning("RC438", "idle-port")
+CLASS_SETTING = error("RC468", "class-setting")
+SEVERAL_IMPLEMENTATIONS = error("RC470", "several-implementations")
+IN_PROCESS_SETTING = error("RC474", "in-process-setting")
 
 
 def check_several_implementations(context: Context) -> Iterator[Diagnostic]:
@@ -82,61 +57,12 @@ def _call_limits(port: Port) -> Iterator[tuple[str, Span]]:
             yield f"'{name}' of {port.kind} '{port.name}'", located.span
 
 
-_SUBSCRIPTION_EXAMPLE = (
-    "    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command, external: true%s}}\n"
-)
-CLASS_SETTING = error(
-    code="RC468",
-    name="class-setting",
-    summary="A node with a class declares reactions, timers, state or limits of calls.",
-    why=(
-        "The class has callbacks and timers of its own; its ports are declared to be checked "
-        "and connected. What the YAML file says they do would have no effect."
-    ),
-    bad=rclpy_class(keys=_SUBSCRIPTION_EXAMPLE % ', log: "{message.data}"'),
-    good=rclpy_class(keys=_SUBSCRIPTION_EXAMPLE % ""),
-)
-
-
 def check_class_setting(context: Context) -> Iterator[Diagnostic]:
     """Check the nodes whose class has callbacks of its own."""
     for item in hosted_classes(context):
         for what, span in callback_settings(item.node):
             message = f"{what} has no effect: node '{item.node.name}' has a class"
             yield Diagnostic(CLASS_SETTING, message, span, hint="remove it, or write a behavior")
-
-
-IN_PROCESS_SETTING = error(
-    code="RC474",
-    name="in-process-setting",
-    summary="An executable or external node has a setting for nodes of the process.",
-    why=(
-        "The composer does not call the callbacks of these nodes: it starts their processes, "
-        "drives their lifecycle and observes their ports. The setting would have no effect. "
-        "What the type of an external node declares is for where the node runs."
-    ),
-    bad="""\
-# file: system.yaml
-system: lights
-nodes:
-  lamp:
-    executable: {command: [sh, driver.sh]}
-    subscriptions:
-      light: {type: std_msgs/msg/Bool, qos: command, external: true, log: "{message.data}"}
-# file: driver.sh
-exec driver
-""",
-    good="""\
-# file: system.yaml
-system: lights
-nodes:
-  lamp:
-    executable: {command: [sh, driver.sh]}
-    subscriptions: {light: {type: std_msgs/msg/Bool, qos: command, external: true}}
-# file: driver.sh
-exec driver
-""",
-)
 
 
 #: Keys of a node's entry that need its process, or its code.
@@ -212,24 +138,6 @@ def _settings_of_port(port: Port) -> Iterator[tuple[str, Span]]:
         if is_set:
             yield f"'{name}' of {port.kind} '{port.name}'", port.span
 
-
-_SERVICE_EXAMPLE = """\
-system: idle
-nodes:
-  planner:
-    services: {reset: {type: std_srvs/srv/Trigger%s}}
-"""
-IDLE_PORT = warning(
-    code="RC438",
-    name="idle-port",
-    summary="A timer or server has neither a behavior nor a reaction.",
-    why=(
-        "The timer has no effect. The service returns an empty response to every request, "
-        "which looks like a failure or, worse, like success."
-    ),
-    bad=_SERVICE_EXAMPLE % "",
-    good=_SERVICE_EXAMPLE % ", respond: {success: true}",
-)
 
 #: What a node without a behavior can do instead, by the kind of its port or timer.
 _MISSING_REACTIONS = {

@@ -14,26 +14,9 @@ from composer.interfaces.sources import FOLDERS
 from composer.model import ChannelKind, Port
 from composer.source import shown_path
 
-UNKNOWN_INTERFACE = error(
-    code="RC301",
-    name="unknown-interface",
-    summary=(
-        "A port's type is neither installed nor defined in an interface package of the project."
-    ),
-    why="Without the definition, the port cannot be created, and its uses cannot be checked.",
-    bad="""\
-system: types
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/Strin, qos: command, external: true}}
-""",
-    good="""\
-system: types
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-""",
-)
+UNKNOWN_INTERFACE = error("RC301", "unknown-interface")
+WRONG_INTERFACE_KIND = error("RC302", "wrong-interface-kind")
+OUTDATED_INTERFACE = error("RC307", "outdated-interface")
 
 
 def check_unknown_interface(context: Context) -> Iterator[Diagnostic]:
@@ -108,25 +91,6 @@ def _interface_hint(context: Context, port: Port) -> str | None:
     return install if hint is None else f"{install}; {hint}"
 
 
-WRONG_INTERFACE_KIND = error(
-    code="RC302",
-    name="wrong-interface-kind",
-    summary="A port has an interface of the wrong kind, such as a service type on a topic.",
-    why="Topics use message types; services and actions have their own kinds of type.",
-    bad="""\
-system: kinds
-nodes:
-  talker:
-    publishers: {trigger: {type: std_srvs/srv/Trigger, qos: command, external: true}}
-""",
-    good="""\
-system: kinds
-nodes:
-  talker:
-    clients: {trigger: {type: std_srvs/srv/Trigger, external: true}}
-""",
-)
-
 _EXPECTED = {
     ChannelKind.TOPIC: "a message type",
     ChannelKind.SERVICE: "a service type",
@@ -152,19 +116,6 @@ def check_wrong_interface_kind(context: Context) -> Iterator[Diagnostic]:
                 f"but {a(port.kind)} needs {_EXPECTED[port.kind.channel]}",
                 port.interface.span,
             )
-
-
-OUTDATED_INTERFACE = error(
-    code="RC307",
-    name="outdated-interface",
-    summary="An interface of the project has changed since its package was built.",
-    why=(
-        "Nodes use the installed package. With other fields or types, messages cannot be "
-        "built, and nodes of other processes do not receive them."
-    ),
-    bad="nano interfaces/arm_interfaces/msg/Grip.msg  # and run, without building it again",
-    good="nano interfaces/arm_interfaces/msg/Grip.msg && colcon build",
-)
 
 
 def check_outdated_interface(context: Context) -> Iterator[Diagnostic]:

@@ -13,24 +13,11 @@ from composer.model import Dependency, Node, PortKind, PortOfNode, PrimaryState,
 from composer.model.dependencies import dependency_cycles
 from composer.source import Located
 
-DEPENDENCY_CYCLE = error(
-    code="RC401",
-    name="dependency-cycle",
-    summary="Nodes depend on each other in a cycle.",
-    why="None of them can start first.",
-    bad="""\
-system: cycle
-nodes:
-  planner: {lifecycle: {depends_on: [mapper]}}
-  mapper: {lifecycle: {depends_on: [planner]}}
-""",
-    good="""\
-system: cycle
-nodes:
-  planner: {lifecycle: {depends_on: [mapper]}}
-  mapper: {on_activate: {log: ready}}
-""",
-)
+UNKNOWN_WATCHED_PUBLISHER = error("RC213", "unknown-watched-publisher")
+DEPENDENCY_CYCLE = error("RC401", "dependency-cycle")
+DEPENDENCY_NOT_REACHED = warning("RC402", "dependency-not-reached")
+NOTHING_TO_WATCH = error("RC404", "nothing-to-watch")
+SILENCE_TOO_SHORT = error("RC405", "silence-too-short")
 
 
 def check_dependency_cycle(context: Context) -> Iterator[Diagnostic]:
@@ -61,28 +48,6 @@ def _dependency(system: System, name: str, other: str) -> Dependency:
     found = node.depends_on if node is not None else ()
     return next(item for item in found if item.node.value == other)
 
-
-DEPENDENCY_NOT_REACHED = warning(
-    code="RC402",
-    name="dependency-not-reached",
-    summary="A node depends on a state that the other node's autostart does not reach.",
-    why=(
-        "The bring-up leaves the dependent node inactive until the other node is moved to "
-        "that state manually."
-    ),
-    bad="""\
-system: waiting
-nodes:
-  planner: {lifecycle: {autostart: inactive}}
-  motor_controller: {lifecycle: {depends_on: [planner]}}
-""",
-    good="""\
-system: waiting
-nodes:
-  planner: {lifecycle: {autostart: inactive}}
-  motor_controller: {lifecycle: {depends_on: {planner: inactive}}}
-""",
-)
 
 _RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
 
@@ -122,28 +87,6 @@ def _autostart_hint(reached: PrimaryState) -> str:
     return f"raise its autostart, or depend on it being {reached}"
 
 
-UNKNOWN_WATCHED_PUBLISHER = error(
-    code="RC213",
-    name="unknown-watched-publisher",
-    summary="topic_silence_ms names a publisher that the node does not have.",
-    why="The publisher would not be monitored, and its silence would go unnoticed.",
-    bad="""\
-system: watching
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
-    lifecycle: {watch: {topic_silence_ms: {scans: 500}}}
-""",
-    good="""\
-system: watching
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
-    lifecycle: {watch: {topic_silence_ms: {scan: 500}}}
-""",
-)
-
-
 def check_unknown_watched_publisher(context: Context) -> Iterator[Diagnostic]:
     """Compare the watched publishers with the declared ones."""
     errors = context.once(earlier_errors)
@@ -161,28 +104,6 @@ def check_unknown_watched_publisher(context: Context) -> Iterator[Diagnostic]:
                 )
 
 
-NOTHING_TO_WATCH = error(
-    code="RC404",
-    name="nothing-to-watch",
-    summary="topic_silence_ms is set for a node without publishers.",
-    why="A node without publishers is always silent, so it would fail repeatedly.",
-    bad="""\
-system: watching
-nodes:
-  logger:
-    subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
-    lifecycle: {watch: {topic_silence_ms: 500}}
-""",
-    good="""\
-system: watching
-nodes:
-  logger:
-    subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true, log: scan}}
-    lifecycle: {watch: {callback_ms: 500}}
-""",
-)
-
-
 def check_nothing_to_watch(context: Context) -> Iterator[Diagnostic]:
     """Check every node that is watched as a whole."""
     errors = context.once(earlier_errors)
@@ -198,33 +119,6 @@ def check_nothing_to_watch(context: Context) -> Iterator[Diagnostic]:
             limit.span,
             hint="watch the nodes that publish its input, or set 'callback_ms'",
         )
-
-
-SILENCE_TOO_SHORT = error(
-    code="RC405",
-    name="silence-too-short",
-    summary="topic_silence_ms is not longer than the publishing period.",
-    why=(
-        "The node would fail although it publishes on time. Timers are never exact, so allow "
-        "for several periods."
-    ),
-    bad="""\
-system: watching
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
-    timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
-    lifecycle: {watch: {topic_silence_ms: 50}}
-""",
-    good="""\
-system: watching
-nodes:
-  lidar:
-    publishers: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}
-    timers: {spin: {period_ms: 100, publish: {scan: {data: beep}}}}
-    lifecycle: {watch: {topic_silence_ms: 500}}
-""",
-)
 
 
 def check_silence_too_short(context: Context) -> Iterator[Diagnostic]:

@@ -19,25 +19,15 @@ from composer.names import (
 )
 from composer.source import Located, Span
 
-INVALID_NODE_NAME = error(
-    code="RC221",
-    name="invalid-node-name",
-    summary="A node name is not valid in ROS.",
-    why=(
-        "Node names consist of letters, digits and underscores and do not start with a digit "
-        "(rmw_validate_node_name). rclpy refuses to create a node with any other name."
-    ),
-    bad="""\
-system: names
-nodes:
-  front-camera: {on_activate: {log: started}}
-""",
-    good="""\
-system: names
-nodes:
-  front_camera: {on_activate: {log: started}}
-""",
-)
+INVALID_NODE_NAME = error("RC221", "invalid-node-name")
+INVALID_NAMESPACE = error("RC222", "invalid-namespace")
+INVALID_ROS_NAME = error("RC223", "invalid-ros-name")
+INVALID_PARAMETER_NAME = error("RC224", "invalid-parameter-name")
+DUPLICATE_PORT_NAME = error("RC225", "duplicate-port-name")
+DUPLICATE_FULL_NAME = error("RC227", "duplicate-full-name")
+DEEP_NAMESPACE = warning("RC231", "deep-namespace")
+HIDDEN_NAME = info("RC232", "hidden-name")
+PRIVATE_CONNECTION_NAME = error("RC233", "private-connection-name")
 
 
 def check_invalid_node_name(context: Context) -> Iterator[Diagnostic]:
@@ -62,28 +52,6 @@ def _check_node_name(name: Located[str], names: set[str]) -> Iterator[Diagnostic
             name.span,
             hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
         )
-
-
-INVALID_NAMESPACE = error(
-    code="RC222",
-    name="invalid-namespace",
-    summary="A namespace is not valid in ROS.",
-    why=(
-        "The parts of a namespace consist of letters, digits and underscores, do not start "
-        "with a digit, and are separated by single slashes (rmw_validate_namespace). The name "
-        "of a system is such a part: its manager node is /<system>/manager."
-    ),
-    bad="""\
-system: names
-nodes:
-  camera: {namespace: robot 1, on_activate: {log: started}}
-""",
-    good="""\
-system: names
-nodes:
-  camera: {namespace: robot_1, on_activate: {log: started}}
-""",
-)
 
 
 def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
@@ -126,33 +94,6 @@ def _invalid_system_name(system: System) -> Iterator[Diagnostic]:
         yield Diagnostic(INVALID_NAMESPACE, f"system name '{name}' {problem}", name.span, hint=hint)
 
 
-INVALID_ROS_NAME = error(
-    code="RC223",
-    name="invalid-ros-name",
-    summary="The name of a topic, service or action is not valid in ROS.",
-    why=(
-        "The parts of a name consist of letters, digits and underscores, do not start with a "
-        "digit, and are separated by single slashes; '~' is allowed only at the start "
-        "(rcl_validate_topic_name). rclpy refuses any other name."
-    ),
-    bad="""\
-system: names
-nodes:
-  talker:
-    publishers:
-      chatter:
-        {type: std_msgs/msg/String, qos: command, topic: /news//today, external: true}
-""",
-    good="""\
-system: names
-nodes:
-  talker:
-    publishers:
-      chatter: {type: std_msgs/msg/String, qos: command, topic: /news/today, external: true}
-""",
-)
-
-
 def check_invalid_ros_name(context: Context) -> Iterator[Diagnostic]:
     """Check the names of ports, of connections, and in remappings."""
     for kind, name in _ros_names(context):
@@ -174,29 +115,6 @@ def _ros_names(context: Context) -> Iterator[tuple[str, Located[str]]]:
             yield connection.kind.value, connection.name
 
 
-INVALID_PARAMETER_NAME = error(
-    code="RC224",
-    name="invalid-parameter-name",
-    summary="A parameter name does not consist of words separated by dots.",
-    why=(
-        "Parameter files, the command line and expressions can refer only to names that "
-        "consist of letters, digits and underscores, separated by dots."
-    ),
-    bad="""\
-system: names
-nodes:
-  motor:
-    parameters: {max velocity: {type: double, default: 1.0}}
-""",
-    good="""\
-system: names
-nodes:
-  motor:
-    parameters: {max_velocity: {type: double, default: 1.0}}
-""",
-)
-
-
 def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
     """Check the name of every declared parameter. rcl passes any name on to other nodes."""
     for node in context.system.nodes:
@@ -216,34 +134,6 @@ def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
                 )
 
 
-PRIVATE_CONNECTION_NAME = error(
-    code="RC233",
-    name="private-connection-name",
-    summary="A connection has a private name, but does not belong to a single node.",
-    why="'~' stands for the node that uses the name, and a connection has no such node.",
-    bad="""\
-system: private
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: ~/chatter, from: talker.chatter, to: listener.chatter}
-""",
-    good="""\
-system: private
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /talker/chatter, from: talker.chatter, to: listener.chatter}
-""",
-)
-
-
 def check_private_connection_name(context: Context) -> Iterator[Diagnostic]:
     """Check the names of connections."""
     for connection in context.system.connections:
@@ -255,29 +145,6 @@ def check_private_connection_name(context: Context) -> Iterator[Diagnostic]:
                 name.span,
                 hint="use an absolute name, such as '/node/topic'",
             )
-
-
-DUPLICATE_FULL_NAME = error(
-    code="RC227",
-    name="duplicate-full-name",
-    summary="Two nodes have the same name and namespace in ROS.",
-    why=(
-        "ROS starts both, with a warning. Then requests to parameter and lifecycle services "
-        "reach either node, and tools show only one of them."
-    ),
-    bad="""\
-system: names
-nodes:
-  front: {name: camera, on_activate: {log: started}}
-  rear: {name: camera, on_activate: {log: started}}
-""",
-    good="""\
-system: names
-nodes:
-  front: {name: camera, namespace: front, on_activate: {log: started}}
-  rear: {name: camera, namespace: rear, on_activate: {log: started}}
-""",
-)
 
 
 def check_duplicate_full_name(context: Context) -> Iterator[Diagnostic]:
@@ -302,31 +169,6 @@ def _full_names(node: Node) -> Iterator[tuple[str, Span]]:
         yield name, node.name.span
 
 
-DUPLICATE_PORT_NAME = error(
-    code="RC225",
-    name="duplicate-port-name",
-    summary="Two ports of different kinds have the same name in one node.",
-    why=(
-        "Connections refer to 'node.port' and handlers bind by name, so a name must identify "
-        "one port. The two ports can still share a topic: set it with 'topic:'."
-    ),
-    bad="""\
-system: ports
-nodes:
-  relay:
-    subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command, external: true}}
-    publishers: {speed: {type: std_msgs/msg/Float64, qos: command, topic: ~/speed, external: true}}
-""",
-    good="""\
-system: ports
-nodes:
-  relay:
-    subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command, external: true}}
-    publishers: {limited: {type: std_msgs/msg/Float64, qos: command, external: true}}
-""",
-)
-
-
 def check_duplicate_port_name(context: Context) -> Iterator[Diagnostic]:
     """Check for names that a node uses twice."""
     for node in context.system.nodes:
@@ -342,26 +184,6 @@ def check_duplicate_port_name(context: Context) -> Iterator[Diagnostic]:
                     "rename one of them",
                 )
 
-
-DEEP_NAMESPACE = warning(
-    code="RC231",
-    name="deep-namespace",
-    summary="A namespace has more than three levels.",
-    why=(
-        "Two or three levels (robot, subsystem, device) are enough to locate a node. Deeper "
-        "names are easily mistyped or remapped wrongly, and tools truncate them."
-    ),
-    bad="""\
-system: deep
-nodes:
-  driver: {namespace: /robot/front/left/camera, on_activate: {log: started}}
-""",
-    good="""\
-system: deep
-nodes:
-  driver: {namespace: /robot/camera_front_left, on_activate: {log: started}}
-""",
-)
 
 _MAX_LEVELS = 3
 
@@ -383,29 +205,6 @@ def check_deep_namespace(context: Context) -> Iterator[Diagnostic]:
             namespace.span,
             hint="merge or drop levels that do not distinguish nodes",
         )
-
-
-HIDDEN_NAME = info(
-    code="RC232",
-    name="hidden-name",
-    summary="A part of a name starts with an underscore, so ROS tools hide it.",
-    why=(
-        "ROS reserves a leading underscore for hidden names. 'ros2 topic list', rqt and "
-        "rosbag omit them by default, so they are easily overlooked."
-    ),
-    bad="""\
-system: hidden
-nodes:
-  talker:
-    publishers: {_status: {type: std_msgs/msg/String, qos: state, external: true}}
-""",
-    good="""\
-system: hidden
-nodes:
-  talker:
-    publishers: {status: {type: std_msgs/msg/String, qos: state, external: true}}
-""",
-)
 
 
 def check_hidden_name(context: Context) -> Iterator[Diagnostic]:

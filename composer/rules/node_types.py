@@ -13,26 +13,10 @@ from composer.project import SETTINGS_FILE, Project
 from composer.resolve.tree_values import is_opaque
 from composer.source import Located, shown_path
 
-UNKNOWN_NODE_TYPE = error(
-    code="RC201",
-    name="unknown-node-type",
-    summary="A node's type is neither in the project's nodes/ folder nor built in.",
-    why="Without the type, the ports and the behavior of the node are unknown.",
-    bad="""\
-system: stubs
-nodes:
-  planner:
-    type: servce_stub
-    variables: {service_type: std_srvs/srv/Trigger}
-""",
-    good="""\
-system: stubs
-nodes:
-  planner:
-    type: service_stub
-    variables: {service_type: std_srvs/srv/Trigger}
-""",
-)
+UNKNOWN_NODE_TYPE = error("RC201", "unknown-node-type")
+REPLACED_NODE_TYPE = warning("RC214", "replaced-node-type")
+NODE_TYPE_NAME = warning("RC215", "node-type-name")
+UNUSED_NODE_TYPE = info("RC244", "unused-node-type")
 
 
 def check_unknown_node_type(context: Context) -> Iterator[Diagnostic]:
@@ -57,37 +41,6 @@ def check_unknown_node_type(context: Context) -> Iterator[Diagnostic]:
         )
 
 
-REPLACED_NODE_TYPE = warning(
-    code="RC214",
-    name="replaced-node-type",
-    summary="A nodes folder that no settings declare replaces a built-in node type.",
-    why=(
-        "Without settings, the nearest folder named nodes in any parent folder is used. It may "
-        "have nothing to do with the system."
-    ),
-    bad="""\
-# file: system.yaml
-system: demo
-nodes:
-  echo: {type: relay}
-# file: nodes/relay.yaml
-node: relay
-on_activate: {log: started}
-""",
-    good="""\
-# file: system.yaml
-system: demo
-nodes:
-  echo: {type: relay}
-# file: nodes/relay.yaml
-node: relay
-on_activate: {log: started}
-# file: composer.yaml
-nodes: [nodes]
-""",
-)
-
-
 def check_replaced_node_type(context: Context) -> Iterator[Diagnostic]:
     """Check the file of every node type, once."""
     seen = set()
@@ -107,29 +60,6 @@ def check_replaced_node_type(context: Context) -> Iterator[Diagnostic]:
                 hint=f"rename it, or create {shown_path(project.root / SETTINGS_FILE)}, which"
                 " declares the project",
             )
-
-
-NODE_TYPE_NAME = warning(
-    code="RC215",
-    name="node-type-name",
-    summary="A node type has another name than its file.",
-    why=(
-        "Systems refer to a node type by the name of its file, so 'node' is never found "
-        "under its own name."
-    ),
-    bad="""\
-# file: nodes/talker.yaml
-node: taker
-publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
-""",
-    good="""\
-# file: nodes/talker.yaml
-node: talker
-publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
-""",
-)
 
 
 _SUFFIXES = frozenset({".yaml", ".yml"})
@@ -155,26 +85,6 @@ def _compare_with_file(name: Located[str]) -> Iterator[Diagnostic]:
             name.span,
             hint=f"write 'node: {file.stem}', or rename the file to '{name}{file.suffix}'",
         )
-
-
-UNUSED_NODE_TYPE = info(
-    code="RC244",
-    name="unused-node-type",
-    summary="No validated system uses a validated node type.",
-    why=(
-        "The node type is left over, or a system uses another one instead. Reported only if "
-        "systems and node types are validated together."
-    ),
-    bad="""\
-nodes/planner.yaml
-nodes/old_planner.yaml
-systems/pipeline.yaml    # uses planner only
-""",
-    good="""\
-nodes/planner.yaml
-systems/pipeline.yaml    # uses planner
-""",
-)
 
 
 def unused_node_types(loaded: Iterable[System]) -> Iterator[Diagnostic]:

@@ -20,27 +20,11 @@ from composer.analysis.parameters import (
 from composer.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import USE_SIM_TIME, Parameter, ParameterType
 
-PARAMETER_TYPE = error(
-    code="RC421",
-    name="parameter-type",
-    summary="A parameter's value does not have the declared type.",
-    why=(
-        "ROS parameters are typed, so the node refuses the value at startup. An integer is "
-        "accepted for a double; nothing else is converted."
-    ),
-    bad="""\
-system: parameters
-nodes:
-  motor:
-    parameters: {max_velocity: {type: double, default: fast}}
-""",
-    good="""\
-system: parameters
-nodes:
-  motor:
-    parameters: {max_velocity: {type: double, default: 1.0}}
-""",
-)
+PARAMETER_TYPE = error("RC421", "parameter-type")
+PARAMETER_RANGE = error("RC422", "parameter-range")
+PARAMETER_CHOICE = error("RC423", "parameter-choice")
+PARAMETER_DECLARATION = error("RC425", "parameter-declaration")
+PARAMETER_WITHOUT_TYPE = error("RC426", "parameter-without-type")
 
 
 def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
@@ -61,28 +45,6 @@ def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
             value.span,
             labels,
         )
-
-
-PARAMETER_RANGE = error(
-    code="RC422",
-    name="parameter-range",
-    summary="A parameter's value violates the declared minimum, maximum or step.",
-    why="The node refuses the value at startup.",
-    bad="""\
-system: parameters
-nodes:
-  motor:
-    parameters:
-      max_velocity: {type: double, default: 9.0, minimum: 0.0, maximum: 5.0, unit: m/s}
-""",
-    good="""\
-system: parameters
-nodes:
-  motor:
-    parameters:
-      max_velocity: {type: double, default: 5.0, minimum: 0.0, maximum: 5.0, unit: m/s}
-""",
-)
 
 
 def check_parameter_range(context: Context) -> Iterator[Diagnostic]:
@@ -106,26 +68,6 @@ def _is_contradictory(parameter: Parameter) -> bool:
     return low is not None and high is not None and low.value > high.value
 
 
-PARAMETER_CHOICE = error(
-    code="RC423",
-    name="parameter-choice",
-    summary="A parameter's value is not one of the declared choices.",
-    why="The node refuses the value at startup.",
-    bad="""\
-system: parameters
-nodes:
-  motor:
-    parameters: {mode: {type: string, default: fats, choices: [slow, fast]}}
-""",
-    good="""\
-system: parameters
-nodes:
-  motor:
-    parameters: {mode: {type: string, default: fast, choices: [slow, fast]}}
-""",
-)
-
-
 def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
     """Check values against the choices; each element of a list must be one of them."""
     reported = ReportedValues()
@@ -145,28 +87,6 @@ def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
             suggestion(str(invalid), [str(choice) for choice in choices.value]),
         )
 
-
-PARAMETER_DECLARATION = error(
-    code="RC425",
-    name="parameter-declaration",
-    summary="A parameter's declaration contradicts itself.",
-    why=(
-        "A minimum above the maximum leaves no valid value, a range applies only to numbers, "
-        "and a choice of another type can never be selected."
-    ),
-    bad="""\
-system: parameters
-nodes:
-  motor:
-    parameters: {max_velocity: {type: double, default: 3.0, minimum: 5.0, maximum: 1.0}}
-""",
-    good="""\
-system: parameters
-nodes:
-  motor:
-    parameters: {max_velocity: {type: double, default: 3.0, minimum: 1.0, maximum: 5.0}}
-""",
-)
 
 _WITH_RANGE = frozenset(
     {
@@ -227,29 +147,6 @@ def _choices_of_other_type(parameter: Parameter) -> Iterator[Diagnostic]:
             f"{describe(wrong[0])}{and_others(len(wrong) - 1)} among its choices",
             parameter.choices.span,
         )
-
-
-PARAMETER_WITHOUT_TYPE = error(
-    code="RC426",
-    name="parameter-without-type",
-    summary="A parameter is declared with a value from which its type cannot be inferred.",
-    why=(
-        "ROS parameters are typed. Most values determine the type, but an empty list fits "
-        "every array type, and a list of mixed types fits none."
-    ),
-    bad="""\
-system: parameters
-nodes:
-  driver:
-    parameters: {waypoints: []}
-""",
-    good="""\
-system: parameters
-nodes:
-  driver:
-    parameters: {waypoints: {type: double_array, default: []}}
-""",
-)
 
 
 def check_parameter_without_type(context: Context) -> Iterator[Diagnostic]:

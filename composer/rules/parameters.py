@@ -26,36 +26,10 @@ from composer.names import namespace_problem, split_node_name
 from composer.source import Located, Span
 from composer.spelling import is_typo
 
-UNKNOWN_PARAMETER = error(
-    code="RC206",
-    name="unknown-parameter",
-    summary="A parameter that is not declared is set, or read by an expression.",
-    why=(
-        "A misspelled parameter leaves the real one at its default, which goes unnoticed "
-        "until the robot moves at the wrong speed. A class, an executable or an external node "
-        "may have parameters that it does not declare: without 'only_declared', only a "
-        "probable misspelling is reported, as an info."
-    ),
-    bad="""\
-system: parameters
-nodes:
-  source:
-    type: timer_source
-    variables: {message_type: std_msgs/msg/String}
-    publishers: {output: {external: true}}
-    parameters: {rate: 2.0}
-""",
-    good="""\
-system: parameters
-nodes:
-  source:
-    type: timer_source
-    variables: {message_type: std_msgs/msg/String}
-    publishers: {output: {external: true}}
-    parameters: {rate_hz: 2.0}
-""",
-)
-
+UNKNOWN_PARAMETER = error("RC206", "unknown-parameter")
+SIMILAR_PARAMETER = warning("RC216", "similar-parameter")
+UNMATCHED_PARAMETERS = warning("RC246", "unmatched-parameters")
+MISSING_PARAMETER = error("RC424", "missing-parameter")
 
 _UNKNOWN_PARAMETER_IF_PASSED_ON = replace(UNKNOWN_PARAMETER, severity=Severity.INFO)
 _SEVERAL = 2
@@ -158,26 +132,6 @@ def _parameter_uses(
                 yield node_name, path.key(known[node_name]) or str(path.parts[1]), span
 
 
-MISSING_PARAMETER = error(
-    code="RC424",
-    name="missing-parameter",
-    summary="A parameter without a default has no value.",
-    why="A parameter without a default is required: the node cannot run without a value.",
-    bad="""\
-system: parameters
-nodes:
-  camera:
-    parameters: {serial_number: {type: string}}
-""",
-    good="""\
-system: parameters
-nodes:
-  camera:
-    parameters: {serial_number: {type: string, default: A-1047}}
-""",
-)
-
-
 def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
     """Check for parameters without a value. A node type alone does not need them."""
     if context.system.node_type:
@@ -198,37 +152,6 @@ def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
                     (Label(parameter.name.span, "declared without a default"),),
                     f"add 'parameters: {{{parameter.name}: ...}}' to the node",
                 )
-
-
-SIMILAR_PARAMETER = warning(
-    code="RC216",
-    name="similar-parameter",
-    summary="A derived node type declares an unused parameter, named like one of its base.",
-    why=(
-        "A value in 'parameters' sets a parameter of the base type, or declares a new one. "
-        "If the name is misspelled, the real parameter silently keeps its default."
-    ),
-    bad="""\
-# file: nodes/fast.yaml
-node: fast
-extends: base
-parameters: {sped: 2.0}
-# file: nodes/base.yaml
-node: base
-parameters: {speed: 1.0}
-on_activate: {log: "at {parameters.speed} m/s"}
-""",
-    good="""\
-# file: nodes/fast.yaml
-node: fast
-extends: base
-parameters: {speed: 2.0}
-# file: nodes/base.yaml
-node: base
-parameters: {speed: 1.0}
-on_activate: {log: "at {parameters.speed} m/s"}
-""",
-)
 
 
 def check_similar_parameter(context: Context) -> Iterator[Diagnostic]:
@@ -280,36 +203,6 @@ def _similar(node: Node, parameter: Parameter) -> Iterator[Diagnostic]:
                 f"did you mean '{meant}'?",
             )
             return
-
-
-UNMATCHED_PARAMETERS = warning(
-    code="RC246",
-    name="unmatched-parameters",
-    summary="A parameter file sets values for a node or parameter that does not exist.",
-    why=(
-        "Parameter files use the full ROS names of nodes, with the namespace and the prefixes "
-        "of includes. Values under any other name are ignored, and the node keeps its "
-        "defaults."
-    ),
-    bad="""\
-# file: system.yaml
-system: parameters
-parameter_files: [robot.yaml]
-nodes:
-  motor: {namespace: control, parameters: {speed: {type: double, default: 1.0}}}
-# file: robot.yaml
-/motor: {ros__parameters: {speed: 2.0}}
-""",
-    good="""\
-# file: system.yaml
-system: parameters
-parameter_files: [robot.yaml]
-nodes:
-  motor: {namespace: control, parameters: {speed: {type: double, default: 1.0}}}
-# file: robot.yaml
-/control/motor: {ros__parameters: {speed: 2.0}}
-""",
-)
 
 
 #: A program may create a node with the name of the section, and gets its values.

@@ -11,26 +11,11 @@ from composer.model import Channel
 from composer.names import topic_name_problem
 from composer.source import Located
 
-UNKNOWN_PROCESS = error(
-    code="RC478",
-    name="unknown-process",
-    summary="A node names an unknown process, or a process an unknown node.",
-    why="No process would run the node.",
-    bad="""\
-system: robot
-processes: {vision: {nodes: [camra]}}
-nodes:
-  camera: {on_activate: {log: started}}
-  detector: {process: vison, on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-processes: {vision: {nodes: [camera]}}
-nodes:
-  camera: {on_activate: {log: started}}
-  detector: {process: vision, on_activate: {log: started}}
-""",
-)
+UNKNOWN_PROCESS = error("RC478", "unknown-process")
+CONFLICTING_PROCESS = error("RC479", "conflicting-process")
+SEPARATE_PROCESS = error("RC482", "separate-process")
+MANY_SERVICES = warning("RC488", "many-services")
+ISOLATION_BETWEEN_PROCESSES = info("RC541", "isolation-between-processes")
 
 
 def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
@@ -61,31 +46,6 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
                 node_name.span,
                 hint=suggestion(node_name.value, nodes),
             )
-
-
-CONFLICTING_PROCESS = error(
-    code="RC479",
-    name="conflicting-process",
-    summary="A node is in two processes, or a process has no node or no valid name.",
-    why=(
-        "Two processes with the same node would publish everything twice. A process is part of "
-        "names in ROS, and one without nodes does nothing."
-    ),
-    bad="""\
-system: robot
-processes: {vision: {nodes: [camera]}, control: {nodes: ["*"]}}
-nodes:
-  camera: {on_activate: {log: started}}
-  arm: {on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-processes: {vision: {nodes: [camera]}, control: {nodes: [arm]}}
-nodes:
-  camera: {on_activate: {log: started}}
-  arm: {on_activate: {log: started}}
-""",
-)
 
 
 def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
@@ -133,29 +93,6 @@ def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-SEPARATE_PROCESS = error(
-    code="RC482",
-    name="separate-process",
-    summary="The environment of a process separates it from the other processes.",
-    why=(
-        "A process in another ROS domain, or without discovery, cannot be brought up, and its "
-        "nodes receive nothing from the others."
-    ),
-    bad="""\
-system: robot
-processes:
-  vision: {nodes: [camera], environment: {ROS_DOMAIN_ID: "7"}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-    good="""\
-system: robot
-processes:
-  vision: {nodes: [camera], environment: {OMP_NUM_THREADS: "2"}}
-nodes:
-  camera: {on_activate: {log: started}}
-""",
-)
 _DOMAIN, _DISCOVERY_RANGE = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
@@ -177,42 +114,6 @@ def check_separate_process(context: Context) -> Iterator[Diagnostic]:
                     name.span,
                     hint="remove it",
                 )
-
-
-ISOLATION_BETWEEN_PROCESSES = info(
-    code="RC541",
-    name="isolation-between-processes",
-    summary="A connection whose ports are in different processes has 'isolation'.",
-    why=(
-        "Between processes, messages go through DDS: each receiver has an object of its own, "
-        "and none is shared. The setting has no effect. With 'share', the nodes were probably "
-        "meant to be in one process, for example to exchange images without copies."
-    ),
-    bad="""\
-system: robot
-processes: {vision: {nodes: [camera]}}
-nodes:
-  camera:
-    publishers: {image: {type: std_msgs/msg/String, qos: command}}
-    timers: {tick: {period_ms: 100, publish: {image: {data: picture}}}}
-  detector:
-    subscriptions: {image: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
-connections:
-  - {topic: /image, from: camera.image, to: detector.image, isolation: share}
-""",
-    good="""\
-system: robot
-processes: {vision: {nodes: [camera, detector]}}
-nodes:
-  camera:
-    publishers: {image: {type: std_msgs/msg/String, qos: command}}
-    timers: {tick: {period_ms: 100, publish: {image: {data: picture}}}}
-  detector:
-    subscriptions: {image: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
-connections:
-  - {topic: /image, from: camera.image, to: detector.image, isolation: share}
-""",
-)
 
 
 def check_isolation_between_processes(context: Context) -> Iterator[Diagnostic]:
@@ -252,33 +153,6 @@ def _has_pair_in_process(channel: Channel) -> bool:
     )
 
 
-MANY_SERVICES = warning(
-    code="RC488",
-    name="many-services",
-    summary="The processes of a system have so many services for tools that it may not start.",
-    why=(
-        "A node has about 28 endpoints for tools: services for parameters and its lifecycle, "
-        "and publishers of its log and its changes. Each process compares its own endpoints "
-        "with those of all others, so the time to start grows with the square of their number. "
-        "On two processors, ten processes with 200 nodes take half a minute, and 400 nodes do "
-        "not come up. Commands of compose need none of these services."
-    ),
-    bad="""\
-system: fleet
-processes: {second: {nodes: ["robot_*"]}}
-nodes:
-  station: {on_activate: {log: started}}
-  "robot_${index}": {for_each: {index: 200}, on_activate: {log: started}}
-""",
-    good="""\
-system: fleet
-introspection: {parameters: false, type_description: false, lifecycle_services: false}
-processes: {second: {nodes: ["robot_*"]}}
-nodes:
-  station: {on_activate: {log: started}}
-  "robot_${index}": {for_each: {index: 200}, on_activate: {log: started}}
-""",
-)
 #: Of about 180 nodes with all services.
 _MOST_ENDPOINTS = 5000
 

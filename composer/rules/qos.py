@@ -12,34 +12,14 @@ from composer.diagnostics import Diagnostic, Label, info, warning
 from composer.model import ChannelKind, Port, PortKind, PortOfNode
 from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
 
-_PERIOD_EXAMPLE = """\
-system: timing
-nodes:
-  robot:
-    publishers:
-      pose: {type: geometry_msgs/msg/Pose, qos: {%s}, external: true}
-    timers: {step: {period_ms: 100, publish: {pose: {}}}}
-"""
-
-DEADLINE_TOO_SHORT = warning(
-    code="RC312",
-    name="deadline-too-short",
-    summary="A publisher's deadline is shorter than its publishing period.",
-    why="Every message is late, and every subscription reports a missed deadline.",
-    bad=_PERIOD_EXAMPLE % "deadline_ms: 50",
-    good=_PERIOD_EXAMPLE % "deadline_ms: 150",
-)
-LIFESPAN_TOO_SHORT = warning(
-    code="RC313",
-    name="lifespan-too-short",
-    summary="A publisher's lifespan is shorter than its publishing period.",
-    why=(
-        "Between an expired message and the next one there is no message: a late joiner or a "
-        "slow subscription receives nothing."
-    ),
-    bad=_PERIOD_EXAMPLE % "lifespan_ms: 50",
-    good=_PERIOD_EXAMPLE % "lifespan_ms: 200",
-)
+DEADLINE_TOO_SHORT = warning("RC312", "deadline-too-short")
+LIFESPAN_TOO_SHORT = warning("RC313", "lifespan-too-short")
+KEEP_ALL = info("RC314", "keep-all")
+SHALLOW_QUEUE = info("RC315", "shallow-queue")
+UNRELIABLE_COMMAND = info("RC316", "unreliable-command")
+RELIABLE_SENSOR_STREAM = info("RC317", "reliable-sensor-stream")
+LEASE_TOO_SHORT = warning("RC319", "lease-too-short")
+UNRELIABLE_STATE = info("RC532", "unreliable-state")
 
 
 def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
@@ -67,40 +47,6 @@ def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-LEASE_TOO_SHORT = warning(
-    code="RC319",
-    name="lease-too-short",
-    summary="A publisher's liveliness lease is shorter than its publishing period.",
-    why=(
-        "With 'liveliness: manual_by_topic', each message renews the lease. If it ends "
-        "before the next message, every subscription reports that the publisher is not "
-        "alive."
-    ),
-    bad="""\
-system: liveliness
-nodes:
-  robot:
-    publishers:
-      pose:
-        type: geometry_msgs/msg/Pose
-        qos: {liveliness: manual_by_topic, liveliness_lease_duration_ms: 50}
-        external: true
-    timers: {step: {period_ms: 100, publish: {pose: {}}}}
-""",
-    good="""\
-system: liveliness
-nodes:
-  robot:
-    publishers:
-      pose:
-        type: geometry_msgs/msg/Pose
-        qos: {liveliness: manual_by_topic, liveliness_lease_duration_ms: 300}
-        external: true
-    timers: {step: {period_ms: 100, publish: {pose: {}}}}
-""",
-)
-
-
 def check_lease_too_short(context: Context) -> Iterator[Diagnostic]:
     """Compare the leases that messages renew with the periods of the publishing timers."""
     for endpoint, period_s in context.once(timed_publishers):
@@ -116,33 +62,6 @@ def check_lease_too_short(context: Context) -> Iterator[Diagnostic]:
                 hint="make the lease longer than the period, with some margin",
             )
 
-
-SHALLOW_QUEUE = warning(
-    code="RC315",
-    name="shallow-queue",
-    summary="A reliable topic with a high rate has a queue depth of 1.",
-    why=(
-        "Reliable delivery loses no message in transit, but a queue of depth 1 replaces each "
-        "message that is not taken before the next one arrives. If only the latest value "
-        "matters, use best effort or transient local."
-    ),
-    bad="""\
-system: queues
-nodes:
-  robot:
-    publishers:
-      order: {type: std_msgs/msg/String, qos: {extends: command, depth: 1}, external: true}
-    timers: {step: {rate_hz: 50, publish: {order: {data: go}}}}
-""",
-    good="""\
-system: queues
-nodes:
-  robot:
-    publishers:
-      order: {type: std_msgs/msg/String, qos: {extends: command, depth: 10}, external: true}
-    timers: {step: {rate_hz: 50, publish: {order: {data: go}}}}
-""",
-)
 
 #: In hertz; on slower topics a message is taken before the next one arrives.
 FAST_HZ = 10.0
@@ -175,31 +94,6 @@ def _is_shallow(profile: QosProfile) -> bool:
     )
 
 
-KEEP_ALL = info(
-    code="RC314",
-    name="keep-all",
-    summary="A publisher or subscription keeps all messages.",
-    why=(
-        "If a subscription is slower than its publisher, the queue grows until memory runs "
-        "out, or a reliable publisher blocks. Set a depth instead."
-    ),
-    bad="""\
-system: queues
-nodes:
-  talker:
-    publishers:
-      chatter: {type: std_msgs/msg/String, qos: {history: keep_all}, external: true}
-""",
-    good="""\
-system: queues
-nodes:
-  talker:
-    publishers:
-      chatter: {type: std_msgs/msg/String, qos: {history: keep_last, depth: 100}, external: true}
-""",
-)
-
-
 def check_keep_all(context: Context) -> Iterator[Diagnostic]:
     """Check the history of every publisher and subscription; a shared profile is reported once."""
     for node in context.system.nodes:
@@ -215,30 +109,6 @@ def check_keep_all(context: Context) -> Iterator[Diagnostic]:
                     hint="use 'keep_last' with a depth",
                 )
 
-
-RELIABLE_SENSOR_STREAM = info(
-    code="RC317",
-    name="reliable-sensor-stream",
-    summary="High-rate sensor data is published reliably.",
-    why=(
-        "Resending a lost image delays all that follow, and the old image is no longer "
-        "needed. The 'sensor_data' preset is best effort."
-    ),
-    bad="""\
-system: stream
-nodes:
-  camera:
-    publishers: {image: {type: sensor_msgs/msg/Image, qos: command, external: true}}
-    timers: {frame: {rate_hz: 30, publish: {image: {}}}}
-""",
-    good="""\
-system: stream
-nodes:
-  camera:
-    publishers: {image: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}}
-    timers: {frame: {rate_hz: 30, publish: {image: {}}}}
-""",
-)
 
 _SENSOR_PACKAGE = "sensor_msgs/msg/"
 #: Messages of that package that are small, and whose consumers usually request reliable QoS.
@@ -287,30 +157,6 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
     )
 
 
-UNRELIABLE_COMMAND = info(
-    code="RC316",
-    name="unreliable-command",
-    summary="A topic whose name suggests commands is best effort.",
-    why=(
-        "A lost reading is followed by the next one; a lost command is never executed. The "
-        "'command' preset is reliable."
-    ),
-    bad="""\
-system: orders
-nodes:
-  planner:
-    publishers:
-      motor_commands: {type: geometry_msgs/msg/Twist, qos: sensor_data, external: true}
-""",
-    good="""\
-system: orders
-nodes:
-  planner:
-    publishers:
-      motor_commands: {type: geometry_msgs/msg/Twist, qos: command, external: true}
-""",
-)
-
 _COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")
 
 
@@ -327,38 +173,6 @@ def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: command'",
                 )
-
-
-UNRELIABLE_STATE = info(
-    code="RC532",
-    name="unreliable-state",
-    summary="A publisher or subscription is transient local, but best effort.",
-    why=(
-        "Messages from before a subscription existed are sent to it as lost ones are: again. "
-        "Best effort sends nothing again, so late joiners do not get the last message. PX4 "
-        "uses both by convention, and a node that communicates with it may have to."
-    ),
-    bad="""\
-system: state
-nodes:
-  robot:
-    publishers:
-      mode:
-        type: std_msgs/msg/String
-        qos: {durability: transient_local, reliability: best_effort}
-        external: true
-""",
-    good="""\
-system: state
-nodes:
-  robot:
-    publishers:
-      mode:
-        type: std_msgs/msg/String
-        qos: {durability: transient_local, reliability: reliable}
-        external: true
-""",
-)
 
 
 def check_unreliable_state(context: Context) -> Iterator[Diagnostic]:

@@ -16,6 +16,9 @@ from composer.qos import Incompatibility, QosProfile, incompatibilities
 from composer.resources import nodes_folder
 from composer.source import Span
 
+QOS_INCOMPATIBLE = error("RC311", "qos-incompatible")
+OUTSIDE_QOS = warning("RC531", "outside-qos")
+
 _Groups = Mapping[QosProfile, list[PortOfNode]]
 
 
@@ -142,35 +145,6 @@ def _place(context: Context, endpoint: PortOfNode, policy: str) -> Span:
     return endpoint.node.name.span
 
 
-QOS_INCOMPATIBLE = error(
-    code="RC311",
-    name="qos-incompatible",
-    summary="One endpoint of a topic or service requests more than the other offers.",
-    why=(
-        "A subscription requests, a publisher offers, and they match only if the offer is at "
-        "least as strong as the request: a best-effort publisher never reaches a reliable "
-        "subscription, while a reliable publisher does reach a best-effort one. Requests and "
-        "responses of services follow the same rule in both directions. Endpoints that do not "
-        "match exchange no data, and ROS logs a warning at most."
-    ),
-    bad="""\
-system: quality
-nodes:
-  lidar:
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
-  mapper:
-    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: command}}
-""",
-    good="""\
-system: quality
-nodes:
-  lidar:
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
-  mapper:
-    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
-""",
-)
-
 #: Maximum number of further endpoints to show for one problem.
 _SHOWN_ENDPOINTS = 3
 
@@ -221,38 +195,6 @@ def _labels(conflict: QosConflict) -> Iterator[Label]:
     if location(shared) != location(wrong.port.qos.own_span(policy)):
         yield Label(shared, f"{policy} is set here")
 
-
-OUTSIDE_QOS = warning(
-    code="RC531",
-    name="outside-qos",
-    summary="A connection sets another QoS than a port of a program or external node declares.",
-    why=(
-        "The composer cannot set the QoS of nodes outside its process. They keep their own, so "
-        "the other ports of the connection may not match them."
-    ),
-    bad="""\
-system: lidar
-nodes:
-  lidar:
-    external: true
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
-  mapper:
-    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, log: received}}
-connections:
-  - {topic: /scan, from: lidar.scan, to: mapper.scan, qos: command}
-""",
-    good="""\
-system: lidar
-nodes:
-  lidar:
-    external: true
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data}}
-  mapper:
-    subscriptions: {scan: {type: sensor_msgs/msg/LaserScan, qos: command, log: received}}
-connections:
-  - {topic: /scan, from: lidar.scan, to: mapper.scan, qos: sensor_data}
-""",
-)
 
 #: The policies that decide whether two endpoints match.
 _POLICIES = (

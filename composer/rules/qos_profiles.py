@@ -11,6 +11,11 @@ from composer.model import ChannelKind, NamedQos
 from composer.qos import PRESETS
 from composer.source import Located
 
+UNKNOWN_QOS_PROFILE = error("RC205", "unknown-qos-profile")
+UNUSED_QOS_PROFILE = info("RC242", "unused-qos-profile")
+QOS_PROFILE_CYCLE = error("RC318", "qos-profile-cycle")
+QOS_IMPLICIT = info("RC501", "qos-implicit")
+
 
 def known_profiles(context: Context) -> frozenset[str]:
     """Return the names of the system's own profiles and of the presets."""
@@ -28,29 +33,6 @@ def unknown_profiles(context: Context) -> tuple[Located[str], ...]:
         for reference in context.system.qos_references
         if reference.name.value not in known and not is_unresolved(reference.name.value)
     )
-
-
-UNKNOWN_QOS_PROFILE = error(
-    code="RC205",
-    name="unknown-qos-profile",
-    summary="A QoS profile is neither declared under qos_profiles nor a preset.",
-    why=(
-        "Falling back to another profile could create endpoints that never match, without an "
-        "error at run time."
-    ),
-    bad="""\
-system: profile
-nodes:
-  talker:
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_dada, external: true}}
-""",
-    good="""\
-system: profile
-nodes:
-  talker:
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
-""",
-)
 
 
 def check_unknown_qos_profile(context: Context) -> Iterator[Diagnostic]:
@@ -71,32 +53,6 @@ def check_unknown_qos_profile(context: Context) -> Iterator[Diagnostic]:
         )
 
 
-UNUSED_QOS_PROFILE = info(
-    code="RC242",
-    name="unused-qos-profile",
-    summary="A declared QoS profile is not used by any port, connection or other profile.",
-    why=(
-        "The profile is left over, or a port that should use it has a different QoS profile "
-        "than intended."
-    ),
-    bad="""\
-system: profiles
-qos_profiles:
-  odometry: {extends: sensor_data, depth: 1}
-nodes:
-  talker: {on_activate: {log: started}}
-""",
-    good="""\
-system: profiles
-qos_profiles:
-  odometry: {extends: sensor_data, depth: 1}
-nodes:
-  robot:
-    publishers: {odometry: {type: nav_msgs/msg/Odometry, qos: odometry, external: true}}
-""",
-)
-
-
 def check_unused_qos_profile(context: Context) -> Iterator[Diagnostic]:
     """Compare the profiles with the references to them."""
     if (
@@ -111,31 +67,6 @@ def check_unused_qos_profile(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 UNUSED_QOS_PROFILE, f"QoS profile '{profile.name}' is never used", profile.name.span
             )
-
-
-QOS_PROFILE_CYCLE = error(
-    code="RC318",
-    name="qos-profile-cycle",
-    summary="QoS profiles extend each other in a cycle.",
-    why="None of them has a base to start from.",
-    bad="""\
-system: profiles
-qos_profiles:
-  odometry: {extends: pose, depth: 1}
-  pose: {extends: odometry, depth: 2}
-nodes:
-  robot: {on_activate: {log: started}}
-""",
-    good="""\
-system: profiles
-qos_profiles:
-  odometry: {extends: sensor_data, depth: 1}
-  pose: {extends: odometry, depth: 2}
-nodes:
-  robot:
-    publishers: {pose: {type: geometry_msgs/msg/Pose, qos: pose, external: true}}
-""",
-)
 
 
 def check_qos_profile_cycle(context: Context) -> Iterator[Diagnostic]:
@@ -170,30 +101,6 @@ def _profile_cycle(cycle: list[NamedQos]) -> Diagnostic:
     )
     hint = "extend a preset" if len(cycle) == 1 else "extend a preset in one of them"
     return Diagnostic(QOS_PROFILE_CYCLE, message, places[0].span, tuple(labels), hint)
-
-
-QOS_IMPLICIT = info(
-    code="RC501",
-    name="qos-implicit",
-    summary="A publisher or subscription does not set its QoS profile.",
-    why=(
-        "It gets rclpy's default: reliable, volatile, keep last 10. That suits commands, but "
-        "neither sensor streams nor states that late joiners need. An explicit profile shows "
-        "that the choice is deliberate."
-    ),
-    bad="""\
-system: implicit
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, external: true}}
-""",
-    good="""\
-system: implicit
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-""",
-)
 
 
 def check_qos_implicit(context: Context) -> Iterator[Diagnostic]:

@@ -13,6 +13,11 @@ from composer.diagnostics import Diagnostic, Label, error, suggestion
 from composer.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
 
+UNKNOWN_NODE = error("RC202", "unknown-node")
+UNKNOWN_PORT = error("RC203", "unknown-port")
+WRONG_PORT_KIND = error("RC211", "wrong-port-kind")
+PORT_CONNECTED_TWICE = error("RC212", "port-connected-twice")
+
 
 def endpoints(system: System) -> Iterator[Endpoint]:
     """Yield the ports that connections and chains refer to."""
@@ -21,26 +26,6 @@ def endpoints(system: System) -> Iterator[Endpoint]:
         yield from connection.sinks
     for chain in system.chains:
         yield from chain.through
-
-
-UNKNOWN_NODE = error(
-    code="RC202",
-    name="unknown-node",
-    summary="A connection, a dependency or --set names a node that is not in this system.",
-    why="The connection would have no effect, and the dependency could never be met.",
-    bad="""\
-system: dependency
-nodes:
-  planner: {on_activate: {log: ready}}
-  motor_controller: {lifecycle: {depends_on: [planer]}}
-""",
-    good="""\
-system: dependency
-nodes:
-  planner: {on_activate: {log: ready}}
-  motor_controller: {lifecycle: {depends_on: [planner]}}
-""",
-)
 
 
 def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
@@ -92,27 +77,6 @@ def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
 def _node_names(context: Context) -> tuple[str, ...]:
     return tuple(node.name.value for node in context.system.nodes)
 
-
-UNKNOWN_PORT = error(
-    code="RC203",
-    name="unknown-port",
-    summary="A connection, a reaction or a node with a type names a port that does not exist.",
-    why="No data would flow: a port must be declared by the node or by its type.",
-    bad="""\
-system: ports
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-    timers: {tick: {period_ms: 1000, publish: {chattter: {data: hello}}}}
-""",
-    good="""\
-system: ports
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-    timers: {tick: {period_ms: 1000, publish: {chatter: {data: hello}}}}
-""",
-)
 
 _PORT_SECTIONS = frozenset(kind.section for kind in PortKind)
 _SENDERS = {
@@ -180,42 +144,6 @@ def _overridden_ports(node: Node) -> Iterator[Diagnostic]:
         )
 
 
-PORT_CONNECTED_TWICE = error(
-    code="RC212",
-    name="port-connected-twice",
-    summary="A port is twice in a connection, or in two with different names or QoS profiles.",
-    why=(
-        "A port has one name and one QoS profile in ROS, so one of the connections would have "
-        "no effect."
-    ),
-    bad="""\
-system: split
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  left:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-  right:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /left/chatter, from: talker.chatter, to: left.chatter}
-  - {topic: /right/chatter, from: talker.chatter, to: right.chatter}
-""",
-    good="""\
-system: split
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  left:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-  right:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /chatter, from: talker.chatter, to: [left.chatter, right.chatter]}
-""",
-)
-
-
 def check_port_connected_twice(context: Context) -> Iterator[Diagnostic]:
     """Compare each later connection of a port with its first one."""
     first: dict[str, tuple[Connection, Endpoint]] = {}
@@ -265,36 +193,6 @@ def _difference(earlier: Connection, later: Connection) -> str | None:
         return f"the QoS profiles '{earlier.qos}' and '{later.qos}'"
     return None
 
-
-WRONG_PORT_KIND = error(
-    code="RC211",
-    name="wrong-port-kind",
-    summary="A port is used where a port of another kind is required.",
-    why=(
-        "Messages go from publishers to subscriptions, requests from clients to services. In "
-        "the other direction, no data can flow."
-    ),
-    bad="""\
-system: swapped
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /chatter, from: talker.chatter, to: talker.chatter}
-""",
-    good="""\
-system: swapped
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
-""",
-)
 
 #: For each kind of channel, the keys of a connection and the kinds of port they accept.
 _ENDS = {

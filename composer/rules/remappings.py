@@ -13,6 +13,10 @@ from composer.names import expand_name, remapped_name, topic_name_problem
 from composer.source import Located
 from composer.spelling import is_typo
 
+UNKNOWN_REMAPPING = error("RC208", "unknown-remapping")
+REMAPPING_COLLISION = warning("RC226", "remapping-collision")
+UNUSED_REMAPPING = warning("RC241", "unused-remapping")
+
 
 def own_name(node: Node, name: str) -> str:
     """Return the full name of ``name`` in ``node`` before remapping."""
@@ -26,31 +30,6 @@ def matched_ports(node: Node, remapping: Remapping) -> Iterator[Port]:
         if own_name(node, port.ros_name.value) == source:
             yield port
 
-
-UNKNOWN_REMAPPING = error(
-    code="RC208",
-    name="unknown-remapping",
-    summary="A remapping names a topic, service or action that no port of the node uses.",
-    why=(
-        "ROS ignores such a remapping silently, and the port keeps its name. A class, an "
-        "executable or an external node may use names that it does not declare: without "
-        "'only_declared', only a probable misspelling is reported, as an info."
-    ),
-    bad="""\
-system: renamed
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-    remappings: {chater: news}
-""",
-    good="""\
-system: renamed
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command, external: true}}
-    remappings: {chatter: news}
-""",
-)
 
 _RULE_IF_PASSED_ON = replace(UNKNOWN_REMAPPING, severity=Severity.INFO)
 #: Names that every ROS node has without declaring them, before expansion.
@@ -114,35 +93,6 @@ def _remapping_hint(node: Node, source: str) -> str | None:
     return suggestion(source, [port.ros_name.value for port in node.ports])
 
 
-REMAPPING_COLLISION = warning(
-    code="RC226",
-    name="remapping-collision",
-    summary="A remapping gives a port a name that another port of the node already has.",
-    why=(
-        "Two streams of the node become one, and subscribers cannot distinguish the messages "
-        "of the two ports."
-    ),
-    bad="""\
-system: collision
-nodes:
-  camera:
-    publishers:
-      left: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
-      right: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
-    remappings: {left: right}
-""",
-    good="""\
-system: collision
-nodes:
-  camera:
-    publishers:
-      left: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
-      right: {type: sensor_msgs/msg/Image, qos: sensor_data, external: true}
-    remappings: {left: left_eye}
-""",
-)
-
-
 def check_remapping_collision(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that each remapping renames."""
     for node in context.system.nodes:
@@ -178,37 +128,6 @@ def _collision(
                 (Label(others[0].name.span, "already has this name"),),
             )
 
-
-UNUSED_REMAPPING = warning(
-    code="RC241",
-    name="unused-remapping",
-    summary="A remapping, or the name of a port, has no effect because of a connection.",
-    why=(
-        "The name in a connection takes precedence over a remapping, so the port does not "
-        "have the name that the remapping suggests."
-    ),
-    bad="""\
-system: renamed
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-    remappings: {chatter: news}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
-""",
-    good="""\
-system: renamed
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-  listener:
-    subscriptions: {chatter: {type: std_msgs/msg/String, qos: command}}
-connections:
-  - {topic: /chatter, from: talker.chatter, to: listener.chatter}
-""",
-)
 
 _NAMES_IN_CODE = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE)
 

@@ -10,35 +10,10 @@ from composer.diagnostics import Diagnostic, warning
 from composer.model import Node, OnFailure, RestartBudget, Supervision
 from composer.source import Span
 
-ENDLESS_RESTART = warning(
-    code="RC406",
-    name="endless-restart",
-    summary=(
-        "The backoff of the restarts adds up to more than the window in which restarts are counted."
-    ),
-    why=(
-        "By the last attempt, the first one is no longer counted, so a node that always fails "
-        "is restarted forever."
-    ),
-    bad="""\
-system: restarting
-nodes:
-  lidar:
-    on_activate: {log: started}
-    lifecycle:
-      on_failure: restart
-      restart: {max_attempts: 5, window_ms: 10000, backoff_ms: 1000}
-""",
-    good="""\
-system: restarting
-nodes:
-  lidar:
-    on_activate: {log: started}
-    lifecycle:
-      on_failure: restart
-      restart: {max_attempts: 5, window_ms: 60000, backoff_ms: 1000}
-""",
-)
+ENDLESS_RESTART = warning("RC406", "endless-restart")
+UNUSED_RESTART = warning("RC407", "unused-restart")
+IMPOSSIBLE_POLICY = warning("RC476", "impossible-policy")
+RESTART_DELAY = warning("RC530", "restart-delay")
 
 
 def check_endless_restart(context: Context) -> Iterator[Diagnostic]:
@@ -75,31 +50,6 @@ def _total_backoff_ms(budget: RestartBudget) -> float:
     return 1000.0 * total_s
 
 
-RESTART_DELAY = warning(
-    code="RC530",
-    name="restart-delay",
-    summary="The first delay of restarts, 'backoff_ms', is longer than 'backoff_max_ms'.",
-    why=(
-        "The delay starts at 'backoff_ms' and doubles up to 'backoff_max_ms'. If that is "
-        "shorter, every restart waits for it, and 'backoff_ms' has no effect."
-    ),
-    bad="""\
-system: restarting
-nodes:
-  lidar:
-    on_activate: {log: started}
-    lifecycle: {on_failure: restart, restart: {backoff_ms: 5000, backoff_max_ms: 1000}}
-""",
-    good="""\
-system: restarting
-nodes:
-  lidar:
-    on_activate: {log: started}
-    lifecycle: {on_failure: restart, restart: {backoff_ms: 1000, backoff_max_ms: 5000}}
-""",
-)
-
-
 def check_restart_delay(context: Context) -> Iterator[Diagnostic]:
     """Compare the delays of the system and of every node; shared settings are reported once."""
     system = context.system
@@ -117,28 +67,6 @@ def check_restart_delay(context: Context) -> Iterator[Diagnostic]:
             span,
             hint="make 'backoff_max_ms' at least as long as 'backoff_ms'",
         )
-
-
-UNUSED_RESTART = warning(
-    code="RC407",
-    name="unused-restart",
-    summary="restart is set, but failed nodes are not restarted.",
-    why="Without 'on_failure: restart', a failed node stays down, and 'restart' has no effect.",
-    bad="""\
-system: restarting
-nodes:
-  lidar:
-    on_activate: {log: started}
-    lifecycle: {restart: {max_attempts: 3}}
-""",
-    good="""\
-system: restarting
-nodes:
-  lidar:
-    on_activate: {log: started}
-    lifecycle: {on_failure: restart, restart: {max_attempts: 3}}
-""",
-)
 
 
 def check_unused_restart(context: Context) -> Iterator[Diagnostic]:
@@ -168,33 +96,6 @@ def _uses_restart(supervision: Supervision) -> bool:
     """Return whether the settings have an effect; errors are counted within their window, too."""
     counts_errors = supervision.watch.max_errors is not None and supervision.restart.has_window
     return supervision.policy is OnFailure.RESTART or counts_errors
-
-
-IMPOSSIBLE_POLICY = warning(
-    code="RC476",
-    name="impossible-policy",
-    summary="The 'on_failure' of a node cannot be carried out.",
-    why=(
-        "The system does not start external nodes, so it cannot restart them: with any policy "
-        "but shutdown and ignore, it waits for them. A node with 'required: false' never ends "
-        "the system."
-    ),
-    bad="""\
-system: lidar
-nodes:
-  lidar:
-    external: true
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
-    lifecycle: {on_failure: restart}
-""",
-    good="""\
-system: lidar
-nodes:
-  lidar:
-    external: true
-    publishers: {scan: {type: sensor_msgs/msg/LaserScan, qos: sensor_data, external: true}}
-""",
-)
 
 
 def check_impossible_policy(context: Context) -> Iterator[Diagnostic]:

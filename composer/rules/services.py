@@ -12,29 +12,10 @@ from composer.model import Channel, ChannelKind, ImplementationKind, PortKind, P
 from composer.model.dependencies import dependency_cycles, dependency_edges, in_dependency_order
 from composer.source import Span
 
-DUPLICATE_SERVER = error(
-    code="RC321",
-    name="duplicate-server",
-    summary="Two ports provide the same service or action.",
-    why="Both answer every request, and the client receives whichever response arrives first.",
-    bad="""\
-system: servers
-nodes:
-  first:
-    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
-  second:
-    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: false}}}
-""",
-    good="""\
-system: servers
-nodes:
-  first:
-    services: {reset: {type: std_srvs/srv/Trigger, respond: {success: true}}}
-  second:
-    services:
-      reset: {type: std_srvs/srv/Trigger, service: ~/reset, respond: {success: false}}
-""",
-)
+DUPLICATE_SERVER = error("RC321", "duplicate-server")
+POLLED_SERVICE = info("RC331", "polled-service")
+ACTION_AS_SERVICE = info("RC332", "action-as-service")
+CLIENT_BEFORE_SERVER = warning("RC403", "client-before-server")
 
 
 def check_duplicate_server(context: Context) -> Iterator[Diagnostic]:
@@ -67,35 +48,6 @@ def _other_name_hint(channel: Channel, other: PortOfNode) -> str:
     return f"rename one of them, for example to '~/{port.name}'"
 
 
-CLIENT_BEFORE_SERVER = warning(
-    code="RC403",
-    name="client-before-server",
-    summary="A node that calls a service or action starts before the node that provides it.",
-    why=(
-        "By default, servers start before their clients. Here 'depends_on' reverses the "
-        "order, so the first calls find no server."
-    ),
-    bad="""\
-system: order
-nodes:
-  motor_controller:
-    clients: {plan: {type: std_srvs/srv/Trigger}}
-  planner:
-    services: {plan: {type: std_srvs/srv/Trigger, respond: {success: true}}}
-    lifecycle: {depends_on: [motor_controller]}
-""",
-    good="""\
-system: order
-nodes:
-  motor_controller:
-    clients: {plan: {type: std_srvs/srv/Trigger}}
-    lifecycle: {depends_on: [planner]}
-  planner:
-    services: {plan: {type: std_srvs/srv/Trigger, respond: {success: true}}}
-""",
-)
-
-
 def check_client_before_server(context: Context) -> Iterator[Diagnostic]:
     """Compare the bring-up order with the services and actions."""
     system = context.system
@@ -125,30 +77,6 @@ def _started_too_early(channel: Channel, client: PortOfNode, server: PortOfNode)
     )
 
 
-POLLED_SERVICE = info(
-    code="RC331",
-    name="polled-service",
-    summary="A timer calls a service more often than once a second.",
-    why=(
-        "Services are for occasional requests. For data that is needed continuously, a topic "
-        "uses half the messages, and no client has to wait."
-    ),
-    bad="""\
-system: polling
-nodes:
-  display:
-    clients: {battery: {type: std_srvs/srv/Trigger, external: true}}
-    timers: {ask: {rate_hz: 10, call: {battery: {}}}}
-""",
-    good="""\
-system: polling
-nodes:
-  display:
-    subscriptions:
-      battery: {type: sensor_msgs/msg/BatteryState, qos: state, external: true, log: received}
-""",
-)
-
 _LONGEST_POLL_S = 1.0
 
 
@@ -171,36 +99,6 @@ def check_polled_service(context: Context) -> Iterator[Diagnostic]:
                     (Label(timer.period.span, "the timer's period"),),
                     "publish the data on a topic instead",
                 )
-
-
-ACTION_AS_SERVICE = info(
-    code="RC332",
-    name="action-as-service",
-    summary="An action server returns its result immediately, without feedback.",
-    why=(
-        "Actions are for long-running work that reports progress and can be canceled. For an "
-        "immediate response, a service does the same with a third of the endpoints."
-    ),
-    bad="""\
-system: pattern
-nodes:
-  navigator:
-    action_servers:
-      navigate:
-        type: composer_interfaces/action/Navigate
-        result: {success: true}
-""",
-    good="""\
-system: pattern
-nodes:
-  navigator:
-    action_servers:
-      navigate:
-        type: composer_interfaces/action/Navigate
-        feedback: {count: 10, period_ms: 100, message: {progress_percent: "{count * 10.0}"}}
-        result: {success: true}
-""",
-)
 
 
 def check_action_as_service(context: Context) -> Iterator[Diagnostic]:

@@ -10,41 +10,9 @@ from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Channel, ChannelKind, Event, Port, PortKind, PortOfNode, PrimaryState
 from composer.rules.connections import diagnostic_location, name_location
 
-TOPIC_LOOP = warning(
-    code="RC326",
-    name="topic-loop",
-    summary="Subscriptions republish messages in a cycle without a timer or condition.",
-    why=(
-        "One message circulates forever, as fast as the processor allows, and each further "
-        "message adds to the load."
-    ),
-    bad="""\
-system: loop
-nodes:
-  ping:
-    subscriptions:
-      in: {type: std_msgs/msg/String, qos: command, topic: pong, publish: {out: "{message}"}}
-    publishers: {out: {type: std_msgs/msg/String, qos: command, topic: ping}}
-  pong:
-    subscriptions:
-      in: {type: std_msgs/msg/String, qos: command, topic: ping, publish: {out: "{message}"}}
-    publishers: {out: {type: std_msgs/msg/String, qos: command, topic: pong}}
-""",
-    good="""\
-system: loop
-nodes:
-  ping:
-    state: {seen: false}
-    subscriptions:
-      in: {type: std_msgs/msg/String, qos: command, topic: pong, set: {seen: true}}
-    publishers: {out: {type: std_msgs/msg/String, qos: command, topic: ping}}
-    timers: {tick: {period_ms: 100, when: state.seen, publish: {out: {data: ping}}}}
-  pong:
-    subscriptions:
-      in: {type: std_msgs/msg/String, qos: command, topic: ping, publish: {out: "{message}"}}
-    publishers: {out: {type: std_msgs/msg/String, qos: command, topic: pong}}
-""",
-)
+TOPIC_LOOP = warning("RC326", "topic-loop")
+OWN_PUBLISHER = warning("RC327", "own-publisher")
+COMPETING_COMMANDS = warning("RC328", "competing-commands")
 
 #: For each topic, the topics to which its messages are republished, with the subscription.
 _Steps = dict[str, dict[str, PortOfNode]]
@@ -118,38 +86,6 @@ def _topic_loop(cycle: list[tuple[str, PortOfNode]]) -> Diagnostic:
     )
 
 
-OWN_PUBLISHER = warning(
-    code="RC327",
-    name="own-publisher",
-    summary="A node subscribes to a topic that it publishes itself.",
-    why=(
-        "The node receives each of its own messages, which is rarely meant: usually, one of "
-        "the two topics is wrong. Nodes that exchange messages on one topic, such as alarms, "
-        "are not reported."
-    ),
-    bad="""\
-system: loops
-nodes:
-  robot:
-    publishers: {report: {type: std_msgs/msg/String, qos: command, topic: reports}}
-    subscriptions: {order: {type: std_msgs/msg/String, qos: command, topic: reports, log: ordered}}
-    timers: {tick: {period_ms: 1000, publish: {report: {data: idle}}}}
-""",
-    good="""\
-system: loops
-nodes:
-  robot:
-    publishers: {report: {type: std_msgs/msg/String, qos: command, topic: reports}}
-    subscriptions: {order: {type: std_msgs/msg/String, qos: command, topic: orders, log: ordered}}
-    timers: {tick: {period_ms: 1000, publish: {report: {data: idle}}}}
-  console:
-    publishers: {order: {type: std_msgs/msg/String, qos: command, topic: orders}}
-    subscriptions: {report: {type: std_msgs/msg/String, qos: command, topic: reports, log: idle}}
-    timers: {tick: {period_ms: 1000, publish: {order: {data: go}}}}
-""",
-)
-
-
 def check_own_publisher(context: Context) -> Iterator[Diagnostic]:
     """Look for topics that exactly one node both publishes and subscribes to."""
     for channel in context.channels:
@@ -190,46 +126,6 @@ def _sends_back(channel: Channel, end: PortOfNode) -> bool:
 def _is_unconditional(end: PortOfNode) -> bool:
     reaction = end.port.reaction(Event.MESSAGE)
     return reaction is not None and reaction.when is None
-
-
-COMPETING_COMMANDS = warning(
-    code="RC328",
-    name="competing-commands",
-    summary="Two nodes publish velocity commands on one topic.",
-    why=(
-        "The robot follows whichever command came last, and jerks between the two. Give "
-        "each source a topic of its own, and select one in a multiplexer."
-    ),
-    bad="""\
-system: driving
-nodes:
-  joystick:
-    publishers: {command: {type: geometry_msgs/msg/Twist, qos: command, topic: cmd_vel}}
-    timers: {tick: {period_ms: 100, publish: {command: {linear: {x: 0.5}}}}}
-  navigation:
-    publishers: {command: {type: geometry_msgs/msg/Twist, qos: command, topic: cmd_vel}}
-    timers: {tick: {period_ms: 100, publish: {command: {linear: {x: 0.2}}}}}
-  base:
-    subscriptions:
-      cmd_vel: {type: geometry_msgs/msg/Twist, qos: command, set: {x: "{message.linear.x}"}}
-    state: {x: 0.0}
-""",
-    good="""\
-system: driving
-nodes:
-  joystick:
-    publishers: {command: {type: geometry_msgs/msg/Twist, qos: command, topic: cmd_vel_joy}}
-    timers: {tick: {period_ms: 100, publish: {command: {linear: {x: 0.5}}}}}
-  navigation:
-    publishers: {command: {type: geometry_msgs/msg/Twist, qos: command, topic: cmd_vel}}
-    timers: {tick: {period_ms: 100, publish: {command: {linear: {x: 0.2}}}}}
-  base:
-    subscriptions:
-      cmd_vel: {type: geometry_msgs/msg/Twist, qos: command, set: {x: "{message.linear.x}"}}
-      joystick: {type: geometry_msgs/msg/Twist, topic: cmd_vel_joy, qos: command, set: {x: 0.0}}
-    state: {x: 0.0}
-""",
-)
 
 
 _VELOCITY_COMMANDS = frozenset(

@@ -24,32 +24,11 @@ from composer.model import (
 from composer.source import Located, Span
 from composer.templates import Constant, Items, Record, Template, Text
 
-TRANSFORM_SOURCE = error(
-    code="RC515",
-    name="transform-source",
-    summary="Nothing broadcasts a declared transform.",
-    why=(
-        "A dynamic transform comes from a subscription with poses. Without it, or for a static "
-        "transform with 'from_code', the node needs code that broadcasts it."
-    ),
-    bad="""\
-system: rover
-nodes:
-  localization:
-    subscriptions: {odometry: {type: nav_msgs/msg/Odometry, qos: sensor_data, external: true}}
-    transforms:
-      dynamic: {base_link: {parent: odom, from: odometri}}
-""",
-    good="""\
-system: rover
-nodes:
-  localization:
-    subscriptions: {odometry: {type: nav_msgs/msg/Odometry, qos: sensor_data, external: true}}
-    transforms:
-      dynamic: {base_link: {parent: odom, from: odometry}}
-""",
-)
-
+FRAME_ID_SLASH = warning("RC309", "frame-id-slash")
+TRANSFORM_SOURCE = error("RC515", "transform-source")
+INVALID_QUATERNION = error("RC516", "invalid-quaternion")
+UNDECLARED_TRANSFORM = error("RC517", "undeclared-transform")
+ROTATION_UNIT = warning("RC533", "rotation-unit")
 
 _SUBSCRIPTION = PortKind.SUBSCRIPTION
 
@@ -105,49 +84,6 @@ def _from_subscription(node: Node, declared: DynamicTransform, source: str) -> I
 _WITH_SUBSCRIPTIONS = (ImplementationKind.DECLARATIVE, ImplementationKind.BEHAVIOR)
 
 
-UNDECLARED_TRANSFORM = error(
-    code="RC517",
-    name="undeclared-transform",
-    summary="A behavior looks up or broadcasts transforms that its node does not declare.",
-    why=(
-        "The node listens to /tf only if it declares 'lookup', and broadcasts only the frames "
-        "that it declares. Otherwise these could not be checked."
-    ),
-    bad="""\
-# file: system.yaml
-system: rover
-nodes:
-  mount:
-    behavior: mount:Mount
-    transforms: {dynamic: {gripper: {parent: wrist}}}
-    timers: {tick: {period_ms: 100}}
-# file: mount.py
-from geometry_msgs.msg import Transform
-
-
-class Mount:
-    def on_tick(self):
-        self.transforms.broadcast("griper", Transform())
-""",
-    good="""\
-# file: system.yaml
-system: rover
-nodes:
-  mount:
-    behavior: mount:Mount
-    transforms: {dynamic: {gripper: {parent: wrist}}}
-    timers: {tick: {period_ms: 100}}
-# file: mount.py
-from geometry_msgs.msg import Transform
-
-
-class Mount:
-    def on_tick(self):
-        self.transforms.broadcast("gripper", Transform())
-""",
-)
-
-
 def check_undeclared_transform(context: Context) -> Iterator[Diagnostic]:
     """Compare the calls of ``self.transforms`` with what the node declares."""
     errors = context.once(earlier_errors)
@@ -198,28 +134,6 @@ def _is_from_code(declared: StaticTransform | DynamicTransform) -> bool:
     return declared.from_code
 
 
-INVALID_QUATERNION = error(
-    code="RC516",
-    name="invalid-quaternion",
-    summary="A quaternion is not of length 1.",
-    why=("Only unit quaternions are rotations. tf2 ignores transforms with others."),
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, quaternion: {z: 1.0, w: 1.0}}}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, quaternion: {z: 0.70711, w: 0.70711}}}
-""",
-)
-
-
 def check_invalid_quaternion(context: Context) -> Iterator[Diagnostic]:
     """Check the rotations of static transforms."""
     for node in context.system.nodes:
@@ -239,27 +153,6 @@ def check_invalid_quaternion(context: Context) -> Iterator[Diagnostic]:
 _FULL_TURN = 2.0 * math.pi
 _TOLERANCE = 1.001
 
-ROTATION_UNIT = warning(
-    code="RC533",
-    name="rotation-unit",
-    summary="An angle in 'rotation_rad' is more than a full turn.",
-    why="Such angles are usually degrees, and the frame then points somewhere else.",
-    bad="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, rotation_rad: {yaw: 180}}}
-""",
-    good="""\
-system: rover
-nodes:
-  mounts:
-    transforms:
-      static: {laser: {parent: base_link, rotation_deg: {yaw: 180}}}
-""",
-)
-
 
 def check_rotation_unit(context: Context) -> Iterator[Diagnostic]:
     """Check the angles of static transforms; those of a node type once."""
@@ -273,31 +166,6 @@ def check_rotation_unit(context: Context) -> Iterator[Diagnostic]:
                         angle.span,
                         hint="write degrees in 'rotation_deg'",
                     )
-
-
-FRAME_ID_SLASH = warning(
-    code="RC309",
-    name="frame-id-slash",
-    summary="A frame ID begins with a slash.",
-    why=(
-        "tf2 refuses frame IDs with a leading slash: every lookup of the frame fails. Frame "
-        "IDs are not in the namespace of a node."
-    ),
-    bad="""\
-system: frames
-nodes:
-  robot:
-    publishers: {header: {type: std_msgs/msg/Header, qos: command, external: true}}
-    timers: {tick: {period_ms: 100, publish: {header: {frame_id: /odom}}}}
-""",
-    good="""\
-system: frames
-nodes:
-  robot:
-    publishers: {header: {type: std_msgs/msg/Header, qos: command, external: true}}
-    timers: {tick: {period_ms: 100, publish: {header: {frame_id: odom}}}}
-""",
-)
 
 
 _FIELDS = frozenset({"frame_id", "child_frame_id"})

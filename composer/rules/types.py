@@ -15,6 +15,8 @@ from composer.field_types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
 from composer.names import join
 
+TYPE_MISMATCH = error("RC303", "type-mismatch")
+
 _SEVERAL = 2
 
 
@@ -200,32 +202,6 @@ def _is_of_node_type(endpoint: PortOfNode) -> bool:
 def _key(endpoint: PortOfNode) -> tuple[str, str]:
     return endpoint.node.name.value, endpoint.port.name.value
 
-
-TYPE_MISMATCH = error(
-    code="RC303",
-    name="type-mismatch",
-    summary="The endpoints of a topic, service or action have different types.",
-    why=(
-        "DDS does not match endpoints of different types: no data arrives, and no error is "
-        "reported."
-    ),
-    bad="""\
-system: types
-nodes:
-  talker:
-    publishers: {speed: {type: std_msgs/msg/Float64, qos: command}}
-  listener:
-    subscriptions: {speed: {type: std_msgs/msg/Float32, qos: command}}
-""",
-    good="""\
-system: types
-nodes:
-  talker:
-    publishers: {speed: {type: std_msgs/msg/Float64, qos: command}}
-  listener:
-    subscriptions: {speed: {type: std_msgs/msg/Float64, qos: command}}
-""",
-)
 
 #: Maximum number of further endpoints with the same wrong type to show.
 _SHOWN_ENDPOINTS = 3

@@ -42,7 +42,7 @@ def test_colcon_builds_the_composer_and_a_project(
     pip = (python, "-m", "pip", "install", "-qq", "colcon-common-extensions", "setuptools<80")
     run(*pip, folder=tmp_path, variables=without_ros())
     sources = tmp_path / "ws" / "src"
-    for name in ("composer", "interfaces", "nodes", "resource", "schemas", "systems"):
+    for name in ("composer", "docs/rules", "interfaces", "nodes", "resource", "schemas", "systems"):
         shutil.copytree(ROOT / name, sources / "ros2_composer" / name)
     for name in ("package.xml", "pyproject.toml", "setup.py"):
         shutil.copy(ROOT / name, sources / "ros2_composer")

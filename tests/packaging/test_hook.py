@@ -20,6 +20,7 @@ PUBLISHED = (
     "README.md",
     "THIRD_PARTY.md",
     "composer",
+    "docs",
     "interfaces",
     "nodes",
     "pyproject.toml",

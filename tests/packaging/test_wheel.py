@@ -21,6 +21,7 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
         "composer/share/interfaces/action/Navigate.action",
         "composer/share/nodes/planner.py",
         "composer/share/nodes/planner.yaml",
+        "composer/share/rules/RC311.md",
         "composer/share/schemas/system.schema.json",
         "composer/share/systems/pipeline.yaml",
         "composer/graph/formats/html/main.js",

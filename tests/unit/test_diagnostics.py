@@ -7,7 +7,7 @@ import pytest
 from composer.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, Rule, Severity, in_order, shown
 from composer.source import SourceFile, Span
 
-RULE = Rule("RC999", "example", Severity.ERROR, "", "", "", "")
+RULE = Rule("RC999", "example", Severity.ERROR)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ TEXT = "system: demo\nnodes: {talker: {type: relai}}\n"
 def example() -> list[Diagnostic]:
     first = diagnostic(TEXT, "relai", "there is no 'relai'", line=2, hint="did you mean 'relay'?")
     label = Label(first.primary.part(0, 2), "this one")
-    second = replace(first, rule=rule(Severity.INFO, "RC998", "hint"), related=(label,), hint=None)
+    second = replace(first, rule=rule(Severity.INFO, "RC244", "hint"), related=(label,), hint=None)
     return [first, replace(first, message="again"), second]
 
 
@@ -39,7 +39,7 @@ def test_json_is_complete() -> None:
     report = json.loads(json_report.render(example()))
     assert report["summary"] == {"errors": 2, "warnings": 0, "infos": 1}
     assert report["diagnostics"][0] == {
-        "code": "RC999",
+        "code": "RC202",
         "rule": "made-up",
         "severity": "error",
         "message": "there is no 'relai'",
@@ -146,7 +146,7 @@ def test_fingerprints_are_unique() -> None:
     same = diagnostic(TEXT, "relai", line=2)
     others = [
         replace(same, message="another"),
-        replace(same, rule=rule(code="RC998")),
+        replace(same, rule=rule(code="RC244")),
         diagnostic(TEXT.replace("relai", "rely"), "rely", line=2),
         diagnostic(TEXT, "relai", line=2, path="another.yaml"),
     ]
@@ -158,7 +158,7 @@ def test_github_commands_have_the_location_and_the_message() -> None:
     [line] = github.render(example()[:1]).splitlines()
     assert line == (
         "::error file=systems/demo.yaml,line=2,endLine=2,col=24,endColumn=29,"
-        "title=RC999 made-up::there is no 'relai'%0Ahint: did you mean 'relay'?"
+        "title=RC202 made-up::there is no 'relai'%0Ahint: did you mean 'relay'?"
     )
 
 

@@ -14,7 +14,7 @@ from composer.source import SourceFile, Span
 from tests.unit.support.reporting import diagnostic, rule, span_of
 
 PLAIN = """\
-error[RC999 made-up]: it is wrong
+error[RC202 made-up]: it is wrong
  --> systems/demo.yaml:1:7
   |
 1 | nodes: {talker: 1}
@@ -83,7 +83,7 @@ def test_labels_are_shown_on_lines_of_their_own() -> None:
         ),
     )
     assert render([found]) == (
-        "error[RC999 made-up]: it is wrong\n"
+        "error[RC202 made-up]: it is wrong\n"
         "  --> systems/demo.yaml:1:1\n"
         "   |\n"
         " 1 | one: 1\n"

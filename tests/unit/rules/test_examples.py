@@ -8,11 +8,12 @@ import pytest
 
 from composer.diagnostics import Diagnostic, Rule
 from composer.loading import load
-from composer.report.rule_page import all_rules, files_of
+from composer.report.rule_page import all_rules, files_of, page_of
 from composer.rules import all_checks
 
 # Examples other than system files, such as command lines, are not tested here.
-RULES = [rule for rule in all_rules() if files_of(rule.bad) and files_of(rule.good)]
+PAGES = {rule: page_of(rule) for rule in all_rules()}
+RULES = [rule for rule, page in PAGES.items() if files_of(page.bad) and files_of(page.good)]
 
 
 def diagnostics_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Diagnostic]:
@@ -29,7 +30,7 @@ def diagnostics_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_bad_example_breaks_the_rule(
     rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = diagnostics_in(rule.bad, tmp_path, monkeypatch)
+    found = diagnostics_in(PAGES[rule].bad, tmp_path, monkeypatch)
     assert {diagnostic.rule.code for diagnostic in found} == {rule.code}
 
 
@@ -37,7 +38,7 @@ def test_bad_example_breaks_the_rule(
 def test_good_example_breaks_none(
     rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = diagnostics_in(rule.good, tmp_path, monkeypatch)
+    found = diagnostics_in(PAGES[rule].good, tmp_path, monkeypatch)
     assert [f"{diagnostic.rule.code}: {diagnostic.message}" for diagnostic in found] == []
 
 

@@ -87,3 +87,15 @@ def test_a_type_with_timers_may_be_external_elsewhere(tmp_path: Path) -> None:
     text = "system: robot\nnodes: {clock: {type: clock, external: true%s}}\n"
     assert rules_broken(text % "", tmp_path) == []
     assert rules_broken(text % ", log_level: debug", tmp_path) == ["in-process-setting"]
+
+
+def test_missing_packages_are_reported_where_ros_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.prefix", str(tmp_path))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    text = "system: lights\nnodes: {lamp: {executable: {package: lamp_for_mars, name: driver}}}\n"
+    assert rules_broken(text, tmp_path) == []
+
+    (tmp_path / "share/ament_index/resource_index/packages").mkdir(parents=True)
+    assert rules_broken(text, tmp_path) == ["executable-not-installed"]

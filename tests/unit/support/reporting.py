@@ -6,8 +6,8 @@ from composer.diagnostics import Diagnostic, Label, Rule, Severity
 from composer.source import SourceFile, Span
 
 
-def rule(severity: Severity = Severity.ERROR, code: str = "RC999", name: str = "made-up") -> Rule:
-    return Rule(code, name, severity, "What it is.", "Why it is.", "bad: 1\n", "good: 1\n")
+def rule(severity: Severity = Severity.ERROR, code: str = "RC202", name: str = "made-up") -> Rule:
+    return Rule(code, name, severity)
 
 
 def span_of(source: SourceFile, marked: str, line: int = 1) -> Span:
