@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node as RosNode
@@ -44,7 +45,7 @@ from composer.runtime.node.managed_node import NodeListener
 from composer.runtime.node.node import WrongReturn
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.outcome import TransitionOutcome
-from composer.runtime.node.parameters import ros_parameters
+from composer.runtime.node.parameters import declare, ros_parameters
 from composer.runtime.node.ros_node import make_ros_node
 
 _THREAD_ENDS_WITHIN_S = 0.2
@@ -75,8 +76,7 @@ class HostedNode(LocalNode):
         self._entities = HostedEntities()
         self._log_level: LogLevel = options.log_level
         self._instance: Instance | None = None
-        self._shared: SharedState | None = None
-        #: What the last instance has declared; the parameters exist until the next one.
+        #: The parameters as the model or the last instance has declared them, until the next one.
         self._declared: dict[str, RosParameter] = {}
         #: Parameters that were set at run time. They keep their values, as those of other nodes do.
         self._kept: dict[str, RosParameter] = {}
@@ -85,6 +85,8 @@ class HostedNode(LocalNode):
         if simulated is not None:
             self._ros.set_parameters([simulated])
         self._join(options)
+        self._shared = SharedState(self._ros)
+        self._declare_initial_parameters()
 
     @property
     def callback_owners(self) -> tuple[object, ...]:
@@ -117,7 +119,6 @@ class HostedNode(LocalNode):
         instance = self._new_instance()
         self._instance, self._entities = instance, instance.entities
         vars(self._ros)["_composer_instance"] = instance
-        self._shared = SharedState(self._ros)
         await self._in_thread(instance, partial(self._construct, instance), "constructor")
 
     async def _call_user(self, transition: str) -> None:
@@ -182,20 +183,33 @@ class HostedNode(LocalNode):
             self._ros.destroy_service(service)
         has_failed = outcome is not None and outcome.transition == "configure"
         self._declared = instance.declared
-        if self._shared is not None:
-            self._shared.remove_callbacks()
+        self._shared.remove_callbacks()
         if has_failed:
             # With values that it cannot be configured with, it would never be again.
-            self._keep_changed_parameters()
+            self._shared.restore()
             self._kept = {}
+            self._declare_initial_parameters()
         self._check_threads(instance.threads)
 
     def _keep_changed_parameters(self) -> None:
         """Remove the parameters of the last instance; the next one begins with changed values."""
         self._kept |= changed_parameters(self._ros, self._declared)
-        self._declared = {}
-        if self._shared is not None:
-            self._shared.restore()
+        self._shared.restore()
+
+    def _declare_initial_parameters(self) -> None:
+        """Declare those with values in the model, which can be set before the class declares any.
+
+        Raises ParameterError.
+        """
+        declared = {parameter.name.value: parameter for parameter in self.model.parameters}
+        initial = [name for name in self._overrides if not self._ros.has_parameter(name)]
+        for name in initial:
+            if name in declared:
+                declare(self._ros, declared[name])
+            else:
+                any_type = ParameterDescriptor(dynamic_typing=True)
+                self._ros.declare_parameter(name, self._overrides[name].value, any_type)
+        self._declared = {name: self._ros.get_parameter(name) for name in initial}
 
     # --- parts
 

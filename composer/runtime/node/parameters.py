@@ -61,7 +61,7 @@ class NodeParameters:
         self._changed = changed
         self.values: dict[str, Any] = {}
         for parameter in self._declared.values():
-            self.values[parameter.name.value] = _declare(node, parameter)
+            self.values[parameter.name.value] = declare(node, parameter)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -111,7 +111,8 @@ class ParameterValues:
         return sorted(vars(self))
 
 
-def _declare(node: Node, parameter: Parameter) -> Any:
+def declare(node: Node, parameter: Parameter) -> Any:
+    """Declare a parameter with its value, and return it. Raises ParameterError."""
     name = parameter.name.value
     if parameter.value is None:
         raise ParameterError(f"parameter '{name}' is required and has no value")

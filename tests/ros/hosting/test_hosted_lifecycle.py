@@ -43,6 +43,50 @@ def test_an_instance_lives_from_configure_to_cleanup(tmp_path: Path, peer: Peer)
     assert history == ["constructed", "destroyed"] * 2
 
 
+def test_parameters_that_are_set_before_the_first_configuration_are_kept(
+    tmp_path: Path, peer: Peer
+) -> None:
+    text = f"""
+    system: early
+    lifecycle: {{autostart: unconfigured}}
+    nodes:
+      talker:
+        class: "{CLASSES}:Talker"
+        parameters: {{word: {{type: string, default: declared}}, period: 0.5}}
+      behavior:
+        behavior: early:Early
+        parameters: {{word: {{type: string, default: declared}}}}
+      declarative:
+        parameters: {{word: {{type: string, default: declared}}}}
+        on_configure: {{log: "the word is {{parameters.word}}"}}
+    """
+    early = """
+    from composer.behavior import Behavior
+
+    class Early(Behavior):
+        def on_configure(self):
+            self.log.info(f"its word is {self.parameters.word}")
+    """
+    with running(text, tmp_path, early=early) as system:
+        for name in ("talker", "behavior", "declarative"):
+            assert peer.set_parameter(f"/{name}", "word", "early") == ""
+        assert peer.set_parameter("/talker", "period", "x")  # of another type
+        assert peer.set_parameter("/talker", "period", -1.0) == ""  # no class has such a timer
+        failed = system.node("talker").loop.run_task(
+            system.node("talker").lifecycle.change("configure")
+        )
+        wait_until(failed.done)
+        assert not failed.result().success
+        assert peer.set_parameter("/talker", "word", "early") == ""
+        for name in ("talker", "behavior", "declarative"):
+            system.change(name, "configure")
+        talker = system.node("talker").instance
+        assert talker.get_parameter("word").value == "early"
+        assert talker.get_parameter("period").value == 0.5
+        system.wait_for_log("its word is early")
+        system.wait_for_log("the word is early")
+
+
 def test_the_handlers_of_a_lifecycle_node_class_are_called(tmp_path: Path, peer: Peer) -> None:
     history.clear()
     text = f"""
