@@ -39,14 +39,16 @@ class SensorSimulator(Node):
         self.max_acceleration = self.declare_parameter("max_acceleration", 2.0).value
         self.command_timeout_ms = self.declare_parameter("command_timeout_ms", 500.0).value
         self.x, self.y = self.declare_parameter("start", [0.0, 0.0]).value
-        rate_hz = self.declare_parameter("rate_hz", ODOMETRY_HZ).value
+        self.rate_hz = self.declare_parameter("rate_hz", ODOMETRY_HZ).value
         self.velocity_x = self.velocity_y = 0.0
         self.sent = 0
         self.command = Twist()
         self.commanded_at_s = self.stepped_at_s = now_s(self)
+
+    def create_entities(self) -> None:
         self.odometry = self.create_publisher(Odometry, "/sensor_data", ODOMETRY_QOS)
         self.create_subscription(Twist, "/motor_commands", self.on_command, COMMAND_QOS)
-        self.create_timer(1.0 / rate_hz, self.step)
+        self.create_timer(1.0 / self.rate_hz, self.step)
 
     def on_command(self, message: Twist) -> None:
         self.command = message
@@ -89,6 +91,8 @@ class Planner(Node):
         self.max_velocity = self.declare_parameter("max_velocity", 1.0).value
         self.period_s = self.declare_parameter("sample_period_ms", 100.0).value / 1000.0
         self.odometry: Odometry | None = None
+
+    def create_entities(self) -> None:
         self.create_subscription(Odometry, "/sensor_data", self.on_odometry, ODOMETRY_QOS)
         self.create_service(PlanTrajectory, "/plan_trajectory", self.plan)
 
@@ -136,7 +140,7 @@ class MotorController(Node):
         self.position_gain = self.declare_parameter("position_gain", 1.5).value
         self.tolerance = self.declare_parameter("tolerance", 0.05).value
         self.waypoints = self.declare_parameter("waypoints", WAYPOINTS).value
-        rate_hz = self.declare_parameter("rate_hz", CONTROL_HZ).value
+        self.rate_hz = self.declare_parameter("rate_hz", CONTROL_HZ).value
         self.position: Point | None = None
         self.points: list[Point] = []
         self.times_s: list[float] = []
@@ -144,11 +148,13 @@ class MotorController(Node):
         self.next_waypoint = 0
         self.distance_traveled = 0.0
         self.sent = 0
+
+    def create_entities(self) -> None:
         self.create_subscription(Odometry, "/sensor_data", self.on_odometry, ODOMETRY_QOS)
         self.planner = self.create_client(PlanTrajectory, "/plan_trajectory")
         self.navigate = ActionServer(self, Navigate, "/navigate", self.on_navigate)
         self.commands = self.create_publisher(Twist, "/motor_commands", COMMAND_QOS)
-        self.create_timer(1.0 / rate_hz, self.control)
+        self.create_timer(1.0 / self.rate_hz, self.control)
         self.create_timer(PLAN_PERIOD_S, self.plan)
 
     def on_odometry(self, message: Odometry) -> None:
@@ -245,6 +251,7 @@ def main() -> None:
     sensor, planner, motor = SensorSimulator(), Planner(), MotorController()
     executor = SingleThreadedExecutor()
     for node in (sensor, planner, motor):
+        node.create_entities()
         executor.add_node(node)
     print("ready", flush=True)
     try:

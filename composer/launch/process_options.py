@@ -27,10 +27,13 @@ def process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
         "ends_launch": any(map(_is_shutdown, on_exit)),
         "left_out": list(_left_out(node, context, on_exit)),
     }
-    if perform_typed_substitution(context, _attribute(node, "respawn") or False, bool):
+    retries = _attribute(node, "respawn_max_retries")
+    if retries != 0 and perform_typed_substitution(
+        context, _attribute(node, "respawn") or False, bool
+    ):
         delay = _attribute(node, "respawn_delay")
         found["respawn_delay"] = 0.0 if delay is None else float(text_of(delay, context))
-        found["respawn_max_retries"] = int(_attribute(node, "respawn_max_retries") or -1)
+        found["respawn_max_retries"] = -1 if retries is None else int(retries)
     for name in ("sigterm_timeout", "sigkill_timeout"):
         timeout_s = float(text_of(_attribute(node, name), context) or _SIGNAL_TIMEOUT_S)
         if timeout_s != _SIGNAL_TIMEOUT_S:

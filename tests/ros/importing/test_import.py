@@ -100,6 +100,7 @@ def test_a_constructor_that_fails_or_waits_is_reported(
 LAUNCH = """\
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction, LogInfo, Shutdown
+from launch.actions import TimerAction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace, SetParameter
@@ -119,7 +120,10 @@ def generate_launch_description():
         Node(package="demo", executable="driver", parameters=["PARAMETERS"], respawn=True,
              respawn_delay=1.5, respawn_max_retries=4, cwd="/tmp", sigterm_timeout="9",
              prefix="nice", on_exit=[LogInfo(msg="ended")]),
-        Node(package="demo", executable="last", name="last", on_exit=Shutdown()),
+        TimerAction(period=2.5, actions=[
+            Node(package="demo", executable="last", name="last", respawn=True,
+                 respawn_max_retries=0, on_exit=Shutdown()),
+        ]),
         ExecuteProcess(cmd=["true"]),
     ])
 """
@@ -138,6 +142,7 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stderr.splitlines() == [
         "left out:",
+        "  timer: what it starts after 2.5 s starts at once",
         "  process: true",
         "  prefix: nice (of /driver)",
         "  on_exit: LogInfo (of /driver)",
@@ -168,6 +173,7 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
       on_failure: restart
       restart: {backoff_ms: 1500, backoff_max_ms: 1500, max_attempts: 4}
     parameters: {x: {type: integer, default: 1}}
+  # Started after 2.5 s by the launch file.
   last: {executable: {package: demo, name: last}, lifecycle: {on_failure: shutdown}}
 """
     )
