@@ -23,6 +23,7 @@ from __future__ import annotations
 import gc
 import math
 import os
+import secrets
 import time
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -80,6 +81,7 @@ _SHORTEST_START_LIMIT_S = 5.0
 #: and then nothing in Python can end it. The last plan of a phase may be slow.
 _HANGS_AFTER_S = 60.0
 _MESSAGES_ARRIVE_WITHIN_S = 0.2
+_KEY_BYTES = 32
 
 
 class Host:
@@ -99,7 +101,10 @@ class Host:
         self._main_queue: MainQueue[Item] = MainQueue()
         self._reporter = Reporter(report, self._options.started_at_s)
         order = in_dependency_order(system, dependency_edges(system))
-        self._status = Status(system, order, self._options.started_by)
+        key = self._options.report_key
+        self._status = Status(system, order, is_child=bool(key))
+        is_member = self._options.process is not None
+        self._report_key = key or (secrets.token_hex(_KEY_BYTES) if is_member else "")
         self._node_set = NodeSet(
             system,
             self._make_listener,
@@ -164,7 +169,8 @@ class Host:
         queue = self._main_queue
         wait = partial(queue.wait, lambda: queue.stopping, stoppable=True)
         servers = discovery_servers(self._system.discovery, os.environ, self._reporter.log, wait)
-        lock = hold_instance_lock(namespace, active_variables(self._system.discovery, os.environ))
+        discovery = active_variables(self._system.discovery, os.environ)
+        lock = hold_instance_lock(namespace, discovery, self._report_key)
         with lock, signals, servers:
             self._limit_start()
             try:
@@ -206,7 +212,7 @@ class Host:
                 self._status,
                 callbacks,
                 use_sim_time=use_sim_time,
-                is_member=self._options.process is not None,
+                report_key=self._report_key,
             )
         except rclpy_implementation.RCLError as error:
             raise start_refused(error) from error

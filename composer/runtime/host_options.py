@@ -21,7 +21,7 @@ class HostOptions:
     ``fail_on_error`` makes errors of user code and failed calls a failure of the run.
 
     ``process`` is set if the system is the part of another one that a process of it runs;
-    ``started_by`` then identifies its start by the coordinating process, or is empty.
+    ``report_key`` is then that of its reports if the coordinating process has started it.
     ``member_command`` starts such processes of this system, with ``--process NAME`` after it;
     without it, they are only awaited.
 
@@ -49,5 +49,5 @@ class HostOptions:
     on_alive: Callable[[], None] = lambda: None
     started_at_s: float | None = None
     process: Process | None = None
-    started_by: str = ""
+    report_key: str = ""
     member_command: Sequence[str] = ()

@@ -31,6 +31,7 @@ from composer.runtime.ros.manager_protocol import (
     LAST_STEPS,
     NUMBERS,
     PARTICIPANT,
+    REPORT_KEY,
     SEEN_REPORT,
     SENDER,
 )
@@ -50,7 +51,8 @@ class MemberCallbacks:
     ``publish_states()`` is called once nodes are shut down: the coordinating process waits for
     their last counters. ``expect_end()`` is called if the process ends after the steps of a
     request. ``keep_goals(text)`` receives the goals of the whole system. ``figures()`` returns the
-    timings of callbacks and chains as text.
+    timings of callbacks and chains as text. ``report_key`` is told to processes that ask for it,
+    unless it is empty.
     """
 
     nodes: Nodes
@@ -60,6 +62,7 @@ class MemberCallbacks:
     expect_end: Callable[[], None]
     keep_goals: Callable[[str], None]
     figures: Callable[[], str]
+    report_key: str
 
 
 @dataclass(slots=True)
@@ -108,6 +111,9 @@ class MemberService:
         values = {item.name: item.value for item in request.parameters}
         if PARTICIPANT in values and values[PARTICIPANT].string_value != self._participant:
             return  # for another process of the same name
+        if REPORT_KEY in values:
+            self._tell_report_key(reply)
+            return
         if GOALS in values:
             self._callbacks.keep_goals(values[GOALS].string_value)
         if self._is_outdated(values):
@@ -116,6 +122,12 @@ class MemberService:
         if LAST_STEPS in values:
             self._callbacks.expect_end()
         self._loop.run_task(self._change_states(values, reply))
+
+    def _tell_report_key(self, reply: Reply) -> None:
+        key = self._callbacks.report_key
+        if key:
+            result = SetParametersResult(successful=True, reason=key)
+            reply(SetParameters.Response(results=[result]))
 
     def _is_outdated(self, values: Mapping[str, Any]) -> bool:
         seen = values.get(SEEN_REPORT)

@@ -46,6 +46,7 @@ from composer.runtime.manager.other_instances import Instance, OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.manager.status_messages import status_message
+from composer.runtime.members.report import signed_report
 from composer.runtime.metrics.diagnostics import Figures, to_statuses, to_text
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.managed_node import ManagedNode
@@ -127,11 +128,12 @@ class ManagerNode:
         host: ManagerCallbacks,
         *,
         use_sim_time: bool = False,
-        is_member: bool = False,
+        report_key: str = "",
     ) -> None:
         """Join the ROS graph. With ``use_sim_time``, stamps have the time of /clock.
 
-        With ``is_member``, another process of the system moves all nodes by this manager.
+        With ``report_key``, another process of the system moves all nodes by this manager, and
+        reports are signed with it.
         """
         self._status = status
         self._host = host
@@ -143,6 +145,7 @@ class ManagerNode:
         self._changed_s = self._due_s = 0.0  # monotonic: the last change, when it is published
         self._published_s = 0.0  # monotonic
         self._number = 0  # of messages on ``state``
+        self._report_key = report_key
         self._node = Node(
             NAME,
             namespace=namespace,
@@ -182,7 +185,8 @@ class ManagerNode:
         )
         own_participant = self._instances.participant
         self._member: MemberService | None = None
-        if is_member:
+        if report_key:
+            is_child = status.without_nodes.is_child
             callbacks = MemberCallbacks(
                 host.nodes,
                 host.recreate,
@@ -191,6 +195,7 @@ class ManagerNode:
                 host.expect_end,
                 status.keep_goals,
                 self._figures_text,
+                "" if is_child else report_key,  # the coordinating process has given it
             )
             self._member = MemberService(
                 self._node, self._loop, callbacks, own_participant.hex(), self._log.info
@@ -373,7 +378,10 @@ class ManagerNode:
         start_s = time.monotonic()
         self._number += 1
         statuses, now_ns = self._status_message(), self._now_ns
-        self._state.publish(write_array(now_ns, statuses))
+        if self._report_key:
+            self._state.publish(signed_report(now_ns, statuses, self._report_key))
+        else:
+            self._state.publish(write_array(now_ns, statuses))
         if self._member is not None:
             self._member.on_report(self._number)
         if self._diagnostics.get_subscription_count():

@@ -49,7 +49,7 @@ def _of_system(
         "started": f"{status.started_s:.3f}",
         "uptime": f"{uptime_s:.3f}",
         "number": str(number),
-        "started_by": status.started_by,
+        "is_child": str(status.is_child).lower(),
         **process,
     }
     values |= {f"chain {chain.chain}": chain.text for chain in chains}

@@ -17,7 +17,7 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.report import MemberState
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
-from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
+from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
 
 
 class ProcessUnavailable(Exception):
@@ -68,11 +68,11 @@ class MemberContext:
         """Return the full name of a process, which is the namespace of its manager."""
         return f"{self.namespace}/{process.name.value}"
 
-    def command_of(self, process: Process, started_by: str) -> Command:
-        """Return the command that starts a process, with ``started_by`` in all of its reports."""
+    def command_of(self, process: Process, report_key: str) -> Command:
+        """Return the command that starts a process, which signs its reports with the key."""
         words = (*self.command, "--process", process.name.value)
         # Its lines are parsed, whatever format those of this process have.
         usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
         usual |= own_enclave(os.environ, self.full_name(process))
         environment = {name.value: value for name, value in process.environment}
-        return Command(words, {**usual, **environment, STARTED_BY_VARIABLE: started_by})
+        return Command(words, {**usual, **environment, REPORT_KEY_VARIABLE: report_key})

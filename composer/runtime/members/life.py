@@ -13,15 +13,14 @@ from composer.runtime.members.report import MemberReport, MemberState
 class MemberLife:
     """One life of the process, as a child or started elsewhere, and its last report.
 
-    ``started_by`` is in all reports of that child. ``lost`` is why its nodes have failed, although
+    Its reports are signed with ``report_key``. ``lost`` is why its nodes have failed, although
     it may still run. ``holds_lock`` is whether it holds the instance lock on this computer.
     ``answered`` are the numbers of the last reports before the responses to requests, by node.
     """
 
+    report_key: str
     child: Child | None = None
-    started_by: str = ""
     last: MemberReport | None = None
-    reports: int = 0
     reported_s: float = 0.0
     lost: str = ""
     holds_lock: bool = False

@@ -5,18 +5,20 @@ are in its reports; requests for transitions go to the manager's service.
 
 The process with the instance lock runs the nodes, whatever has started it. One that was not started
 here is used as it is, and from then on only awaited: what has started it may start it again.
+
+Nothing that arrives on a topic decides: only reports count that are signed with the key of the
+process, see :mod:`.report`. What the process is, is learnt from its instance lock, its end as a
+child, or the answer of its service.
 """
 
 from __future__ import annotations
 
-import math
-from collections import defaultdict
+import secrets
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from time import monotonic
 from typing import Any
-from uuid import uuid4
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
@@ -34,13 +36,14 @@ from composer.runtime.members.report import (
     REPORTS_WITHIN_S,
     MemberReport,
     NodeFigures,
+    is_signed,
     parse_report,
 )
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.metrics.diagnostics import from_text
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES
-from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
+from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held, report_key
 from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
@@ -51,6 +54,7 @@ _LOCK_POLL_S = 0.1
 _CHECK_PERIOD_S = 0.5
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
+_KEY_BYTES = 32
 
 
 class MemberProcess:
@@ -61,19 +65,25 @@ class MemberProcess:
         self._context = context
         self._name = context.full_name(process)
         self._members: dict[str, Member] = {}
-        self._figures: defaultdict[str, NodeFigures] = defaultdict(NodeFigures)
+        self._figures: dict[str, NodeFigures] = {}
         #: When, by ``time.monotonic()``, it last reported that a node has moved.
         self.moved_s = 0.0
         self._life: MemberLife | None = None  # from the start, or the first report, to the end
         self._may_start = bool(context.command)
-        self._refused_s = -math.inf  # when another process last reported, not the child
+        self._answered_key = ""  # of a process whose service was asked for it
+        self._unsigned = b""  # the report for which it was asked
         self._starting: Future[None] | None = None
         self._is_ending = False
         self._belongs_to_another = False
         manager = f"{self._name}/{NAME}"
         service = f"{manager}/{CHANGE_STATES}"
         self.requests = MemberRequests(
-            context.manager, context.loop, service, self._on_figures, self._warn
+            context.manager,
+            context.loop,
+            service,
+            on_figures=self._on_figures,
+            on_report_key=self._on_report_key,
+            on_problem=self._warn,
         )
         #: The timings of its callbacks and chains, once it was asked for them.
         self.callbacks: tuple[CallbackFigures, ...] = ()
@@ -88,6 +98,7 @@ class MemberProcess:
     def add(self, member: Member) -> None:
         """Add a node, in place of an earlier one of the same name."""
         self._members[member.full_name] = member
+        self._figures.setdefault(member.full_name, NodeFigures())
 
     @property
     def pid(self) -> int | None:
@@ -114,8 +125,7 @@ class MemberProcess:
         if life is None or life.last is None:
             has_child = life is not None and life.child is not None
             return has_child or (self._may_start and not is_held(self._name))
-        is_settled = all(node.state in PRIMARY_STATES for node in life.states.values())
-        return is_settled and life.reports > 1  # the first one may be an old one that was latched
+        return all(node.state in PRIMARY_STATES for node in life.states.values())
 
     @property
     def is_running(self) -> bool:
@@ -229,13 +239,15 @@ class MemberProcess:
                 raise ProcessUnavailable(f"{self} {life.lost}")
             await self._kill_child(life, life.child)
         end_s = monotonic() + STARTS_WITHIN_S
+        refused_s = -REPORTS_WITHIN_S
         child: Child | None = None
         while self._life is None or not self._life.is_up:
             if child is not None and child.ended.done():
                 if self._may_start and child.ended.result() != ALREADY_RUNS:
                     raise ProcessUnavailable(f"{self} {child.how_ended}")
-                child = None
-            if self._life is None and self._may_start and not is_held(self._name):
+                child, refused_s = None, monotonic()  # the other one is about to report
+            may_start = self._may_start and monotonic() - refused_s >= REPORTS_WITHIN_S
+            if self._life is None and may_start and not is_held(self._name):
                 child = await self._start_child()
             elif monotonic() > end_s:
                 raise ProcessUnavailable(self._not_reported())
@@ -250,8 +262,8 @@ class MemberProcess:
         return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
 
     async def _start_child(self) -> Child:
-        life = MemberLife(started_by=uuid4().hex)
-        command = self._context.command_of(self._process, life.started_by)
+        life = MemberLife(secrets.token_hex(_KEY_BYTES))
+        command = self._context.command_of(self._process, life.report_key)
         self._is_ending = False
         try:
             life.child = child = self._context.children.start(command, self._log)
@@ -260,7 +272,7 @@ class MemberProcess:
             raise ProcessUnavailable(f"{self} cannot be started: {error}") from error
         self._life = life
         child.ended.add_done_callback(
-            lambda _: self._context.loop.call_soon(partial(self._on_end, life))
+            lambda _: self._context.loop.call_soon(partial(self._on_end, life, child))
         )
         return child
 
@@ -268,35 +280,34 @@ class MemberProcess:
         self._context.children.end(child, 0.0, 0.0)
         while not child.ended.done():
             await sleep(self._context.loop, _POLL_S)
-        self._on_end(life)
+        self._on_end(life, child)
 
-    def _on_end(self, life: MemberLife) -> None:
+    def _on_end(self, life: MemberLife, child: Child) -> None:
         """Handle the end of a child."""
         if self._life is not life:
             return
         self._life = None
-        if monotonic() - self._refused_s < REPORTS_WITHIN_S:
-            self._may_start = False
+        if life.last is not None and child.ended.result() == ALREADY_RUNS:
+            self._may_start = False  # it has found another one, on another computer
         for figures in self._figures.values():
             figures.end_life()
-        if life.child is not None:
-            self._fail(f"{self} {life.child.how_ended}", is_expected=self._is_ending)
+        self._fail(f"{self} {child.how_ended}", is_expected=self._is_ending)
 
     # --- reports
 
     def _on_message(self, taken: tuple[bytes, Any]) -> None:
-        report = parse_report(taken[0])
-        life = None if report is None or report.is_starting else self._life_of(report)
-        if report is None or life is None:
+        report, life = self._read(taken[0])
+        if report is None or life is None or report.is_starting:
             return
         has_returned = bool(life.lost) or (life.last is None and life.child is None)
         before = life.states
         if any(before.get(name, now).state != now.state for name, now in report.nodes.items()):
             self.moved_s = monotonic()
         life.last, life.reported_s = report, monotonic()
-        life.reports += 1
-        for name, reported in report.nodes.items():
-            self._figures[name].take(reported.figures, is_started_here=life.child is not None)
+        for name, figures in self._figures.items():
+            if name in report.nodes:
+                taken_figures = report.nodes[name].figures
+                figures.take(taken_figures, is_started_here=life.child is not None)
         if report.is_stopping:
             if not self._is_ending:
                 self._lose(life, "is shutting down")
@@ -325,28 +336,46 @@ class MemberProcess:
             callbacks, self.chains = from_text(text)
             self.callbacks = tuple(item for item in callbacks if item.node in self._members)
 
-    def _life_of(self, report: MemberReport) -> MemberLife | None:
-        """Return the life that a report belongs to; None if it is to be ignored."""
-        life = self._life
-        if report.started_by:  # another such child is about to end, with its coordinator
-            return life if life is not None and life.started_by == report.started_by else None
-        if life is not None and life.child is not None:
-            self._refused_s = monotonic()  # the child is about to be refused
-            return None
-        if life is None or life.last is None:
-            return None if report.is_stopping or self._is_ending else self._use(report)
-        if life.last.identity == report.identity:
-            return life
-        if not life.lost and report.started_s < life.last.started_s:
-            return None  # it has been replaced, or is about to be refused
-        self._lose(life, "has ended")
-        return self._use(report)
+    def _on_report_key(self, key: str) -> None:
+        """Read the report again for which the service of its process was asked for the key."""
+        self._answered_key = key
+        self._on_message((self._unsigned, None))
 
-    def _use(self, report: MemberReport) -> MemberLife:
+    def _read(self, content: bytes) -> tuple[MemberReport | None, MemberLife | None]:
+        """Return the report in a message and the life that it belongs to, if it counts."""
+        life = self._life
+        if life is not None and is_signed(content, life.report_key):
+            report = parse_report(content)
+            is_new = report and (life.last is None or report.number > life.last.number)
+            return report, life if is_new else None
+        if life is not None and life.child is not None:
+            return None, None
+        key_here = report_key(self._name)
+        key = self._answered_key if key_here is None else key_here
+        if is_signed(content, key):
+            report = parse_report(content)
+            return report, self._next_life(report, key) if report else None
+        if key_here is None:
+            self._unsigned = content
+            self.requests.ask_for_report_key()
+        return None, None
+
+    def _next_life(self, report: MemberReport, key: str) -> MemberLife | None:
+        """Return the life of a process that was started elsewhere; None if it is not to be used."""
+        life = self._life
+        if report.is_child or report.is_stopping or (life is None and self._is_ending):
+            return None  # another child ends with its coordinator
+        if life is not None and life.last is not None:
+            if not life.lost and report.started_s < life.last.started_s:
+                return None  # it has been replaced, or is about to be refused
+            self._lose(life, "has ended")
+        return self._use(report, key)
+
+    def _use(self, report: MemberReport, key: str) -> MemberLife:
         """Use a process that was started elsewhere, and start none from now on."""
         for figures in self._figures.values():
             figures.end_life()
-        self._life = life = MemberLife(holds_lock=is_held(self._name))
+        self._life = life = MemberLife(key, holds_lock=is_held(self._name))
         self._may_start = False
         text = f"{self} was not started here; it is used: host {report.host}, process {report.pid}"
         self._context.write_log(LogLevel.INFO, PROGRAM_LOGGER, text)

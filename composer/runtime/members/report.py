@@ -2,23 +2,35 @@
 
 Its manager node publishes that as a diagnostic_msgs/msg/DiagnosticArray, latched on ``state``. The
 process may be of another version.
+
+Any node can publish on ``state``, and a replayed bag does. So the frame id of a report is its
+signature. The coordinating process gives the key to those that it starts. It reads the key of
+others in their instance locks or, from other computers, asks their services for it.
 """
 
 from __future__ import annotations
 
+import hmac
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from composer.runtime.metrics.numbers import finite, optional
-from composer.runtime.ros.diagnostic_arrays import read_array
+from composer.runtime.ros.diagnostic_arrays import Status, read_array, write_array
 
 #: Processes report every second. One that has not reported for this time is lost.
 REPORTS_WITHIN_S = 5.0
 _RATES = ("sent_hz", "received_hz", "busy")
 _COUNTS = ("errors", "overruns", "queue_drops", "calls", "skipped")
 _COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
+_DIGEST = "sha256"
+_DIGITS = 64
+#: The signature follows the header, the time and the length of the frame id. Other middleware may
+#: change the header.
+_HEADER, _SIGNATURE_AT = 4, 16
+_SIGNATURE_END = _SIGNATURE_AT + _DIGITS
+_ALIGNED = 4  # to so many bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +48,7 @@ class MemberState:
 
 @dataclass(frozen=True, slots=True)
 class MemberReport:
-    """One report. ``started_by`` identifies the start by a coordinating process, or is empty.
+    """One report. ``is_child`` is whether a coordinating process has started the process.
 
     ``number`` counts the reports of the process. ``last_step`` identifies the last step that was
     received: see :meth:`received`. ``goals`` are those of the whole system that it
@@ -48,7 +60,7 @@ class MemberReport:
     host: str
     pid: str
     started_s: float
-    started_by: str
+    is_child: bool
     number: int
     goals: str
     participant: str
@@ -76,6 +88,26 @@ class MemberReport:
         return self.host, self.pid, self.started_s
 
 
+def signed_report(stamp_ns: int, statuses: Iterable[Status], key: str) -> bytes:
+    """Return a report as :func:`write_array` does, with its signature."""
+    content = write_array(stamp_ns, statuses, "0" * _DIGITS)
+    content += bytes(-len(content) % _ALIGNED)  # otherwise, the middleware does that
+    signature = _signature(content, key).encode()
+    return content[:_SIGNATURE_AT] + signature + content[_SIGNATURE_END:]
+
+
+def is_signed(content: bytes, key: str) -> bool:
+    """Return whether a process with this key, which is not empty, has sent a report."""
+    signature = content[_SIGNATURE_AT:_SIGNATURE_END]
+    return bool(key) and hmac.compare_digest(signature, _signature(content, key).encode())
+
+
+def _signature(content: bytes, key: str) -> str:
+    digest = hmac.new(key.encode(), content[_HEADER:_SIGNATURE_AT], _DIGEST)
+    digest.update(memoryview(content)[_SIGNATURE_END:])
+    return digest.hexdigest()
+
+
 def parse_report(content: bytes) -> MemberReport | None:
     """Return the report in a serialized message, None if it is none."""
     try:
@@ -91,7 +123,7 @@ def parse_report(content: bytes) -> MemberReport | None:
         host=host,
         pid=values.get("pid", ""),
         started_s=started_s,
-        started_by=values.get("started_by", ""),
+        is_child=values.get("is_child") == "true",
         number=number,
         goals=values.get("goals", ""),
         participant=values.get("participant", ""),

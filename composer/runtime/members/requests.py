@@ -32,6 +32,7 @@ from composer.runtime.ros.manager_protocol import (
     LAST_STEPS,
     NUMBERS,
     PARTICIPANT,
+    REPORT_KEY,
     SEEN_REPORT,
     SENDER,
     STEPS,
@@ -49,6 +50,8 @@ _ANSWERED_WITHIN_S = 5.0
 _DISCOVERED_WITHIN_S = 3.0
 #: After this time, it is reported that the service of a process cannot be used.
 _READY_WITHIN_S = 3.0
+#: A response may be lost, and a killed process is known for 20 s more, with its service.
+_KEY_AGAIN_S = 0.25
 _TYPES = {
     "bool_value": ParameterType.PARAMETER_BOOL,
     "integer_value": ParameterType.PARAMETER_INTEGER,
@@ -61,16 +64,19 @@ _TYPES = {
 class MemberRequests:
     """The client of the service ``change_states`` of a process. Use it on ``loop``."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - three of them are callbacks
         self,
         ros: RosNode,
         loop: Loop,
         service: str,
+        *,
         on_figures: Callable[[str], None],
+        on_report_key: Callable[[str], None],
         on_problem: Callable[[str], None],
     ) -> None:
         """``on_figures(text)`` receives the timings that were requested.
 
+        ``on_report_key(key)`` receives the key that was asked for.
         ``on_problem(text)`` receives why the process does not get requests, once for each process.
         """
         self._ros = ros
@@ -88,6 +94,9 @@ class MemberRequests:
         self._awaited_until_s = 0.0
         self._is_polling = False
         self._on_figures = on_figures
+        self._on_report_key = on_report_key
+        self._key_request: Any = None  # the last one
+        self._key_asked_s = -_KEY_AGAIN_S
         self._on_problem = on_problem
         self._holds = 0
         self._unsent: list[RequestedStep] = []
@@ -138,6 +147,18 @@ class MemberRequests:
         """Request the timings of the callbacks and chains of the process."""
         self._wants_figures = True
         self._loop.call_soon(self._send)
+
+    def ask_for_report_key(self) -> None:
+        """Ask the process for the key of its reports, unless that was done a moment ago."""
+        now_s = monotonic()
+        if now_s - self._key_asked_s < _KEY_AGAIN_S or not self._client.service_is_ready():
+            return
+        self._key_asked_s = now_s
+        if self._key_request is not None:
+            self._client.remove_pending_request(self._key_request)
+        request = SetParameters.Request(parameters=[_parameter(REPORT_KEY, bool_value=True)])
+        self._key_request = pending = self._client.call_async(request)
+        pending.add_done_callback(self._on_key)
 
     @property
     def has_messages(self) -> bool:
@@ -276,6 +297,12 @@ class MemberRequests:
         if request.figures:
             parameters.append(_parameter(FIGURES, bool_value=True))
         return SetParameters.Request(parameters=parameters)
+
+    def _on_key(self, pending: Any) -> None:
+        if pending is self._key_request:
+            self._key_request = None
+            for result in pending.result().results[-1:]:
+                self._on_report_key(result.reason)
 
     def _on_response(self, pending: Any) -> None:
         sent = self._sent.pop(pending, None)

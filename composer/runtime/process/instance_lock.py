@@ -19,9 +19,9 @@ from typing import Any, TextIO
 
 from composer.runtime.process import StartRefused
 
-#: Identifies the start of a process of a system by the one that coordinates it. Such a process ends
-#: with ``ALREADY_RUNS``, and says nothing, if another one holds its instance lock.
-STARTED_BY_VARIABLE = "COMPOSE_STARTED_BY"
+#: The key of the reports of a process that the coordinating process of its system starts. Such a
+#: process ends with ``ALREADY_RUNS``, and says nothing, if another one holds its instance lock.
+REPORT_KEY_VARIABLE = "COMPOSE_REPORT_KEY"
 ALREADY_RUNS = 75  # EX_TEMPFAIL of sysexits.h
 #: The name of the folder of the lock files.
 FOLDER_NAME = f"ros2-composer-{os.geteuid()}"
@@ -57,12 +57,14 @@ def already_running(name: str, host: str, pid: str | int) -> AlreadyRunning:
 
 
 @contextmanager
-def hold_instance_lock(name: str, discovery: Mapping[str, str] | None = None) -> Iterator[None]:
+def hold_instance_lock(
+    name: str, discovery: Mapping[str, str] | None = None, report_key: str = ""
+) -> Iterator[None]:
     """Hold the instance lock of a system; ``name`` is the namespace of its manager.
 
-    Commands on this computer use the variables in ``discovery`` to discover the system. The
-    operating system releases the lock however the process ends. Raises StartRefused and
-    AlreadyRunning.
+    Commands on this computer use the variables in ``discovery`` to discover the system. Processes
+    of the same user learn ``report_key`` by :func:`report_key`. The operating system releases the
+    lock however the process ends. Raises StartRefused and AlreadyRunning.
     """
     lock = _open(name)
     if lock is None:
@@ -80,7 +82,12 @@ def hold_instance_lock(name: str, discovery: Mapping[str, str] | None = None) ->
             time.sleep(_POLL_S)
         lock.seek(0)
         lock.truncate()
-        holder = {"host": socket.gethostname(), "pid": os.getpid(), "discovery": discovery or {}}
+        holder = {
+            "host": socket.gethostname(),
+            "pid": os.getpid(),
+            "discovery": discovery or {},
+            "report_key": report_key,
+        }
         json.dump(holder, lock)
         lock.flush()
         with suppress(OSError):  # for LocalSystems: the file may exist since long
@@ -170,13 +177,27 @@ def _holder_in(folder: int, file_name: str) -> dict[str, Any] | None:
 
 def is_held(name: str) -> bool:
     """Return whether a process on this host holds the instance lock of a system."""
+    return _holder_of(name) is not None
+
+
+def report_key(name: str) -> str | None:
+    """Return the key of the reports of the process that holds an instance lock, None without one.
+
+    It is empty while the process writes it.
+    """
+    holder = _holder_of(name)
+    return None if holder is None else str(holder.get("report_key", ""))
+
+
+def _holder_of(name: str) -> dict[str, Any] | None:
+    """Return the holder of the instance lock of a system, None if it is not held."""
     if _is_without_locks():
-        return False
+        return None
     try:
         with _open_folder() as folder:
-            return _holder_in(folder, _file_name(name, _SUFFIX)) is not None
+            return _holder_in(folder, _file_name(name, _SUFFIX))
     except (OSError, StartRefused):
-        return False
+        return None
 
 
 def socket_path(name: str) -> Path | None:

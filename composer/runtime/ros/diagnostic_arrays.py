@@ -42,14 +42,14 @@ class Status(NamedTuple):
     values: dict[str, str]
 
 
-def write_array(stamp_ns: int, statuses: Iterable[Status]) -> bytes:
+def write_array(stamp_ns: int, statuses: Iterable[Status], frame_id: str = "") -> bytes:
     """Return a message with these statuses; ``stamp_ns`` is its time in nanoseconds."""
     statuses = tuple(statuses)
     seconds, nanoseconds = divmod(stamp_ns, _NS_PER_S)
     parts = [
         _LITTLE_ENDIAN,
         struct.pack("<iI", seconds, nanoseconds),
-        _padded(""),  # the frame id
+        _padded(frame_id),
         struct.pack("<I", len(statuses)),
     ]
     gap = 0  # until the next aligned position, which the last value leaves

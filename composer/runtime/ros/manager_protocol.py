@@ -26,13 +26,16 @@ CHANGE_STATE = "change_state"
 #: is meant, as it reports itself: another process of the same name, on another computer for
 #: example, receives the request as well, but neither follows nor answers it. The parameters
 #: ``sender`` and ``numbers`` identify the steps, and ``seen_report`` is the number of the last
-#: report that the sender has received: see ``manager/received_steps.py``.
+#: report that the sender has received: see ``manager/received_steps.py``. With the parameter
+#: ``report_key``, a process that was not started by a coordinating one has the key of its reports
+#: as the reason of the last result: see ``members/report.py``.
 CHANGE_STATES = "change_states"
 STEPS = "steps"
 CREATE = "create"
 LAST_STEPS = "last_steps"
 GOALS = "goals"
 FIGURES = "figures"
+REPORT_KEY = "report_key"
 PARTICIPANT = "participant"
 SENDER = "sender"
 NUMBERS = "numbers"

@@ -83,8 +83,8 @@ class NodeStatus:
 class SystemStatus:
     """A system, its process, and its nodes in the order of the bring-up.
 
-    ``started_by`` identifies the start of a process of a system by the one that coordinates it,
-    ``goals`` are those of the whole system: see :mod:`composer.plan.system_goals`.
+    ``is_child`` is whether the coordinating process of the system has started this one. ``goals``
+    are those of the whole system: see :mod:`composer.plan.system_goals`.
     """
 
     system: str
@@ -93,7 +93,7 @@ class SystemStatus:
     host: str
     pid: int
     started_s: float  # seconds since 1970
-    started_by: str = ""
+    is_child: bool = False
     goals: str = ""
 
     @property
@@ -173,7 +173,7 @@ class _Counters(NamedTuple):
 class Status:
     """The current status of the system and its nodes. Thread-safe."""
 
-    def __init__(self, system: System, order: tuple[str, ...], started_by: str = "") -> None:
+    def __init__(self, system: System, order: tuple[str, ...], *, is_child: bool = False) -> None:
         """``order`` are the keys of all nodes, in the order of the bring-up."""
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
@@ -197,7 +197,7 @@ class Status:
             host=socket.gethostname(),
             pid=os.getpid(),
             started_s=now_s,
-            started_by=started_by,
+            is_child=is_child,
         )
         self._nodes = {
             name: NodeStatus(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from functools import partial
 from itertools import count
@@ -72,14 +73,27 @@ class Process:
 
 
 def report_of(participant: str, number: int = 1, last_step: str = "") -> MemberReport:
-    return MemberReport("running", "vm", "7", 1.0, "", number, "", participant, last_step, {})
+    return MemberReport("running", "vm", "7", 1.0, False, number, "", participant, last_step, {})
+
+
+def requests_of(
+    on: Bench, service: str, figures: list[str], on_problem: Callable[[str], None]
+) -> MemberRequests:
+    return MemberRequests(
+        on.node,
+        on.loop,
+        service,
+        on_figures=figures.append,
+        on_report_key=lambda _: None,
+        on_problem=on_problem,
+    )
 
 
 def client(
     on: Bench, figures: list[str], problems: list[str] | None = None, service: str = SERVICE
 ) -> MemberRequests:
     on_problem = ([] if problems is None else problems).append
-    requests = MemberRequests(on.node, on.loop, service, figures.append, on_problem)
+    requests = requests_of(on, service, figures, on_problem)
     wait_until(requests._client.service_is_ready, "the service")
     return requests
 
@@ -169,8 +183,7 @@ def test_a_process_whose_service_is_not_discovered_is_reported(
     monkeypatch.setattr(member_requests, "_READY_WITHIN_S", 0.0)
     with bench(ExecutorKind.EVENTS) as on:
         problems = list[str]()
-        nothing: Any = None
-        requests = MemberRequests(on.node, on.loop, SERVICE, nothing, problems.append)
+        requests = requests_of(on, SERVICE, [], problems.append)
         result = on.loop.run(lambda: requests.request("/arm", "activate"))
         wait_until(lambda: problems, "the report")
         Process(on).answers = True
@@ -237,7 +250,7 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
         asked.append("")
 
     with bench(ExecutorKind.EVENTS) as on:
-        callbacks = MemberCallbacks(dict, *[nothing] * 6)
+        callbacks = MemberCallbacks(dict, *[nothing] * 6, "")
         MemberService(on.node, on.loop, callbacks, MEANT, nothing).on_report(1)
         service = on.node.resolve_service_name(f"~/{CHANGE_STATES}")
         requests = client(on, [], service=service)
@@ -291,7 +304,7 @@ def test_a_process_that_has_not_reported_is_asked_for_nothing(tmp_path: Path) ->
     """Another one, of another computer, would follow the request."""
     with bench(ExecutorKind.EVENTS) as on:
         process = silent_process(on, tmp_path, "unused")
-        process._life = MemberLife(child=Child(1))
+        process._life = MemberLife("key", child=Child(1))
         with pytest.raises(ProcessUnavailable, match="has not reported yet"):
             process.request("/arm", "shutdown")
         process.close()

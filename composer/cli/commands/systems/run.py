@@ -208,7 +208,7 @@ def run(
         *_words({"--no-tracing": not tracing, "--check-mutation": check_mutation}),
     ]
     from composer.cli.support.process import compose_command, run_in_background
-    from composer.runtime.process.instance_lock import STARTED_BY_VARIABLE
+    from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
 
     if wait:
         up_s = _WAIT_S if timeout is None else timeout
@@ -226,7 +226,7 @@ def run(
         fail_on_error=fail_on_error,
         all_or_nothing=all_or_nothing,
         process=member,
-        started_by=os.environ.pop(STARTED_BY_VARIABLE, ""),  # not for its own children
+        report_key=os.environ.pop(REPORT_KEY_VARIABLE, ""),  # not for its own children
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
     )
     shown = _dashboard_arguments(system, settings or [], namespace, autostart)
@@ -317,7 +317,7 @@ def _run(
         stack.enter_context(queued_output())
         is_part = "/" in system.name.value  # a process of a system: robot/perception
         name = join(system.namespace, system.name.value)
-        is_child = bool(options.started_by)  # its lines go to the process that has started it
+        is_child = bool(options.report_key)  # its lines go to the process that has started it
         log = stack.enter_context(run_log(name, part=is_part, forwarded=is_child))
         address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
         progress = Progress(sys.stderr, console_format(), address)
@@ -342,7 +342,7 @@ def _run(
         try:
             outcome = host.run()
         except StartRefused as refusal:
-            if options.started_by and isinstance(refusal, AlreadyRunning):
+            if options.report_key and isinstance(refusal, AlreadyRunning):
                 raise typer.Exit(ALREADY_RUNS) from refusal
             raise CommandError(str(refusal), hint=refusal.hint) from refusal
         if options.process is None or sys.stderr.isatty():

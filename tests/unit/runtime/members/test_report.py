@@ -14,7 +14,7 @@ SYSTEM = {
     "host": "vm",
     "pid": "7",
     "started": "12.5",
-    "started_by": "ab",
+    "is_child": "true",
     "participant": "010f",
     "last_step": "cafe 7",
 }
@@ -47,7 +47,7 @@ def test_a_report_has_the_process_and_its_nodes() -> None:
     assert report is not None
     assert report.identity == ("vm", "7", 12.5)
     assert report.participant == "010f"
-    assert (report.started_by, report.is_starting, report.is_stopping) == ("ab", False, False)
+    assert (report.is_child, report.is_starting, report.is_stopping) == (True, False, False)
     camera = report.nodes["/camera"]
     assert (camera.state, camera.held_down) == ("active", "")
     assert camera.figures["sent"] == {"/a": 5, "/b": 1}
