@@ -39,11 +39,3 @@ FORMATS_BY_SUFFIX = {
     ".html": Format.HTML,
     ".htm": Format.HTML,
 }
-
-
-class Engine(StrEnum):
-    """The layout engine. ``bundled`` gives the same bytes on every machine."""
-
-    AUTO = "auto"
-    GRAPHVIZ = "graphviz"
-    BUNDLED = "bundled"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from composer.graph import View, build_graph, scene_of
-from composer.graph.output import Engine, Format, render
+from composer.graph.output import Format, render
 from composer.loading import load
 
 ROOT = Path(__file__).parents[1]
@@ -35,7 +35,7 @@ def drawn(name: str, view: View) -> bytes:
     if loading.system is None:
         raise SystemExit(f"{path} cannot be drawn")
     graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
-    return render([graph], Format.SVG, Engine.BUNDLED)
+    return render([graph], Format.SVG)
 
 
 def main() -> None:

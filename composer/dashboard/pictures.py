@@ -11,10 +11,8 @@ from composer.dashboard.observing.topology import is_manager
 from composer.drift import Snapshot
 from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
-from composer.graph.formats.svg import contents
-from composer.graph.formats.svg_elements import markers
+from composer.graph.formats.svg import contents, markers
 from composer.graph.layout import Size, arrange_for_pages
-from composer.graph.measure import sizes
 from composer.graph.scenes.scene import Scene
 from composer.model import PortKind
 
@@ -62,7 +60,7 @@ class Diagram:
             graph = replace(graph, clusters=tuple(map(_with_place_for_process, graph.clusters)))
         directions = tuple(Direction) if view in _TURNED else (graph.direction,)
         self._graph = graph
-        self._arrangement = arrange_for_pages(graph, sizes(graph), directions)
+        self._layout_on = arrange_for_pages(graph, directions)
         self._facts = {thing.key: _facts(thing) for thing in _things(graph)}
         self._executors = _nodes_by_executor(graph) if view is View.DEPLOYMENT else {}
 
@@ -71,7 +69,7 @@ class Diagram:
 
         All texts in the fragment are escaped.
         """
-        graph, layout = self._graph, self._arrangement.on(page)
+        graph, layout = self._graph, self._layout_on(page)
         return {
             "title": graph.title,
             "view": graph.view,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from composer.graph import View, build_graph, scene_of
-from composer.graph.output import Engine, Format, render
+from composer.graph.output import Format, render
 from composer.loading import load
 from composer.resources import systems_folder
 from tests.browser.conftest import Opened
@@ -40,7 +40,7 @@ def rendered(name: str) -> bytes:
         loading = load(systems_folder() / f"{name}.yaml")
         assert loading.system is not None
         scene = scene_of([loading.system], loading.diagnostics)
-    return render([build_graph(scene, view) for view in View], Format.HTML, Engine.BUNDLED)
+    return render([build_graph(scene, view) for view in View], Format.HTML)
 
 
 @pytest.fixture
@@ -271,7 +271,7 @@ def test_a_page_with_diagnostics_shows_them(open_file: Open, tmp_path: Path) -> 
     assert loading.system is not None
     graph = build_graph(scene_of([loading.system], loading.diagnostics))
     path = tmp_path / "broken.html"
-    path.write_bytes(render([graph], Format.HTML, Engine.BUNDLED))
+    path.write_bytes(render([graph], Format.HTML))
     page = open_file(path).page
     assert page.locator("[role=tab]").count() == 0
     page.click(thing("node:/one"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from composer.graph import View, build_graph, scene_of
-from composer.graph.output import Engine, Format, render
+from composer.graph.output import Format, render
 from composer.loading import load
 from composer.resources import systems_folder
 from tests.browser.conftest import Opened
@@ -23,7 +23,7 @@ def test_every_example_is_shown_and_loads_nothing(
     scene = scene_of([loading.system], loading.diagnostics)
     paths = [tmp_path / f"{name}.{view}.svg" for view in View]
     for path, view in zip(paths, View, strict=True):
-        path.write_bytes(render([build_graph(scene, view)], Format.SVG, Engine.BUNDLED))
+        path.write_bytes(render([build_graph(scene, view)], Format.SVG))
     opened = open_file(paths[0])
     page = opened.page
     for path in paths:

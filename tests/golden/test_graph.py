@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from composer.graph import View, build_graph, scene_of
-from composer.graph.engines import Engine
 from composer.graph.output import Format, render
 from composer.loading import load
 
@@ -25,7 +24,7 @@ def test_diagram(view: View, form: Format, request: pytest.FixtureRequest) -> No
     loading = load(HERE / "depot.yaml", shown="depot.yaml")
     assert loading.system is not None
     graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
-    text = render([graph], form, Engine.BUNDLED).decode()
+    text = render([graph], form).decode()
     expected = HERE / f"depot.{view}.{SUFFIXES[form]}"
     if request.config.getoption("--update-golden"):
         expected.write_text(text, encoding="utf-8")

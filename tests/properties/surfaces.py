@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from composer.diagnostics import in_order, registered_rules
 from composer.document import parse_bytes
 from composer.graph import View, build_graph, scene_of
-from composer.graph.output import Engine, Format, render
+from composer.graph.output import Format, render
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import Bundle, Definition
 from composer.loading import load_bytes
@@ -140,11 +140,11 @@ def _check_graph(data: bytes) -> None:
     scene = scene_of([loading.system], loading.diagnostics)
     graphs = [build_graph(scene, view) for view in View]
     for number in range(len(graphs)):
-        ElementTree.fromstring(render(graphs, Format.SVG, Engine.BUNDLED, number))
+        ElementTree.fromstring(render(graphs, Format.SVG, number))
         json.loads(render(graphs, Format.JSON, shown=number))
         for form in (Format.MERMAID, Format.DOT):
             assert render(graphs, form, shown=number).decode().endswith("\n")
-    assert render(graphs, Format.HTML, Engine.BUNDLED).startswith(b"<!DOCTYPE html>")
+    assert render(graphs, Format.HTML).startswith(b"<!DOCTYPE html>")
 
 
 def _mutations(some: list[Any]) -> st.SearchStrategy[bytes]:

@@ -1,30 +1,24 @@
 """Layered graph drawing with nested frames (Sugiyama, Tagawa and Toda, 1981).
 
-The steps, in ``steps``, are: rank assignment (``ranks``), ordering with few crossings
-(``ordering``, ``transpose``), coordinate assignment (``coordinates``) and edge routing
-(``routing``). A frame is one lane across the ranks, so frames never overlap. Positions are in
-pixels, and the layout is deterministic. Edges with a common end share segments (``build``). Ports
-of a block are rows of one box (``units``). Components that differ only in names are laid out once
-(``alike``).
+The steps are: sizes of texts (``measure``), rank assignment (``ranks``), boxes for vertices, labels
+and bends (``build``), ordering with few crossings (``ordering``), coordinate assignment
+(``coordinates``) and edge routing (``routing``). ``layered`` runs them on a connected graph, and
+``pages`` puts several of its results on a page. A frame is one lane across the ranks, so frames
+never overlap. Positions are in pixels, and the layout is deterministic.
 """
 
 from __future__ import annotations
 
-from composer.graph.layout.arrange import LayOut, arrange
-from composer.graph.layout.fitting import Arrangement, arrange_for_pages
+from composer.graph.layout.pages import arrange, arrange_for_pages
 from composer.graph.layout.result import Frame, Layout, Path, Point, Rectangle, Size
-from composer.graph.layout.units import Sizes
 
 __all__ = [
-    "Arrangement",
     "Frame",
-    "LayOut",
     "Layout",
     "Path",
     "Point",
     "Rectangle",
     "Size",
-    "Sizes",
     "arrange",
     "arrange_for_pages",
 ]

@@ -1,18 +1,22 @@
-"""Convert a graph to boxes in groups: vertices on even ranks, bends and labels between them."""
+"""Convert a graph to boxes in groups: vertices on even ranks, bends and labels between them.
+
+A block is one box, with its ports as rows.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from composer.fast_dataclass import dataclass
-from composer.graph.diagram import Cluster, Direction, Edge, Graph, Mark
-from composer.graph.layout.result import Size
-from composer.graph.layout.self_loops import loops_of, make_room
-from composer.graph.layout.steps.boxes import (
+from composer.graph.diagram import Direction, Edge, Graph
+from composer.graph.layout.boxes import (
     BEND_GAP,
     FRAME_LABEL,
     FRAME_PADDING,
+    LOOP_BOW,
+    LOOP_LABEL_GAP,
     Axes,
     Box,
     EdgeChain,
@@ -20,8 +24,9 @@ from composer.graph.layout.steps.boxes import (
     SelfLoop,
     link,
 )
-from composer.graph.layout.steps.ranks import assign_ranks, break_cycles
-from composer.graph.layout.units import LayoutUnits, Sizes
+from composer.graph.layout.measure import Sizes
+from composer.graph.layout.ranks import assign_ranks, break_cycles
+from composer.graph.layout.result import Size
 
 
 @dataclass(slots=True)
@@ -32,7 +37,7 @@ class Parts:
     axes: Axes
     root: Group
     groups: dict[str, Group]  # by cluster key; "" is the root
-    boxes: dict[str, Box] = field(default_factory=dict)  # by the unit's key
+    boxes: dict[str, Box] = field(default_factory=dict)  # by the key of a vertex or block
     chains: list[EdgeChain] = field(default_factory=list)
     loops: list[SelfLoop] = field(default_factory=list)
 
@@ -50,40 +55,66 @@ class _DirectedEdge:
         return self.low != self.edge.source
 
     @property
-    def style(self) -> tuple[str, Mark | None, bool]:
+    def style(self) -> tuple[object, ...]:
         """The style that edges must have in common to share segments."""
         mark = self.edge.problem.mark if self.edge.problem else None
-        return (self.edge.kind.value, mark, self.backward)
+        return (self.edge.kind, mark, self.backward)
 
 
 def build(graph: Graph, sizes: Sizes) -> Parts:
     """Return the boxes and groups of a graph, without positions. It has at least one vertex."""
-    units = LayoutUnits(graph, sizes)
-    through = [edge for edge in graph.edges if units.key(edge.source) != units.key(edge.target)]
-    pairs = [(units.key(edge.source), units.key(edge.target)) for edge in through]
-    clusters = {key: unit.cluster for key, unit in units.all.items()}
-    turned = break_cycles(list(clusters), pairs)
-    rank = assign_ranks(clusters, turned)
+    nesting = _Nesting(graph, sizes)
+    between = [edge for edge in graph.edges if nesting.box[edge.source] != nesting.box[edge.target]]
+    pairs = [(nesting.box[edge.source], nesting.box[edge.target]) for edge in between]
+    turned = break_cycles(list(nesting.around), pairs)
+    rank = assign_ranks(nesting.around, turned)
     axes = Axes(graph.direction is Direction.DOWN)
     root = Group(padding=0.0)
     parts = Parts(graph, axes, root, _groups(graph, root, axes, sizes))
-    for key, unit in units.all.items():
-        along, across = axes.of_size(unit.size)
-        box = Box(2 * rank[key], along, across)
-        parts.boxes[key] = box
-        parts.groups[unit.cluster].children.append(box)
-    for key, edges in loops_of(graph, units).items():
-        parts.loops += make_room(parts.boxes[key], edges, sizes, axes)
-    directed_edges = [
+    for key, cluster in nesting.around.items():
+        along, across = axes.of_size(sizes.of_box(key))
+        parts.boxes[key] = Box(2 * rank[key], along, across)
+        parts.groups[cluster].children.append(parts.boxes[key])
+    loops: dict[str, list[Edge]] = {}
+    for edge in graph.edges:
+        if nesting.box[edge.source] == nesting.box[edge.target]:
+            loops.setdefault(nesting.box[edge.source], []).append(edge)
+    for key, edges in loops.items():
+        parts.loops += _self_loops(parts.boxes[key], edges, sizes, axes)
+    directed = [
         _DirectedEdge(edge, edge.source, edge.target)
         if pair == straight
         else _DirectedEdge(edge, edge.target, edge.source)
-        for edge, pair, straight in zip(through, turned, pairs, strict=True)
+        for edge, pair, straight in zip(between, turned, pairs, strict=True)
     ]
-    _Chains(parts, units, directed_edges).add(sizes)
+    parts.chains += _Chains(parts, nesting, sizes, directed).all()
     _drop_empty(root)
     root.span_ranks()
     return parts
+
+
+class _Nesting:
+    """The box of each vertex, and the frames around each box."""
+
+    def __init__(self, graph: Graph, sizes: Sizes) -> None:
+        self._parents: Mapping[str, str] = {item.key: item.parent for item in graph.clusters}
+        self.box: dict[str, str] = {}  # of each vertex: its own key, or that of its block
+        self.around: dict[str, str] = {}  # the innermost cluster of each box
+        for vertex in graph.vertices:
+            in_block = vertex.cluster in sizes.blocks
+            box = self.box[vertex.key] = vertex.cluster if in_block else vertex.key
+            self.around[box] = self._parents[vertex.cluster] if in_block else vertex.cluster
+
+    def around_both(self, first: str, second: str) -> str:
+        """Return the innermost cluster around two boxes; empty for none."""
+        outer = set(self._outwards(first))
+        return next((key for key in self._outwards(second) if key in outer), "")
+
+    def _outwards(self, box: str) -> Iterator[str]:
+        key = self.around[box]
+        while key:
+            yield key
+            key = self._parents[key]
 
 
 def _groups(graph: Graph, root: Group, axes: Axes, sizes: Sizes) -> dict[str, Group]:
@@ -102,6 +133,28 @@ def _groups(graph: Graph, root: Group, axes: Axes, sizes: Sizes) -> dict[str, Gr
     return groups
 
 
+def _drop_empty(group: Group) -> None:
+    for child in group.inner():
+        _drop_empty(child)
+    group.children = [child for child in group.children if isinstance(child, Box) or child.children]
+
+
+def _self_loops(box: Box, edges: list[Edge], sizes: Sizes, axes: Axes) -> Iterator[SelfLoop]:
+    """Yield the loops of a box, and extend the box by a tail for them and their labels."""
+    labels = [sizes.labels.get(edge.key) for edge in edges]
+    extents = [None if label is None else axes.of_size(label) for label in labels]
+    needed = [extent for extent in extents if extent is not None]
+    box.tail = LOOP_BOW + max((along + LOOP_LABEL_GAP for along, _ in needed), default=0.0)
+    box.along += box.tail
+    box.across = max(box.across, sum(across + LOOP_LABEL_GAP for _, across in needed))
+    step = box.across / len(edges)
+    for index, (edge, extent) in enumerate(zip(edges, extents, strict=True)):
+        middle = (index + 0.5) * step - box.across / 2
+        source = sizes.rows.get(edge.source, middle - step / 4)
+        target = sizes.rows.get(edge.target, middle + step / 4)
+        yield SelfLoop(edge, box, source, target, middle, extent)
+
+
 class _Chains:
     """Joins boxes by bends on the ranks between them, one of which holds the label.
 
@@ -109,30 +162,29 @@ class _Chains:
     """
 
     def __init__(
-        self, parts: Parts, units: LayoutUnits, directed_edges: list[_DirectedEdge]
+        self, parts: Parts, nesting: _Nesting, sizes: Sizes, directed_edges: list[_DirectedEdge]
     ) -> None:
         self._parts = parts
-        self._units = units
-        self._ways = directed_edges
-        self._frames = _Frames(parts.graph, units)
+        self._nesting = nesting
+        self._sizes = sizes
+        self._edges = directed_edges
         self._shared: dict[tuple[object, ...], Box] = {}
         self._leaving = Counter((directed.low, *directed.style) for directed in directed_edges)
         self._arriving = Counter((directed.high, *directed.style) for directed in directed_edges)
 
-    def add(self, sizes: Sizes) -> None:
-        for directed in self._ways:
-            chain = self._chain(directed, sizes.labels.get(directed.edge.key))
+    def all(self) -> Iterator[EdgeChain]:
+        """Yield the chain of each edge, with its boxes linked."""
+        for directed in self._edges:
+            chain = self._chain(directed, self._sizes.labels.get(directed.edge.key))
             link(chain)
-            self._parts.chains.append(chain)
+            yield chain
 
     def _chain(self, directed: _DirectedEdge, label: Size | None) -> EdgeChain:
-        low, high = self._units.key(directed.low), self._units.key(directed.high)
+        low, high = self._nesting.box[directed.low], self._nesting.box[directed.high]
         begin, end = self._parts.boxes[low], self._parts.boxes[high]
-        inside = self._frames.around_both(low, high)
-        leaving, arriving = (
-            self._leaving[directed.low, *directed.style],
-            self._arriving[directed.high, *directed.style],
-        )
+        inside = self._nesting.around_both(low, high)
+        leaving = self._leaving[directed.low, *directed.style]
+        arriving = self._arriving[directed.high, *directed.style]
         ranks = range(begin.rank + 1, end.rank)
         hub = ("leaving", directed.low) if leaving >= arriving else ("arriving", directed.high)
         own = ranks[-1] if leaving >= arriving else ranks[0]
@@ -150,8 +202,8 @@ class _Chains:
             boxes=(begin, *bends.values(), end),
             label=bends[own] if label is not None else None,
             backward=directed.backward,
-            first_offset=self._units.offset(directed.low),
-            last_offset=self._units.offset(directed.high),
+            first_offset=self._sizes.rows.get(directed.low),
+            last_offset=self._sizes.rows.get(directed.high),
         )
 
     def _bend(self, rank: int, inside: str, shared_by: tuple[object, ...] | None) -> Box:
@@ -162,30 +214,3 @@ class _Chains:
                 return known
         self._parts.groups[inside].children.append(bend)
         return bend
-
-
-def _drop_empty(group: Group) -> None:
-    for child in group.inner():
-        _drop_empty(child)
-    group.children = [child for child in group.children if isinstance(child, Box) or child.children]
-
-
-class _Frames:
-    """The nested frames around each unit."""
-
-    def __init__(self, graph: Graph, units: LayoutUnits) -> None:
-        self._clusters: dict[str, Cluster] = {cluster.key: cluster for cluster in graph.clusters}
-        self._around = {key: unit.cluster for key, unit in units.all.items()}
-
-    def around_both(self, first: str, second: str) -> str:
-        """Return the innermost cluster that holds both; empty for none."""
-        outer = set(self._outwards(first))
-        return next((key for key in self._outwards(second) if key in outer), "")
-
-    def _outwards(self, unit: str) -> list[str]:
-        found = []
-        key = self._around[unit]
-        while key:
-            found.append(key)
-            key = self._clusters[key].parent
-        return found

@@ -126,15 +126,6 @@ def test_systems_and_live_are_mutually_exclusive() -> None:
         assert "--live" in done.err
 
 
-def test_missing_graphviz_is_reported_if_requested(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PATH", "/nowhere")
-    done = compose("graph", PIPELINE, "-f", "svg", "--layout", "graphviz")
-    assert (done.code, done.out) == (1, "")
-    assert "Graphviz is not installed" in done.err
-    assert "--layout bundled" in done.err
-    assert compose("graph", PIPELINE, "-f", "svg").out.startswith("<svg ")
-
-
 def test_a_diagram_too_large_for_mermaid_prints_a_warning(tmp_path: Path) -> None:
     path = tmp_path / "large.yaml"
     path.write_text(fleet_text(300))

@@ -12,16 +12,15 @@ from html.parser import HTMLParser
 
 from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Graph
-from composer.graph.engines import lay_out
 from composer.graph.formats import html
-from composer.graph.output import Engine, Format, render
+from composer.graph.output import Format, render
 from composer.loading import load
 from composer.resources import systems_folder
 from tests.unit.graph.test_renderers import EVIL, evil_graph
 
 
 def page_of(*graphs: Graph) -> str:
-    return html.render([(graph, lay_out(graph, Engine.BUNDLED)) for graph in graphs])
+    return html.render(graphs)
 
 
 def pipeline_page() -> str:
@@ -94,7 +93,7 @@ def test_the_chosen_view_is_the_one_that_is_shown() -> None:
     assert loading.system is not None
     scene = scene_of([loading.system])
     graphs = [build_graph(scene, view) for view in View]
-    page = render(graphs, Format.HTML, Engine.BUNDLED, shown=2).decode()
+    page = render(graphs, Format.HTML, shown=2).decode()
     shown = re.findall(r'<section class="view" id="([^"]*)"[^>]*?(hidden)?>', page)
     assert [name for name, hidden in shown if not hidden] == ["view-lifecycle"]
     assert page.count('aria-selected="true" tabindex') == 1
@@ -103,7 +102,7 @@ def test_the_chosen_view_is_the_one_that_is_shown() -> None:
 ALL_FORMATS = """
 import hashlib, sys
 from composer.graph import View, build_graph, scene_of
-from composer.graph.output import Engine, Format, render
+from composer.graph.output import Format, render
 from composer.loading import load
 from composer.resources import systems_folder
 loading = load(systems_folder() / "navigation.yaml")
@@ -111,7 +110,7 @@ scene = scene_of([loading.system], loading.diagnostics)
 graphs = [build_graph(scene, view) for view in View]
 for form in Format:
     if form is not Format.PNG:
-        print(form, hashlib.sha256(render(graphs, form, Engine.BUNDLED)).hexdigest())
+        print(form, hashlib.sha256(render(graphs, form)).hexdigest())
 """
 
 

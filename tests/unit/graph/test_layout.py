@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
-from composer.graph.layout import Layout, Rectangle, arrange
-from composer.graph.measure import sizes
+from composer.graph.layout import Rectangle, arrange
+from composer.graph.layout.measure import measure
 from tests.examples import examples
 
 
@@ -34,10 +34,6 @@ def graph_of(
     )
 
 
-def laid_out(graph: Graph) -> Layout:
-    return arrange(graph, sizes(graph))
-
-
 def overlap(first: Rectangle, second: Rectangle) -> bool:
     return (
         abs(first.center.x - second.center.x) * 2 < first.size.width + second.size.width
@@ -55,7 +51,7 @@ def holds(outer: Rectangle, inner: Rectangle) -> bool:
 
 
 def test_a_chain_runs_from_left_to_right_in_a_straight_line() -> None:
-    layout = laid_out(graph_of(dict.fromkeys("abc", ""), [("a", "b"), ("b", "c")]))
+    layout = arrange(graph_of(dict.fromkeys("abc", ""), [("a", "b"), ("b", "c")]))
     places = list(layout.vertices.values())
     assert places[0].center.x < places[1].center.x < places[2].center.x
     assert len({round(place.center.y, 3) for place in places}) == 1
@@ -63,14 +59,14 @@ def test_a_chain_runs_from_left_to_right_in_a_straight_line() -> None:
 
 def test_a_chain_runs_downwards_on_request() -> None:
     graph = graph_of(dict.fromkeys("ab", ""), [("a", "b")], direction=Direction.DOWN)
-    first, second = laid_out(graph).vertices.values()
+    first, second = arrange(graph).vertices.values()
     assert first.center.y < second.center.y
     assert first.center.x == second.center.x
 
 
 def test_an_edge_begins_at_its_source_and_ends_at_its_target_also_against_the_direction() -> None:
     graph = graph_of(dict.fromkeys("ab", ""), [("a", "b"), ("b", "a")])
-    layout = laid_out(graph)
+    layout = arrange(graph)
     places = layout.vertices
     for path in layout.paths:
         begin, end = path.points[0], path.points[-1]
@@ -80,21 +76,21 @@ def test_an_edge_begins_at_its_source_and_ends_at_its_target_also_against_the_di
 
 
 def test_no_vertices_make_an_empty_picture() -> None:
-    layout = laid_out(graph_of({}, []))
+    layout = arrange(graph_of({}, []))
     assert layout.vertices == {}
     assert layout.size.width > 0
 
 
 def test_a_cluster_without_vertices_is_not_drawn() -> None:
-    layout = laid_out(graph_of({"a": "full"}, [], [("full", ""), ("empty", "")]))
+    layout = arrange(graph_of({"a": "full"}, [], [("full", ""), ("empty", "")]))
     assert [frame.cluster.key for frame in layout.frames] == ["full"]
 
 
 def test_a_frame_is_wide_enough_for_its_label() -> None:
     long_name = "/a/namespace/with/a/very/long/name"
     graph = graph_of({"a": long_name}, [], [(long_name, "")])
-    layout = laid_out(graph)
-    assert layout.frames[0].place.size.width >= sizes(graph).frames[long_name].width
+    layout = arrange(graph)
+    assert layout.frames[0].place.size.width >= measure(graph).frames[long_name].width
 
 
 @st.composite
@@ -115,12 +111,12 @@ def graphs(draw: st.DrawFn) -> Graph:
 @examples(60)
 @given(graphs())
 def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
-    layout = laid_out(graph)
+    layout = arrange(graph)
     places = layout.vertices
     for first, second in combinations(places.values(), 2):
         assert not overlap(first, second)
     labels = [
-        Rectangle(path.label, sizes(graph).labels[path.edge.key])
+        Rectangle(path.label, measure(graph).labels[path.edge.key])
         for path in layout.paths
         if path.label is not None
     ]
@@ -133,7 +129,7 @@ def test_nothing_overlaps_that_must_not(graph: Graph) -> None:
 @examples(60)
 @given(graphs())
 def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
-    layout = laid_out(graph)
+    layout = arrange(graph)
     frames = {frame.cluster.key: frame for frame in layout.frames}
     for frame in layout.frames:
         if frame.cluster.parent:
@@ -153,11 +149,11 @@ def test_frames_hold_what_is_theirs_and_nothing_else(graph: Graph) -> None:
 @examples(30)
 @given(graphs())
 def test_everything_is_inside_the_picture_and_comes_out_the_same_again(graph: Graph) -> None:
-    layout = laid_out(graph)
+    layout = arrange(graph)
     everything = [*layout.vertices.values(), *(frame.place for frame in layout.frames)]
     for place in everything:
         assert place.left >= 0.0
         assert place.top >= 0.0
         assert place.left + place.size.width <= layout.size.width
         assert place.top + place.size.height <= layout.size.height
-    assert laid_out(graph) == layout
+    assert arrange(graph) == layout

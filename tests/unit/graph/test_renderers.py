@@ -24,9 +24,9 @@ from composer.graph.diagram import (
     Vertex,
     VertexKind,
 )
-from composer.graph.engines import Engine
 from composer.graph.formats import dot, mermaid, svg, theme
 from composer.graph.formats import json as graph_json
+from composer.graph.layout import arrange
 from composer.graph.output import Format, render
 from composer.loading import load
 from composer.resources import systems_folder
@@ -85,7 +85,7 @@ def hostile_graph() -> Graph:
 
 @pytest.mark.parametrize("form", [form for form in Format if form is not Format.PNG])
 def test_no_format_holds_control_characters(form: Format) -> None:
-    text = render([hostile_graph()], form, Engine.BUNDLED).decode()
+    text = render([hostile_graph()], form).decode()
     assert is_safe(text)
     if form is Format.JSON:
         assert json.loads(text)["title"] == hostile_graph().title
@@ -117,14 +117,16 @@ def test_graphviz_shows_the_texts_as_they_were() -> None:
 
 
 def test_svg_holds_the_texts_as_they_were() -> None:
-    root = ET.fromstring(svg.render(evil_graph()))
+    root = ET.fromstring(svg.render(evil_graph(), arrange(evil_graph())))
     texts = [text.text for text in root.iter(f"{SVG}text")]
     assert texts.count(EVIL) == 3  # frame, vertex, edge
     assert EVIL in {title.text for title in root.iter(f"{SVG}title")}
 
 
 def test_svg_loads_nothing_from_elsewhere() -> None:
-    text = svg.render(evil_graph()).replace('xmlns="http://www.w3.org/2000/svg"', "")
+    text = svg.render(evil_graph(), arrange(evil_graph())).replace(
+        'xmlns="http://www.w3.org/2000/svg"', ""
+    )
     assert "http" not in text
     assert "@import" not in text
 
@@ -170,7 +172,7 @@ def test_every_example_system_is_drawn_in_every_format(path: Path, view: View) -
     assert len(keys) == len(graph.vertices)
     assert all({edge.source, edge.target} <= keys for edge in graph.edges)
     for form in (Format.JSON, Format.SVG, Format.MERMAID, Format.DOT):
-        check(form, render([graph], form, Engine.BUNDLED).decode())
+        check(form, render([graph], form).decode())
 
 
 def test_no_kind_of_vertex_has_the_name_of_another_color() -> None:

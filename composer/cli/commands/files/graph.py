@@ -14,7 +14,7 @@ from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
 from composer.cli.support.output.terminal import say, write_bytes
 from composer.cli.support.system_arguments import complete_system, load_system, system_file
-from composer.diagram_options import FORMATS_BY_SUFFIX, Engine, Format, View
+from composer.diagram_options import FORMATS_BY_SUFFIX, Format, View
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
@@ -80,13 +80,6 @@ def graph(
             " and opens with this one.",
         ),
     ] = View.NODES,
-    layout: Annotated[
-        Engine,
-        typer.Option(
-            help="Layout engine for svg, png and html. auto uses Graphviz if it is installed, else"
-            " bundled. bundled has the same output on every machine.",
-        ),
-    ] = Engine.AUTO,
     live: Annotated[
         bool, typer.Option("--live", help="Draw the running ROS graph instead of a file.")
     ] = False,
@@ -122,7 +115,7 @@ def graph(
     )
     if view is View.FRAMES and not scene.transforms:
         raise CommandError("no node declares the frames that it broadcasts, in 'transforms'")
-    drawn = _drawn(scene, chosen, view, layout, live=live)
+    drawn = _drawn(scene, chosen, view, live=live)
     if output is None:
         write_bytes(drawn)
     else:
@@ -163,12 +156,10 @@ def _live(timeout_s: float, measure_s: float, *, has_processes: bool) -> Scene:
             return live_scene_of(snapshot, observer.rates(deadline, measure_s))
 
 
-def _drawn(scene: Scene, form: Format, view: View, layout: Engine, *, live: bool) -> bytes:
+def _drawn(scene: Scene, form: Format, view: View, *, live: bool) -> bytes:
     from composer import graph as graphs
     from composer.graph import output
     from composer.graph.formats import mermaid
-    from composer.graph.formats.png import PngMissing
-    from composer.graph.graphviz import GraphvizFailed
 
     views = [view]
     if form is Format.HTML:
@@ -178,11 +169,12 @@ def _drawn(scene: Scene, form: Format, view: View, layout: Engine, *, live: bool
     if form is Format.MERMAID and mermaid.is_too_large(pictures[0]):
         say("warning: Mermaid refuses to render a diagram of this size; use html or svg instead")
     try:
-        return output.render(pictures, form, layout, shown=views.index(view))
-    except GraphvizFailed as error:
-        raise CommandError(str(error), hint="--layout bundled needs no Graphviz") from error
-    except PngMissing as error:
-        raise CommandError(str(error)) from error
+        return output.render(pictures, form, shown=views.index(view))
+    except output.PngMissing as error:
+        raise CommandError(
+            str(error),
+            hint='pip install "ros2-composer[png]"; or use -f svg, or -f dot with Graphviz',
+        ) from error
 
 
 def _format_of(output: Path | None) -> Format:

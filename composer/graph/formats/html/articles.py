@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from composer.graph.diagram import Details, Graph, Problem
-from composer.graph.formats.svg_elements import text
+from composer.graph.formats.svg import text
 from composer.tree import Plain
 
 #: Labels for the keys of facts.

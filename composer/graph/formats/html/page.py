@@ -10,10 +10,9 @@ from pathlib import Path
 
 from composer.graph.diagram import Graph, VertexKind
 from composer.graph.formats.html.articles import articles
-from composer.graph.formats.svg import contents
-from composer.graph.formats.svg_elements import markers, number, text
+from composer.graph.formats.svg import contents, markers, number, text
 from composer.graph.formats.theme import page_style
-from composer.graph.layout import Layout
+from composer.graph.layout import arrange
 
 #: The modules of the script, each before those that import it.
 _SCRIPTS = (
@@ -30,19 +29,17 @@ _SCRIPTS = (
 _MODULE_SYNTAX = re.compile(r"^(import .*\n+|export )", re.MULTILINE)
 _KINDS = (VertexKind.NODE, VertexKind.TOPIC, VertexKind.SERVICE, VertexKind.ACTION)
 
-Picture = tuple[Graph, Layout]
 
-
-def render(pictures: Sequence[Picture], shown: int = 0) -> str:
+def render(graphs: Sequence[Graph], shown: int = 0) -> str:
     """Return the page with one picture or more, each of another view.
 
-    The one at index ``shown`` is the one that is shown first.
+    The page first shows the picture at index ``shown``.
     """
-    return "\n".join(_lines(pictures, shown)) + "\n"
+    return "\n".join(_lines(graphs, shown)) + "\n"
 
 
-def _lines(pictures: Sequence[Picture], shown: int) -> Iterator[str]:
-    title = text(pictures[0][0].title)
+def _lines(graphs: Sequence[Graph], shown: int) -> Iterator[str]:
+    title = text(graphs[0].title)
     script = _script()
     yield "<!DOCTYPE html>"
     yield '<html lang="en">'
@@ -56,14 +53,14 @@ def _lines(pictures: Sequence[Picture], shown: int) -> Iterator[str]:
     yield "<noscript><style>.listing{display:block}.tools{display:none}</style></noscript>"
     yield "</head>"
     yield "<body>"
-    yield from _toolbar(title, pictures, shown)
+    yield from _toolbar(title, graphs, shown)
     yield "<main>"
-    for index, (graph, layout) in enumerate(pictures):
-        yield from _view(graph, layout, shown=index == shown)
+    for index, graph in enumerate(graphs):
+        yield from _view(graph, shown=index == shown)
     yield from _panel()
     yield "</main>"
     yield '<section class="listing" aria-label="All details">'
-    yield from articles(graph for graph, _ in pictures)
+    yield from articles(graphs)
     yield "</section>"
     yield f'<svg class="heads" aria-hidden="true">{markers()}</svg>'
     yield f"<script>{script}</script>"
@@ -80,17 +77,17 @@ def _policy(script: str) -> str:
     )
 
 
-def _toolbar(title: str, pictures: Sequence[Picture], shown: int) -> Iterator[str]:
+def _toolbar(title: str, graphs: Sequence[Graph], shown: int) -> Iterator[str]:
     yield '<header class="bar">'
     yield f"<h1>{title}</h1>"
     yield '<div class="tools">'
-    yield from _tabs([graph.view for graph, _ in pictures], shown)
+    yield from _tabs([graph.view for graph in graphs], shown)
     yield (
         '<div class="search" role="search"><input type="search" id="search" autocomplete="off"'
         ' spellcheck="false" placeholder="Search ( / )" aria-label="Search names, types, notes">'
         '<output id="matches" for="search" aria-live="polite"></output></div>'
     )
-    yield from _filters([graph for graph, _ in pictures])
+    yield from _filters(graphs)
     yield (
         '<div class="group" role="group" aria-label="Zoom">'
         '<button type="button" data-zoom="out" aria-label="Zoom out" title="-">-</button>'
@@ -158,7 +155,8 @@ def _natural(name: str) -> list[tuple[str, int]]:
     ]
 
 
-def _view(graph: Graph, layout: Layout, *, shown: bool) -> Iterator[str]:
+def _view(graph: Graph, *, shown: bool) -> Iterator[str]:
+    layout = arrange(graph)
     width, height = number(layout.size.width), number(layout.size.height)
     hidden = "" if shown else " hidden"
     yield (

@@ -10,7 +10,6 @@ import pytest
 from composer.graph import View
 from composer.graph.diagram import Direction
 from composer.graph.layout import Layout, Size, arrange, arrange_for_pages
-from composer.graph.measure import sizes
 from tests.unit.graph.test_layout import graph_of, holds, overlap
 from tests.unit.support.fleets import fleet_graph
 
@@ -27,10 +26,10 @@ def scale(layout: Layout, page: Size) -> float:
 @pytest.mark.parametrize("view", [View.NODES, View.CONNECTIONS])
 def test_a_large_graph_fills_the_page(view: View, page: Size) -> None:
     graph = fleet_graph(100, view)
-    layout = arrange_for_pages(graph, sizes(graph), BOTH).on(page)
+    layout = arrange_for_pages(graph, BOTH)(page)
     filled = layout.size.width * layout.size.height * scale(layout, page) ** 2
     assert filled > 0.7 * page.width * page.height
-    others = [arrange(replace(graph, direction=item), sizes(graph)) for item in BOTH]
+    others = [arrange(replace(graph, direction=item)) for item in BOTH]
     assert scale(layout, page) > max(scale(other, page) for other in others)
     assert {path.edge.key for path in layout.paths} == {edge.key for edge in graph.edges}
     assert layout.vertices.keys() == {vertex.key for vertex in graph.vertices}
@@ -38,7 +37,7 @@ def test_a_large_graph_fills_the_page(view: View, page: Size) -> None:
 
 def test_the_parts_of_a_large_graph_are_in_rows_in_their_natural_order() -> None:
     graph = fleet_graph(100, View.NODES)
-    layout = arrange_for_pages(graph, sizes(graph), BOTH).on(PAGES[0])
+    layout = arrange_for_pages(graph, BOTH)(PAGES[0])
     outer = [frame for frame in layout.frames if not frame.cluster.parent]
     reading = sorted(outer, key=lambda frame: (round(frame.place.top), frame.place.left))
     assert [frame.cluster.label for frame in reading][8:11] == ["/area9", "/area10", "/area11"]
@@ -57,7 +56,7 @@ def test_the_parts_of_a_large_graph_are_in_rows_in_their_natural_order() -> None
 def test_a_small_graph_has_the_direction_in_which_it_is_larger() -> None:
     names = "abcdefgh"
     graph = graph_of(dict.fromkeys(names, ""), list(pairwise(names)))
-    arranged = arrange_for_pages(graph, sizes(graph), BOTH)
-    wide, narrow = (arranged.on(page).size for page in (PAGES[0], PAGES[2]))
+    layout_on = arrange_for_pages(graph, BOTH)
+    wide, narrow = (layout_on(page).size for page in (PAGES[0], PAGES[2]))
     assert wide.width > wide.height
     assert narrow.width < narrow.height

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Edge, Graph, Vertex, VertexKind
-from composer.graph.layout import Size, Sizes
+from composer.graph.layout.result import Size
 
 FONT_SIZE = 12.0
 SMALL = 10.0
@@ -23,7 +24,26 @@ _ROW_GAP = 16.0
 _SLANTED = (VertexKind.SERVICE, VertexKind.TOPIC, VertexKind.FRAME)
 
 
-def sizes(graph: Graph) -> Sizes:
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Sizes of vertices and clusters by key, and of edge labels by the key of the edge.
+
+    ``frames`` are the sizes of cluster labels, ``blocks`` the sizes of whole blocks, and ``rows``
+    the offsets of vertices from the middle of their block.
+    """
+
+    vertices: Mapping[str, Size]
+    labels: Mapping[str, Size]
+    frames: Mapping[str, Size]
+    blocks: Mapping[str, Size]
+    rows: Mapping[str, float]
+
+    def of_box(self, key: str) -> Size:
+        """Return the size of a block, or of a vertex outside blocks."""
+        return self.blocks.get(key) or self.vertices[key]
+
+
+def measure(graph: Graph) -> Sizes:
     """Return the sizes that the texts of a graph need."""
     blocks = dict(_blocks(graph))
     return Sizes(

@@ -1,4 +1,4 @@
-"""Assign coordinates across: move boxes and groups towards their neighbors.
+"""Assign coordinates: across, by moving boxes and groups towards their neighbors; along, by ranks.
 
 The order stays as it is, and so does every frame: nothing that did not overlap does so after.
 """
@@ -12,7 +12,7 @@ from itertools import groupby
 from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
-from composer.graph.layout.steps.boxes import Box, Group, Item, space_between
+from composer.graph.layout.boxes import Box, Group, Item, space_between
 
 #: Sweeps propagate positions over all ranks; rounds balance pulls from both sides.
 _SWEEPS = 4
@@ -21,7 +21,8 @@ _ROUNDS = 24
 _STILL = 0.5
 #: Bends have a higher weight than vertices, to keep long edges straight.
 _BEND_WEIGHT = 4.0
-
+#: The space between ranks.
+_RANK_GAP = 22.0
 
 #: A box of an item, the neighbor to align it with, the offset of the box from the neighbor for a
 #: straight edge, and the weight.
@@ -150,3 +151,59 @@ def _room_below(room: _Room, root: Group) -> float:
     for other, space in room.below:
         found = min(found, other.low - high - space)
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """An interval along the arrows."""
+
+    begin: float
+    end: float
+
+    @property
+    def middle(self) -> float:
+        """The point halfway."""
+        return (self.begin + self.end) / 2
+
+
+def rank_extents(root: Group) -> list[Extent]:
+    """Return the extent of each rank, with space for frames that begin or end there."""
+    widths = [0.0] * (root.last_rank + 1)
+    for box in root.boxes():
+        widths[box.rank] = max(widths[box.rank], box.along)
+    for group in root.groups():
+        if group.first_rank == group.last_rank:
+            needed = group.least_along - 2 * group.padding
+            widths[group.first_rank] = max(widths[group.first_rank], needed)
+    extents = []
+    start = 0.0
+    for rank, width in enumerate(widths):
+        begin = start + _space_for_frames(root, rank, before=True)
+        extents.append(Extent(begin, begin + width))
+        start = begin + width + _space_for_frames(root, rank, before=False) + _RANK_GAP
+    return extents
+
+
+def extent_of(item: Item, ranks: list[Extent]) -> Extent:
+    """Return the extent of a box, without the tail for its loops, or of a frame."""
+    if isinstance(item, Box):
+        middle = ranks[item.rank].middle
+        return Extent(middle - item.along / 2, middle + item.along / 2 - item.tail)
+    inside = [extent_of(child, ranks) for child in item.children]
+    tails = [child.tail if isinstance(child, Box) else 0.0 for child in item.children]
+    begin = min(extent.begin for extent in inside) - item.padding - item.label_along
+    end = max(extent.end + tail for extent, tail in zip(inside, tails, strict=True)) + item.padding
+    missing = max(0.0, item.least_along - (end - begin))
+    return Extent(begin - missing / 2, end + missing / 2)
+
+
+def _space_for_frames(group: Group, rank: int, *, before: bool) -> float:
+    """Return the space before or behind a rank for the group and the frames in it."""
+    if before:
+        own = group.padding + group.label_along if group.first_rank == rank else 0.0
+    else:
+        own = group.padding if group.last_rank == rank else 0.0
+    nested = [child for child in group.inner() if child.first_rank <= rank <= child.last_rank]
+    return own + max(
+        (_space_for_frames(child, rank, before=before) for child in nested), default=0.0
+    )

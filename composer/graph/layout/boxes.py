@@ -19,6 +19,9 @@ BEND_GAP = 8.0
 #: Space between a frame and its contents, and for its label.
 FRAME_PADDING = 14.0
 FRAME_LABEL = 20.0
+#: How far a self-loop reaches out of its box, and the space before its label.
+LOOP_BOW = 30.0
+LOOP_LABEL_GAP = 4.0
 
 
 @dataclass(slots=True, eq=False)

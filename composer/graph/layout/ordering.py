@@ -1,0 +1,276 @@
+"""Order the boxes on the ranks with the barycenter method.
+
+Sweeps over the ranks in both directions move every box to the mean position of its neighbors;
+groups move as a whole. The order with the fewest crossings is kept and improved by transposing
+neighbors.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right, insort
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from composer.graph.layout.boxes import Box, Group, Item, Link, space_between
+
+_SWEEPS = 12
+_MAX_SWEEPS_WITHOUT_GAIN = 4
+_ROUNDS = 8
+
+#: The cost of an order: crossings, then the total length of edges across in pixels.
+_Cost = tuple[int, float]
+#: The segments that leave an item: rank, target rank, and the positions of both ends.
+_Pieces = dict[tuple[int, int], list[tuple[float, float]]]
+#: The children of every group.
+_Order = list[tuple[Group, list[Item]]]
+
+
+def order_boxes(root: Group) -> None:
+    """Sort the children of all groups for few crossings, and give every box a position."""
+    by_rank = _by_rank(root)
+    found = [_swept(root, by_rank, start) for start in (_as_declared, _as_reached)]
+    best = min(found, key=lambda one: one[0])
+    _restore(best[1])
+    _transpose(root, best)
+    _pack(root)
+
+
+def _swept(
+    root: Group, by_rank: list[list[Box]], start: Callable[[Group], None]
+) -> tuple[_Cost, _Order]:
+    """Return the best order found by sweeps from a start; stop without improvement."""
+    order = _children(root)
+    start(root)
+    _pack(root)
+    best = (_cost(root), _children(root))
+    without_gain = 0
+    for sweep in range(_SWEEPS):
+        _sweep(by_rank, backwards=bool(sweep % 2))
+        _sort(root)
+        _pack(root)
+        reached = _cost(root)
+        without_gain += 1
+        if reached < best[0]:
+            best = (reached, _children(root))
+            without_gain = 0
+        if without_gain == _MAX_SWEEPS_WITHOUT_GAIN:
+            break
+    _restore(order)
+    return best
+
+
+def _transpose(root: Group, best: tuple[_Cost, _Order]) -> None:
+    for _ in range(_ROUNDS):
+        _pack(root)
+        if not _transpose_once(root):
+            break
+        _pack(root)
+        reached = _cost(root)
+        if reached < best[0]:
+            best = (reached, _children(root))
+    _restore(best[1])
+
+
+def _by_rank(root: Group) -> list[list[Box]]:
+    ranks: list[list[Box]] = [[] for _ in range(root.last_rank + 1)]
+    for box in root.boxes():
+        ranks[box.rank].append(box)
+    return ranks
+
+
+def _children(group: Group) -> _Order:
+    found: _Order = [(group, list(group.children))]
+    for child in group.inner():
+        found += _children(child)
+    return found
+
+
+def _restore(order: _Order) -> None:
+    for group, children in order:
+        group.children = list(children)
+
+
+def _as_declared(root: Group) -> None:
+    """Keep the declared order."""
+
+
+def _as_reached(root: Group) -> None:
+    """Sort in breadth-first order, which keeps related boxes together."""
+    number: dict[int, int] = {}
+    for start in sorted(root.boxes(), key=lambda box: box.rank):
+        waiting = deque([start])
+        while waiting:
+            box = waiting.popleft()
+            if id(box) in number:
+                continue
+            number[id(box)] = len(number)
+            waiting.extend(piece.high for piece in box.after)
+            waiting.extend(piece.low for piece in box.before)
+    for box in root.boxes():
+        box.position = float(number[id(box)])
+    _sort(root)
+
+
+def _sweep(by_rank: list[list[Box]], *, backwards: bool) -> None:
+    """Move every box to the mean position of its neighbors on the previous (or next) rank."""
+    for rank in reversed(by_rank) if backwards else by_rank:
+        for box in rank:
+            places = _behind(box.after) if backwards else _before(box.before)
+            if places:
+                box.position = sum(places) / len(places)
+        rank.sort(key=lambda box: box.position)
+        _push_apart(rank)
+
+
+def _before(pieces: list[Link]) -> list[float]:
+    return [piece.low.position + piece.low_offset - piece.high_offset for piece in pieces]
+
+
+def _behind(pieces: list[Link]) -> list[float]:
+    return [piece.high.position + piece.high_offset - piece.low_offset for piece in pieces]
+
+
+def _push_apart(rank: list[Box]) -> None:
+    """Remove overlaps on a rank, keeping its order and its middle."""
+    if len(rank) < 2:
+        return
+    middle = sum(box.position for box in rank) / len(rank)
+    end = None
+    for box in rank:
+        least = box.position if end is None else end + box.gap + box.across / 2
+        box.position = max(box.position, least)
+        end = box.high
+    drift = sum(box.position for box in rank) / len(rank) - middle
+    for box in rank:
+        box.position -= drift
+
+
+def _sort(group: Group) -> float:
+    """Sort all children by position, groups by their mean; return the mean of the group."""
+    positions = {
+        id(child): _sort(child) if isinstance(child, Group) else child.position
+        for child in group.children
+    }
+    group.children.sort(key=lambda child: positions[id(child)])
+    return sum(positions.values()) / len(positions)
+
+
+def _pack(group: Group, start: float = 0.0) -> None:
+    """Place the children in order, as close to ``start`` as possible."""
+    group.low = start
+    inside = start + group.padding + group.label
+    last: dict[int, Item] = {}
+    for child in group.children:
+        if isinstance(child, Box):  # as below, for the most frequent case
+            nearest = last.get(child.rank)
+            low = inside if nearest is None else nearest.high + space_between(nearest, child)
+            child.position = low + child.across / 2
+            last[child.rank] = child
+            continue
+        covered = range(child.first_rank, child.last_rank + 1)
+        above = [last[rank] for rank in covered if rank in last]
+        low = max((item.high + space_between(item, child) for item in above), default=inside)
+        _pack(child, low)
+        last.update(dict.fromkeys(covered, child))
+    high = max(child.high for child in group.children) + group.padding
+    group.high = max(high, group.low + group.least)
+
+
+def _cost(root: Group) -> _Cost:
+    """Return the number of crossings between ranks, and the length of edges across."""
+    by_rank: dict[int, list[tuple[float, float]]] = {}
+    for box in root.boxes():
+        for piece in box.after:
+            ends = (box.position + piece.low_offset, piece.high.position + piece.high_offset)
+            by_rank.setdefault(box.rank, []).append(ends)
+    length = sum(abs(begin - end) for lines in by_rank.values() for begin, end in lines)
+    return sum(map(_inversions, by_rank.values())), round(length, 3)
+
+
+def _inversions(lines: Sequence[tuple[float, float]]) -> int:
+    if len(lines) == 1:
+        return 0
+    count = 0
+    seen: list[float] = []
+    for _, end in sorted(lines):
+        count += len(seen) - bisect_right(seen, end)
+        insort(seen, end)
+    return count
+
+
+def _transpose_once(root: Group) -> bool:
+    """Transpose neighbors in all groups once where that helps; return whether any were.
+
+    Positions are read to know the order on each rank. Only the order of the children is to be
+    used after: positions are those of the new order as far as it goes without packing.
+    """
+    changed = [_pass_over(group) for group in [root, *root.groups()]]
+    return any(changed)
+
+
+def _pass_over(group: Group) -> bool:
+    changed = False
+    index = 0
+    while index < len(group.children) - 1:
+        other = _next_in_the_way(group.children, index)
+        if other is not None and _gain(group.children[index], group.children[other]) > 0:
+            _exchange(group.children, index, other)
+            changed = True
+        index += 1
+    return changed
+
+
+def _next_in_the_way(children: list[Item], index: int) -> int | None:
+    """Return the next child that shares a rank with the child at ``index``."""
+    item = children[index]
+    for other in range(index + 1, len(children)):
+        following = children[other]
+        if item.first_rank <= following.last_rank and following.first_rank <= item.last_rank:
+            return other
+    return None
+
+
+def _exchange(children: list[Item], index: int, other: int) -> None:
+    """Move the child at ``index`` after the one at ``other``; none in between shares a rank."""
+    first, second = children[index], children[other]
+    forward, backward = second.high - first.high, first.low - second.low
+    first.shift(forward)
+    second.shift(backward)
+    children.insert(other, children.pop(index))
+
+
+def _gain(first: Item, second: Item) -> int:
+    """Return the number of crossings saved by putting the second before the first."""
+    theirs = _pieces(second)
+    gain = 0
+    for key, lines in _pieces(first).items():
+        for begin, end in lines:
+            for other_begin, other_end in theirs.get(key, ()):
+                gain += _sign((begin - other_begin) * (end - other_end))
+    return -gain
+
+
+def _sign(value: float) -> int:
+    return (value > 0.0) - (value < 0.0)
+
+
+def _pieces(item: Item) -> _Pieces:
+    own = set(map(id, item.boxes()))
+    found: _Pieces = {}
+    for box in item.boxes():
+        for begin, other, end in _around(box):
+            if id(other) not in own:
+                found.setdefault((box.rank, other.rank), []).append((begin, end))
+    return found
+
+
+def _around(box: Box) -> list[tuple[float, Box, float]]:
+    leaving = [
+        (box.position + piece.low_offset, piece.high, piece.high.position + piece.high_offset)
+        for piece in box.after
+    ]
+    arriving = [
+        (box.position + piece.high_offset, piece.low, piece.low.position + piece.low_offset)
+        for piece in box.before
+    ]
+    return leaving + arriving

@@ -1,1 +1,0 @@
-"""The steps of the layout, on boxes in nested groups: from ranks to the curves of edges."""
