@@ -8,10 +8,9 @@ from functools import partial
 
 from composer.fast_dataclass import dataclass
 from composer.model import PortKind
-from composer.python_code.nodes.class_interfaces import calls_on_self, passes_node_on
-from composer.python_code.nodes.classes import ClassOfNode
-from composer.python_code.source.scopes import NotLiteral, Scope
-from composer.python_code.source.trees import argument, dotted, span_of, walk
+from composer.python_code.nodes import ClassOfNode, calls_on_self, passes_node_on
+from composer.python_code.scopes import NotLiteral, Scope
+from composer.python_code.trees import argument, dotted, span_of, walk
 from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 from composer.source import Span
 

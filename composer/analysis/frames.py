@@ -21,8 +21,10 @@ from composer.model import (
     PortKind,
     StaticTransform,
 )
-from composer.python_code.source import BehaviorSource, Scope, scopes_in
-from composer.python_code.source.trees import argument, dotted, span_of
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.scopes import Scope
+from composer.python_code.syntax import scopes_in
+from composer.python_code.trees import argument, dotted, span_of
 from composer.source import Located, Span
 from composer.spelling import vocabulary
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from composer.analysis.context import Context
-from composer.python_code.nodes.behaviors import use_of
-from composer.python_code.nodes.classes import ClassOfNode, NodeClass, node_classes
+from composer.python_code.nodes import ClassOfNode, NodeClass, node_classes, use_of
 
 
 def behaviors(context: Context) -> tuple[NodeClass, ...]:

@@ -20,13 +20,15 @@ from composer.model import (
     Reaction,
     Timer,
 )
-from composer.python_code.nodes.behaviors import (
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import (
     GENERAL_HANDLERS,
     called_methods,
     handlers,
+    published_port,
     reached_methods,
 )
-from composer.python_code.source import BehaviorSource, Call, published_port
+from composer.python_code.scopes import Call
 
 _ENTRIES = ("on_", "accept_")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from composer.hosts.inventory import Question
 from composer.model import BehaviorReference, Executable, System
 from composer.project import SETTINGS_FILE, Project
-from composer.python_code.source import find_behavior
+from composer.python_code.lookup import find_behavior
 from composer.source import SourceFile
 
 _LONGEST_NAME = 256  # of a file, for Linux

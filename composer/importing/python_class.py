@@ -16,13 +16,10 @@ from composer.importing.branches import conditions_of_calls, negated
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.model import BehaviorReference, PortKind
 from composer.project import Project
-from composer.python_code.source import (
-    BehaviorSource,
-    find_behavior,
-    nearby_modules,
-)
-from composer.python_code.source.scopes import NotLiteral, Scope
-from composer.python_code.source.syntax import Method, scopes_in
+from composer.python_code.lookup import BehaviorSource, find_behavior
+from composer.python_code.modules import nearby_modules
+from composer.python_code.scopes import NotLiteral, Scope
+from composer.python_code.syntax import Method, scopes_in
 from composer.resolve.declarations.parameters import rclpy_type
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Plain

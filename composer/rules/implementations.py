@@ -10,7 +10,7 @@ from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, error, warning
 from composer.model import ImplementationKind, Isolation, Node, Port, PortKind, System
-from composer.python_code.nodes.behaviors import handlers
+from composer.python_code.nodes import handlers
 from composer.source import Span
 
 IDLE_PORT = warning("RC438", "idle-port")

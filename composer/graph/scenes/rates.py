@@ -6,7 +6,9 @@ import ast
 from collections.abc import Iterator, Mapping
 
 from composer.model import Node, PortKind, Timer
-from composer.python_code.source import Method, find_behavior, published_port
+from composer.python_code.lookup import find_behavior
+from composer.python_code.nodes import published_port
+from composer.python_code.syntax import Method
 
 #: Statements that may leave a method early.
 _EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)

@@ -16,8 +16,8 @@ from composer.model import Node
 from composer.python_code.checker.findings import SYNTAX_KINDS, problems_of
 from composer.python_code.checker.project import CheckedFile, FileSet, file_sets
 from composer.python_code.checker.pyrefly import Check, CheckerFailed, start_check
+from composer.python_code.lookup import BehaviorSource
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource
 from composer.source import Span
 
 __all__ = ["RunningCheck", "start"]

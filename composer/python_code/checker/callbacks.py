@@ -6,9 +6,10 @@ import ast
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 
-from composer.python_code.source import Function, Module, imported_from
-from composer.python_code.source.trees import argument, called_name, dotted, is_none, last_name
+from composer.python_code.lookup import imported_from
 from composer.python_code.stubs.behaviors import Signature
+from composer.python_code.syntax import Module
+from composer.python_code.trees import Function, argument, called_name, dotted, is_none, last_name
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
 _SENT_GOAL = "rclpy.action.client.ClientGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"

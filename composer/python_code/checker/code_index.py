@@ -6,8 +6,8 @@ import ast
 from collections import defaultdict
 from collections.abc import Iterator
 
-from composer.python_code.source import Function, Module
-from composer.python_code.source.trees import catches, dotted, positional_arguments, span_of
+from composer.python_code.syntax import Module
+from composer.python_code.trees import Function, catches, dotted, positional_arguments, span_of
 from composer.source import Span
 
 #: What code raises that uses a value of a wrong type.

@@ -14,10 +14,10 @@ from typing import TypeGuard
 
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.callbacks import callback_signatures
-from composer.python_code.source import Function, Module
-from composer.python_code.source.trees import characters, dotted, is_none, positional_arguments
 from composer.python_code.stubs.behaviors import Signature
 from composer.python_code.stubs.messages import interface_modules
+from composer.python_code.syntax import Module
+from composer.python_code.trees import Function, characters, dotted, is_none, positional_arguments
 
 #: The line that a copy gets, so that annotations can name what they need.
 _IMPORTS = (

@@ -21,11 +21,11 @@ from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.project import CheckedFile
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.checker.relevance import Relevance, reassigned, unguarded_value
-from composer.python_code.nodes.behaviors import API_CLASSES
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource, Function
-from composer.python_code.source.trees import dotted, is_none, name_span, span_of
 from composer.python_code.stubs.folder import LIBRARIES
+from composer.python_code.trees import Function, dotted, is_none, name_span, span_of
 from composer.source import Span
 
 #: What the checker says about code that Python refuses to compile.

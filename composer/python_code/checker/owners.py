@@ -13,10 +13,10 @@ from composer.interfaces import Interfaces, Message
 from composer.interfaces.definitions import parts
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
-from composer.python_code.nodes.behaviors import API_CLASSES
+from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family
-from composer.python_code.source import Module
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES, member_class_name
+from composer.python_code.syntax import Module
 
 #: Names of ROS 1, with what ROS 2 has instead.
 _ROS_1_NAMES = {"nsec": "nanosec", "nsecs": "nanosec", "secs": "sec"}

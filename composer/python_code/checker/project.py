@@ -16,8 +16,7 @@ from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node, PortKind
 from composer.python_code.checker.copies import ClassEdit, Copy, edited_copy
-from composer.python_code.source import BehaviorSource, Module
-from composer.python_code.source.lookup import BrokenModule
+from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.stubs.behaviors import (
     behavior_class_name,
     behavior_module,
@@ -26,6 +25,7 @@ from composer.python_code.stubs.behaviors import (
 )
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
+from composer.python_code.syntax import Module
 from composer.typed import SUFFIX
 
 _FILES = "files"

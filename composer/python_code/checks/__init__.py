@@ -16,8 +16,8 @@ from composer.python_code.checks.methods import (
 )
 from composer.python_code.checks.node_classes import node_class_problems
 from composer.python_code.checks.scopes import Code
+from composer.python_code.lookup import BehaviorSource
 from composer.python_code.problems import Problem
-from composer.python_code.source import BehaviorSource
 
 __all__ = ["code_problems"]
 

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from composer.diagnostics import suggestion
 from composer.field_types import STATUS, Word
 from composer.python_code.checks.scopes import Code, NodeScope
-from composer.python_code.nodes.behaviors import reached_methods
+from composer.python_code.nodes import published_port, reached_methods
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import Method, published_port
-from composer.python_code.source.trees import SCOPES, argument, dotted, span_of, walk
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
+from composer.python_code.syntax import Method
+from composer.python_code.trees import SCOPES, argument, dotted, span_of, walk
 
 #: The attributes that the composer sets after the constructor.
 _SET_LATER = frozenset(

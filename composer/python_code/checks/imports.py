@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import ast
-import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from functools import cache
-from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,18 +13,19 @@ from composer.diagnostics import suggestion
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.project import Project
-from composer.python_code.nodes.behaviors import API_CLASSES
-from composer.python_code.problems import Family, Problem
-from composer.python_code.source import Module
-from composer.python_code.source.modules import (
+from composer.python_code.modules import (
+    COMPILED,
     Unreadable,
+    files_and_folders,
     is_installed,
     local_module_file,
     module_file,
     relative_module_file,
 )
-from composer.python_code.source.syntax import defined_names, read_module
-from composer.python_code.source.trees import dotted, start_span, walk
+from composer.python_code.nodes import API_CLASSES
+from composer.python_code.problems import Family, Problem
+from composer.python_code.syntax import Module, defined_names, read_module
+from composer.python_code.trees import dotted, start_span, walk
 from composer.source import shown_path
 from composer.spelling import edit_distance
 
@@ -43,9 +41,6 @@ _USUAL = frozenset(
 _AT_RUN_TIME = frozenset(
     {"sys.path", "importlib.import_module", "importlib.util", "site.addsitedir", "__import__"}
 )
-#: With files of these types, a package may have modules that are compiled when it is built.
-_COMPILED = frozenset({".c", ".cpp", ".pyx", ".pyd", ".so"})
-_MAXIMUM_FILES = 2000  # in a folder
 _LONG_NAME = 8  # letters, of which two may be wrong
 _SHORTEST_TYPO = 4
 
@@ -194,8 +189,8 @@ class _Imports:
                 return None if own.dynamic else _Contents(defined, is_closed=True)
         elif name:
             return None
-        listed = [name for folder in folders for name in _modules_in(folder)]
-        if module and any(Path(name).suffix in _COMPILED for name in listed):
+        listed = [name for folder in folders for name in files_and_folders(folder)]
+        if module and any(Path(name).suffix in COMPILED for name in listed):
             return None
         return _Contents(defined.union(Path(name).stem for name in listed), is_closed=False)
 
@@ -248,16 +243,6 @@ def _missing(message: str, name: str, known: Iterable[str], where: str = "") -> 
         if is_public and other[:2] == name[:2] and edit_distance(name, other) == 1:
             hint = f"did you mean '{other}'?"
     return _Missing(f"{message}{where}", hint, Family.NOT_INSTALLED)
-
-
-def _modules_in(folder: Path) -> list[str]:
-    """Return the names of the files and folders in a folder that may be modules."""
-    kinds = (".py", *_COMPILED)
-    with suppress(OSError), os.scandir(folder) as items:
-        return [
-            x.name for x in islice(items, _MAXIMUM_FILES) if x.name.endswith(kinds) or x.is_dir()
-        ]
-    return []
 
 
 def _has_file(name: str) -> bool:

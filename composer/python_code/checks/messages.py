@@ -10,7 +10,7 @@ from composer.field_types import constant_problem, enumerator_problem, enumerato
 from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
 from composer.python_code.checks.scopes import NodeScope
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source.trees import dotted, span_of
+from composer.python_code.trees import dotted, span_of
 
 
 def message_problems(scope: NodeScope) -> Iterator[Problem]:

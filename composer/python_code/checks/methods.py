@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import Function, Method
-from composer.python_code.source.trees import (
+from composer.python_code.syntax import Method
+from composer.python_code.trees import (
     SCOPES,
+    Function,
     called_name,
     dotted,
     is_empty,

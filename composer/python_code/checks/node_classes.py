@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 
 from composer.diagnostics import nearest
 from composer.python_code.checks.scopes import Code, NodeScope
-from composer.python_code.nodes.class_interfaces import (
+from composer.python_code.lookup import imported_from, is_of_rclpy
+from composer.python_code.nodes import (
     UNDECLARED,
     declared_parameters,
     passes_node_on,
 )
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source.lookup import imported_from, is_of_rclpy
-from composer.python_code.source.trees import catches, dotted, span_of, walk
+from composer.python_code.trees import catches, dotted, span_of, walk
 
 #: The parameters that every node has.
 _DECLARED = frozenset({"use_sim_time", "start_type_description_service"})

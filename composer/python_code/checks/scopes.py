@@ -18,11 +18,12 @@ from composer.interfaces import Field, FieldType, Interfaces, Message, parts
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures
+from composer.python_code.lookup import BehaviorSource
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource, Function, Method
-from composer.python_code.source.scopes import Scope
-from composer.python_code.source.trees import bindings, positional_arguments, span_of
+from composer.python_code.scopes import Scope
 from composer.python_code.stubs.behaviors import signatures
+from composer.python_code.syntax import Method
+from composer.python_code.trees import Function, bindings, positional_arguments, span_of
 
 #: Maximum number of names and fields to follow.
 _MAXIMUM_STEPS = 16

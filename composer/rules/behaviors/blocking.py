@@ -11,13 +11,15 @@ from composer.analysis.context import Context
 from composer.analysis.python_nodes import behaviors, distinct_behaviors
 from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import Node
-from composer.python_code.nodes.behaviors import (
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import (
     GENERAL_HANDLERS,
     handlers,
     reached_methods,
 )
-from composer.python_code.source import BehaviorSource, Call, Function, Method
-from composer.python_code.source.trees import SCOPES, called_name, is_empty, start_span, walk
+from composer.python_code.scopes import Call
+from composer.python_code.syntax import Method
+from composer.python_code.trees import SCOPES, Function, called_name, is_empty, start_span, walk
 from composer.rules.python.definitions import on_tick
 from composer.source import Span
 

@@ -9,14 +9,15 @@ from composer.analysis.formatting import a
 from composer.analysis.python_nodes import behaviors, distinct_behaviors
 from composer.diagnostics import Diagnostic, Label, error, nearest, suggestion
 from composer.model import Node, PortKind
-from composer.python_code.nodes.behaviors import (
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import (
     GENERAL_HANDLERS,
     Handler,
     handlers,
     unbound_handlers,
 )
-from composer.python_code.source import BehaviorSource, Method, scopes_in
-from composer.python_code.source.trees import positional_arguments, span_of
+from composer.python_code.syntax import Method, scopes_in
+from composer.python_code.trees import positional_arguments, span_of
 from composer.rules.python.definitions import on_tick
 from composer.rules.python.uses_of_nodes import HANDLER_ANNOTATION
 

@@ -9,8 +9,7 @@ from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, error, info, nearest, warning
 from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
-from composer.python_code.nodes.class_interfaces import declared_parameters, passes_node_on
-from composer.python_code.nodes.classes import ClassOfNode
+from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
 from composer.qos import incompatibilities
 from composer.rules.python.definitions import as_warning, rclpy_class
 from composer.spelling import is_typo

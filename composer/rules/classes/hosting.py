@@ -10,9 +10,9 @@ from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, error, warning
 from composer.model import ExecutorKind, Node, System
 from composer.model.dependencies import dependency_edges
-from composer.python_code.nodes.classes import ClassOfNode
-from composer.python_code.source import Call
-from composer.python_code.source.trees import SCOPES, is_none, span_of, walk
+from composer.python_code.nodes import ClassOfNode
+from composer.python_code.scopes import Call
+from composer.python_code.trees import SCOPES, is_none, span_of, walk
 from composer.rules.python.definitions import as_warning, rclpy_class
 
 _IMPORT = "import rclpy\n"

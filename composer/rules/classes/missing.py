@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
 from composer.diagnostics import Diagnostic, Label, error, info, suggestion
-from composer.python_code.nodes.classes import ClassOfNode
-from composer.python_code.source import Method
+from composer.python_code.nodes import ClassOfNode
+from composer.python_code.syntax import Method
 from composer.rules.python.definitions import rclpy_class
 from composer.rules.python.missing import missing, unnamed
 

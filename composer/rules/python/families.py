@@ -13,9 +13,10 @@ from composer.diagnostics import Diagnostic, Label, Rule, Severity
 from composer.model import Node
 from composer.python_code.checks import code_problems
 from composer.python_code.checks.imports import import_problems
+from composer.python_code.lookup import BehaviorSource
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource, Module
-from composer.python_code.source.trees import start_span, walk
+from composer.python_code.syntax import Module
+from composer.python_code.trees import start_span, walk
 from composer.rules.behaviors import blocking, handlers
 from composer.rules.expressions import INDEX_OUT_OF_RANGE
 from composer.rules.fields import INVALID_VALUE, UNKNOWN_FIELD

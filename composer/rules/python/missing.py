@@ -9,7 +9,8 @@ from composer.analysis.spans import class_name_hint, part_of
 from composer.diagnostics import Diagnostic, Rule, suggestion
 from composer.model import BehaviorReference
 from composer.project import Project
-from composer.python_code.source import BehaviorSource, nearby_modules
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.modules import nearby_modules
 
 
 def unnamed(reference: BehaviorReference, what: str, rule: Rule) -> Iterator[Diagnostic]:
@@ -39,7 +40,6 @@ def missing(
         )
         if nearby.package:
             message = f"package '{nearby.package}' has no module '{nearby.missing}'"
-            hint = suggestion(nearby.missing, nearby.names) or hint
         rule = module_rule if nearby.is_misspelled else not_installed
         if rule is not module_rule:
             message = (

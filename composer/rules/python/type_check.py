@@ -17,9 +17,9 @@ from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checker import RunningCheck, start
-from composer.python_code.nodes.behaviors import use_of
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import use_of
 from composer.python_code.problems import Family, Problem
-from composer.python_code.source import BehaviorSource
 from composer.rules.python.families import diagnostic, sources
 from composer.source import Span
 

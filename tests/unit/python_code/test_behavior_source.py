@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.model import BehaviorReference
-from composer.python_code.source import BehaviorSource, find_behavior
+from composer.python_code.lookup import BehaviorSource, find_behavior
 from composer.source import Located, SourceFile, Span
 
 

@@ -10,7 +10,7 @@ import pytest
 from composer.interfaces import Interfaces
 from composer.python_code.checks.imports import import_problems
 from composer.python_code.problems import Family
-from composer.python_code.source.syntax import read_module
+from composer.python_code.syntax import read_module
 
 
 @cache

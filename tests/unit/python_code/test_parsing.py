@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from composer.python_code.source.modules import Unreadable
-from composer.python_code.source.syntax import parse
+from composer.python_code.modules import Unreadable
+from composer.python_code.syntax import parse
 from composer.source import SourceFile
 
 REFUSED = {

@@ -11,7 +11,7 @@ import pytest
 from composer.analysis import rates as publications
 from composer.graph.scenes import rates
 from composer.model import BehaviorReference
-from composer.python_code.source import find_behavior
+from composer.python_code.lookup import find_behavior
 from composer.source import Located, SourceFile, Span
 from tests.unit.support.resolving import system_of
 

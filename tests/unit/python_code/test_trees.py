@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.python_code.source.trees import walk
+from composer.python_code.trees import walk
 
 PATTERNS = """
 match value:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.python_code.source import Function
+from composer.python_code.trees import Function
 from composer.rules.behaviors.blocking import endless_loops
 from tests.unit.support.checking import diagnostics_in
 

@@ -11,8 +11,8 @@ from composer.interfaces import Interfaces
 from composer.loading import load_bytes
 from composer.model import BehaviorReference, Node
 from composer.python_code.checks import code_problems
+from composer.python_code.lookup import find_behavior
 from composer.python_code.problems import Problem
-from composer.python_code.source import find_behavior
 from composer.source import Located
 
 SYSTEM = """

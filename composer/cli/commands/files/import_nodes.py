@@ -170,7 +170,7 @@ def import_class(
 def _is_found(reference: str, output: Path) -> bool:
     """Return whether a node type in the file ``output`` finds the module of a class."""
     from composer.model import BehaviorReference
-    from composer.python_code.source import find_behavior
+    from composer.python_code.lookup import find_behavior
     from composer.source import Located, SourceFile, Span
 
     span = Span(SourceFile("", reference), 1, 1)

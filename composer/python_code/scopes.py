@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TypeVar
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces.sources import FOLDERS
-from composer.python_code.source.trees import (
+from composer.python_code.trees import (
     SCOPES,
     Function,
     bindings,
@@ -29,7 +28,6 @@ T = TypeVar("T")
 _MAXIMUM_STEPS = 8
 _MAXIMUM_ITEMS = 1000
 _MAXIMUM_BITS = 128
-_PUBLISH = re.compile(r"self\.publishers\.(\w+)\.publish")
 
 
 class NotLiteral(Exception):
@@ -180,9 +178,3 @@ class Scope:
                 return node
             node = assigned
         raise NotLiteral(start)
-
-
-def published_port(name: str) -> str | None:
-    """Return ``x`` for ``self.publishers.x.publish``."""
-    match = _PUBLISH.fullmatch(name)
-    return match[1] if match else None

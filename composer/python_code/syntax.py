@@ -10,9 +10,9 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.source.modules import Unreadable, read_text
-from composer.python_code.source.scopes import Call, Scope
-from composer.python_code.source.trees import (
+from composer.python_code.modules import Unreadable, read_text
+from composer.python_code.scopes import Call, Scope
+from composer.python_code.trees import (
     SCOPES,
     Function,
     Import,

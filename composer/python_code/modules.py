@@ -1,20 +1,29 @@
-"""Finds and reads the file of a Python module, without importing it or its parents."""
+"""Finds and reads the files of Python modules, without importing them or their parents."""
 
 from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
 import io
+import os
 import stat
+import sys
 import tokenize
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 
+from composer.fast_dataclass import dataclass
 from composer.ownership import TrustedUsers
 from composer.project import Project
 from composer.source import Span
+from composer.spelling import Vocabulary
 
 MAXIMUM_BYTES = 250_000
+#: Files of these types in a package may be modules that are compiled when it is built.
+COMPILED = frozenset({".c", ".cpp", ".pyx", ".pyd", ".so"})
+_MAXIMUM_FILES = 2000  # in a folder
 
 #: Other codecs of Python may take quadratic time, or do not encode text.
 _ENCODINGS = frozenset({"utf-8", "utf-8-sig", "ascii", "us-ascii", "iso-8859-1", "iso-8859-15"})
@@ -147,3 +156,64 @@ def module_spec(name: str) -> importlib.machinery.ModuleSpec | None:
         return importlib.util.find_spec(name)
     except Exception:  # import hooks of installed packages may raise anything
         return None
+
+
+@dataclass(frozen=True, slots=True)
+class NearbyModules:
+    """The modules next to one that does not exist.
+
+    ``package`` is the longest part of its name that is a package, ``missing`` the part that
+    follows. ``similar`` are modules that may be meant. ``is_misspelled``: the module is not just
+    not installed. A file of the project has a name without dots, unlike most modules of packages.
+    """
+
+    package: str
+    missing: str
+    similar: Sequence[str]
+    is_misspelled: bool
+
+    @property
+    def hint(self) -> str | None:
+        """The name that was most likely meant, as a hint."""
+        return f"did you mean '{self.similar[0]}'?" if self.similar else None
+
+
+def nearby_modules(module: str, folder: Path, project: Project) -> NearbyModules:
+    """Look for what is next to ``module``, a dotted name that no file has."""
+    parts = module.split(".")
+    bases = [*dict.fromkeys((folder, *project.node_folders))]
+    for count in range(len(parts) - 1, 0, -1):
+        folders = [*_package_folders(parts[:count], bases)]
+        if folders:
+            similar = _similar_modules(parts[count], folders)
+            return NearbyModules(".".join(parts[:count]), parts[count], similar, True)
+    similar = _similar_modules(parts[0], bases)
+    is_misspelled = bool(similar) and len(parts) == 1
+    similar = similar or _similar_modules(parts[0], map(Path, sys.path))
+    return NearbyModules("", parts[0], similar, is_misspelled)
+
+
+def files_and_folders(folder: Path) -> list[str]:
+    """Return the names of the files and folders in a folder that may be modules."""
+    kinds = (".py", *COMPILED)
+    with suppress(OSError, ValueError), os.scandir(folder) as items:
+        return [
+            x.name for x in islice(items, _MAXIMUM_FILES) if x.name.endswith(kinds) or x.is_dir()
+        ]
+    return []
+
+
+def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:
+    spec = module_spec(parts[0])
+    locations = () if spec is None else spec.submodule_search_locations or ()
+    candidates = [base.joinpath(*parts) for base in bases]
+    candidates += [Path(location, *parts[1:]) for location in locations]
+    for candidate in candidates:
+        with suppress(OSError, ValueError):
+            if candidate.is_dir():
+                yield candidate
+
+
+def _similar_modules(name: str, folders: Iterable[Path]) -> Sequence[str]:
+    names = (item.partition(".")[0] for folder in folders for item in files_and_folders(folder))
+    return Vocabulary(tuple(dict.fromkeys(filter(str.isidentifier, names)))).close(name)

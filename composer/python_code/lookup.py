@@ -13,15 +13,15 @@ from pathlib import Path
 from composer.fast_dataclass import dataclass
 from composer.model import BehaviorReference
 from composer.project import Project
-from composer.python_code.source.modules import (
+from composer.python_code.modules import (
     Unreadable,
     is_compiled,
     local_module_file,
     module_file,
     relative_module_file,
 )
-from composer.python_code.source.syntax import Class, Method, Module, read_module
-from composer.python_code.source.trees import Import
+from composer.python_code.syntax import Class, Method, Module, read_module
+from composer.python_code.trees import Import
 from composer.source import Span, shown_path
 
 _Finder = Callable[[str, Path, Project], Path | None]

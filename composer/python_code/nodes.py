@@ -1,0 +1,303 @@
+"""The nodes of a system that run Python: behaviors with their handlers, and rclpy classes."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+from composer import behavior
+from composer.diagnostics import Diagnostic, Label, Rule
+from composer.fast_dataclass import dataclass
+from composer.model import HostedClass, Node, Port, PortKind, System
+from composer.python_code.lookup import BehaviorSource, find_behavior
+from composer.python_code.scopes import Scope
+from composer.python_code.syntax import Method, scopes_in
+from composer.python_code.trees import SCOPES, argument, span_of, walk
+from composer.resolve.declarations.parameters import rclpy_type
+from composer.resolve.tree_values import is_opaque
+from composer.source import Located, Span
+
+#: A node, and the source of its behavior or class.
+NodeClass: TypeAlias = tuple[Node, BehaviorSource]
+#: The classes that behaviors may import from ``composer.behavior``.
+API_CLASSES = frozenset(
+    name
+    for name, item in vars(behavior).items()
+    if isinstance(item, type) and item.__module__ == behavior.__name__
+)
+#: Handlers that every behavior may have, with the arguments they are called with.
+GENERAL_HANDLERS: Mapping[str, tuple[str, ...]] = {
+    "on_configure": (),
+    "on_activate": (),
+    "on_deactivate": (),
+    "on_cleanup": (),
+    "on_shutdown": (),
+    "on_error": ("cause",),
+    "on_parameters": ("changes",),
+}
+
+_ARGUMENTS: Mapping[PortKind, tuple[str, ...]] = {
+    PortKind.SUBSCRIPTION: ("message",),
+    PortKind.SERVICE: ("request", "response"),
+    PortKind.ACTION_SERVER: ("goal",),
+}
+_PUBLISH = re.compile(r"self\.publishers\.(\w+)\.publish")
+_PREFIXES = ("on_", "accept_")
+#: What may leave out the code in it, or stop it.
+_CONDITIONAL = (
+    *SCOPES,
+    *(ast.If, ast.IfExp, ast.BoolOp, ast.Match, ast.Try, ast.TryStar, ast.With),
+    *(ast.For, ast.While, ast.ListComp, ast.GeneratorExp),
+)
+_DECLARING = frozenset({"declare_parameter", "declare_parameters"})
+#: With one of these, parameters exist that the class does not declare by name.
+UNDECLARED = frozenset(
+    {"allow_undeclared_parameters", "automatically_declare_parameters_from_overrides"}
+)
+#: Packages whose functions take a node and declare no parameters of the class.
+_OF_ROS = frozenset({"message_filters", "rclpy", "tf2_ros"})
+
+
+def node_classes(system: System) -> tuple[NodeClass, ...]:
+    """Return every node with a behavior or a class, and its source; each class is read once."""
+    read: dict[tuple[str, Path], BehaviorSource] = {}
+    classes = []
+    for node in system.nodes:
+        hosted = node.hosted_class if node.external is None else None
+        reference = node.behavior or (hosted.reference if hosted is not None else None)
+        if reference is None or is_opaque(reference.text.value):
+            continue
+        if not (reference.module and reference.class_name):
+            continue  # a rule reports it
+        key = (reference.text.value, reference.folder)
+        if key not in read:
+            read[key] = find_behavior(reference)
+        classes.append((node, read[key]))
+    return tuple(classes)
+
+
+@dataclass(frozen=True, slots=True)
+class Handler:
+    """A method that the behavior may define for a port or a timer.
+
+    ``needed`` is true if the port or timer has no reaction of its own.
+    """
+
+    name: str
+    of: Located[str]  # the port's or timer's name
+    kind: str  # "subscription", "timer", ...
+    arguments: tuple[str, ...]
+    needed: bool
+
+
+def use_of(node: Node, source: BehaviorSource) -> tuple[object, ...]:
+    """Return what a check of the Python code of a node depends on; equal uses are checked once."""
+    place = (source.reference.text.value, source.reference.folder)
+    if node.behavior is None:
+        return place
+    ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
+    parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
+    timers = tuple(timer.name.value for timer in node.timers)
+    return (*place, node.complete, ports, parameters, timers)
+
+
+def handlers(node: Node) -> Iterator[Handler]:
+    """Yield the handlers for the ports and timers of a node."""
+    for port in node.ports:
+        arguments = _ARGUMENTS.get(port.kind)
+        if arguments is None:
+            continue
+        yield Handler(f"on_{port.name}", port.name, port.kind.value, arguments, _is_needed(port))
+        if port.kind is PortKind.ACTION_SERVER:
+            yield Handler(f"accept_{port.name}", port.name, port.kind.value, ("request",), False)
+    for timer in node.timers:
+        needed = timer.reaction is None
+        yield Handler(f"on_{timer.name}", timer.name, "timer", (), needed)
+
+
+def _is_needed(port: Port) -> bool:
+    if port.kind is PortKind.ACTION_SERVER and (port.result or port.feedback):
+        return False
+    return not port.reactions
+
+
+def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
+    """Return the methods called ``on_...`` or ``accept_...`` that nothing calls.
+
+    One that the code itself uses, such as ``on_feedback=self.on_progress``, is not a handler.
+    """
+    called = {handler.name for handler in handlers(node)} | GENERAL_HANDLERS.keys()
+    unbound = [
+        method
+        for method in source.methods
+        if method.name.startswith(_PREFIXES) and method.name not in called
+    ]
+    if not unbound:
+        return []
+    used = {
+        inner.attr
+        for module in source.own_modules
+        for inner in ast.walk(module.tree)
+        if isinstance(inner, ast.Attribute)
+    }
+    return [method for method in unbound if method.name not in used]
+
+
+def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
+    """Yield ``methods`` and those of their class that they call, directly or through others."""
+    pending, seen = list(methods), {method.name for method in methods}
+    while pending:
+        current = pending.pop()
+        yield current
+        for callee in called_methods(source, current):
+            if callee.name not in seen:
+                seen.add(callee.name)
+                pending.append(callee)
+
+
+def called_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
+    """Yield those methods of its class that ``method`` itself calls at once."""
+    for call in method.calls:
+        is_own = call.name.startswith("self.") and not call.deferred
+        callee = source.method(call.name.removeprefix("self.")) if is_own else None
+        if callee is not None:
+            yield callee
+
+
+@dataclass(frozen=True, slots=True)
+class ClassOfNode:
+    """A node with the source of its class."""
+
+    node: Node
+    hosted: HostedClass
+    source: BehaviorSource
+
+    @property
+    def span(self) -> Span:
+        """Where the YAML file names the class."""
+        return self.hosted.reference.text.span
+
+    @property
+    def constructor(self) -> Method | None:
+        """The constructor of the class or of its bases outside of rclpy, if it is known."""
+        method = self.source.method("__init__")
+        is_nearest = any(method in class_.methods for _, class_ in self.source.classes[:1])
+        return method if is_nearest or self.source.complete else None
+
+    def is_certain(self, span: Span) -> bool:
+        """Return whether the constructor makes the call at a place whatever happens before."""
+        constructor = self.constructor
+        if constructor is None or constructor.node is None or constructor.span.file != span.file:
+            return False
+        nodes = walk(constructor.node.body, closed=_CONDITIONAL)
+        calls = (span_of(node, span.file) for node in nodes if isinstance(node, ast.Call))
+        return any((call.line, call.column) == (span.line, span.column) for call in calls)
+
+    def diagnostic(self, rule: Rule, message: str, where: Span, hint: str) -> Diagnostic:
+        """Return a diagnostic about the class, with its place in the Python file."""
+        related = (Label(where, "here"),)
+        return Diagnostic(rule, message, self.span, related=related, hint=hint)
+
+
+@dataclass(slots=True)
+class DeclaredParameters:
+    """The parameters that a class declares, by name; ``is_complete`` if there are no others.
+
+    The type is None if the source does not show it, or if it may change.
+    """
+
+    types: dict[str, Located[str] | None]
+    is_complete: bool
+
+
+def declared_parameters(source: BehaviorSource) -> DeclaredParameters:
+    """Return the parameters that a class declares by methods of Node."""
+    nodes = [node for module in source.own_modules for node in walk(module.tree.body)]
+    texts = [module.source.text for module in source.own_modules]
+    is_open = any(name in text for name in UNDECLARED for text in texts)
+    # A method that is passed on, or called for another object, may declare anything.
+    mentions = sum(isinstance(node, ast.Attribute) and node.attr in _DECLARING for node in nodes)
+    parameters = DeclaredParameters({}, source.complete and source.class_found and not is_open)
+    for scope, call, method in calls_on_self(source):
+        if method in _DECLARING:
+            mentions -= 1
+            _declare(scope, call, method, parameters)
+    parameters.is_complete = parameters.is_complete and mentions == 0
+    return parameters
+
+
+def _declare(scope: Scope, call: ast.Call, method: str, parameters: DeclaredParameters) -> None:
+    """Add the parameters that a call declares."""
+    prefix: str | None = ""
+    items = [(argument(call, 0, "name"), argument(call, 1, "value"))]
+    if method == "declare_parameters":
+        prefix = scope.known(scope.text, argument(call, 0, "namespace"))
+        listed = argument(call, 1, "parameters")
+        pairs = listed.elts if isinstance(listed, ast.List | ast.Tuple) else [ast.Tuple(elts=[])]
+        items = [_pair(item) for item in pairs]
+    for name_node, default in items:
+        name = scope.known(scope.text, name_node)
+        if name is None or prefix is None:
+            parameters.is_complete = False
+            continue
+        name = f"{prefix}.{name}" if prefix else name
+        is_certain = name not in parameters.types and not _may_change(call)
+        type_ = rclpy_type(scope.known(scope.literal, default)) if is_certain else None
+        where = span_of(call, scope.source)
+        parameters.types[name] = Located(type_, where) if type_ is not None else None
+
+
+def _pair(item: ast.expr) -> tuple[ast.expr | None, ast.expr | None]:
+    match item:
+        case ast.Tuple(elts=[name, default, *_]):
+            return name, default
+        case ast.Tuple(elts=[name]):
+            return name, None
+    return None, None
+
+
+def passes_node_on(source: BehaviorSource, harmless: frozenset[str] = _OF_ROS) -> bool:
+    """Return whether a class passes its object to other code than some packages."""
+    return any(_passes_on(scope, harmless) for scope in scopes_in(source.classes))
+
+
+def _passes_on(scope: Scope, harmless: frozenset[str]) -> bool:
+    uses = 0
+    for node in scope.nodes:
+        match node:
+            case ast.Name(id="self"):
+                uses += 1
+            case ast.Attribute(value=ast.Name(id="self")):
+                uses -= 1
+            case ast.Call() if scope.full_name(node.func).partition(".")[0] in harmless:
+                given = [*node.args, *(keyword.value for keyword in node.keywords)]
+                uses -= sum(getattr(item, "id", None) == "self" for item in given)
+    return uses > 0
+
+
+def calls_on_self(source: BehaviorSource) -> Iterator[tuple[Scope, ast.Call, str]]:
+    """Yield the calls of methods of the object in the methods of a class, with their names."""
+    for scope in scopes_in(source.classes):
+        for node in scope.nodes:
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name(id="self"), attr=name)):
+                    yield scope, node, name
+
+
+def _may_change(call: ast.Call) -> bool:
+    """Return whether a declaration may allow values of several types."""
+    match argument(call, 2, "descriptor"):
+        case None:
+            return False
+        case ast.Call(keywords=keywords):
+            return any(item.arg in (None, "dynamic_typing") for item in keywords)
+    return True
+
+
+def published_port(name: str) -> str | None:
+    """Return ``x`` for ``self.publishers.x.publish``."""
+    match = _PUBLISH.fullmatch(name)
+    return match[1] if match else None
