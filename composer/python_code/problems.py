@@ -53,3 +53,7 @@ class Problem:
     span: Span
     hint: str | None = None
     is_certain: bool = True
+
+
+class CheckerFailed(Exception):
+    """The type checker cannot run or has no result; the message is the reason."""

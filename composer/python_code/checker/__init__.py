@@ -6,19 +6,22 @@ that its node type generates, and handlers and callbacks get annotated arguments
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import Node
-from composer.python_code.checker.findings import SYNTAX_KINDS, problems_of
-from composer.python_code.checker.project import CheckedFile, FileSet, file_sets
-from composer.python_code.checker.pyrefly import Check, CheckerFailed, start_check
-from composer.python_code.lookup import BehaviorSource
-from composer.python_code.problems import Family, Problem
+from composer.python_code.checker.cache import entry_of, keep_entry, read_entry
+from composer.python_code.checker.file_sets import FileSet, file_sets
+from composer.python_code.lookup import BehaviorSource, BrokenModule
+from composer.python_code.problems import CheckerFailed, Family, Problem
 from composer.source import Span
+
+if TYPE_CHECKING:
+    from composer.python_code.checker.check import Check
 
 __all__ = ["RunningCheck", "start"]
 
@@ -33,59 +36,39 @@ class RunningCheck:
 
     interfaces: Interfaces
     waiting: list[FileSet]
-    running: list[tuple[Check, dict[str, CheckedFile], FileSet]] = field(default_factory=list)
+    running: list[tuple[Check, FileSet, Path]] = field(default_factory=list)
     found: list[tuple[Node, BehaviorSource, Problem]] = field(default_factory=list)
+    has_failed: bool = False
 
     def fill(self) -> None:
-        """Start as many checks as may run side by side."""
+        """Start as many checks as may run side by side, of files that have changed."""
         while self.waiting and len(self.running) < _PARALLEL:
             files = self.waiting.pop(0)
-            copies = files.copies()
-            texts = {name: item.copy.text for name, item in copies.items()}
-            texts |= {name: item[0].span.file.text for name, item in files.broken.items()}
             stubs = files.stubs(self.interfaces)
+            entry = entry_of(files.state(stubs))
+            kept = read_entry(entry, files)
+            if kept is not None:
+                self._add(files, kept)
+                continue
+            from composer.python_code.checker.check import Check  # noqa: PLC0415 - slow
+
             try:
-                check = start_check({**texts, **stubs}, texts, files.search_paths())
+                self.running.append((Check.start(files, stubs, self.interfaces), files, entry))
             except CheckerFailed as error:
-                self._failed(files, copies, error)
+                self._add_failure(files, error)
                 self.waiting.clear()  # the next one would fail as well
-                return
-            self.running.append((check, copies, files))
-
-    def _failed(
-        self, files: FileSet, copies: Mapping[str, CheckedFile], error: CheckerFailed
-    ) -> None:
-        """Report once that the checker does not work, and what is wrong without it."""
-        if copies and not self.found:
-            item = next(iter(copies.values()))
-            message = f"the type checker did not check the Python code: {error}"
-            problem = Problem(Family.NOT_CHECKED, message, Span(item.copy.module.source, 1, 1))
-            self.found.append((item.node, item.source, problem))
-        self._add_broken(files, files.broken)
-
-    def _add_broken(self, files: FileSet, refused: Container[str]) -> None:
-        """Report the files that Python cannot parse, those that the checker can parse as info."""
-        for name, (broken, node, source) in files.broken.items():
-            problem = Problem(Family.SYNTAX, broken.message, broken.span)
-            if name not in refused:
-                version = ".".join(map(str, sys.version_info[:2]))
-                message = f"this Python, {version}, cannot parse the file, which needs a newer one"
-                hint = "Jazzy's Python is 3.12"
-                problem = Problem(Family.NOT_CHECKED, message, broken.span, hint)
-            self.found.append((node, source, problem))
 
     def problems(self) -> list[tuple[Node, BehaviorSource, Problem]]:
         """Wait for all checks, and return what they found, each with the node it is about."""
         while self.running:
-            check, copies, files = self.running.pop(0)
+            check, files, entry = self.running.pop(0)
             try:
-                findings = check.result()
+                found = check.problems()
             except CheckerFailed as error:
-                self._failed(files, copies, error)
+                self._add_failure(files, error)
             else:
-                refused = {item.path for item in findings if item.kind in SYNTAX_KINDS}
-                self._add_broken(files, refused)
-                self.found += problems_of(findings, copies, files.behaviors, self.interfaces)
+                keep_entry(entry, found)
+                self._add(files, found)
             self.fill()
         return self.found
 
@@ -94,6 +77,22 @@ class RunningCheck:
         self.waiting.clear()
         for check, _, _ in self.running:
             check.close()
+
+    def _add(self, files: FileSet, found: Iterable[tuple[str, Problem]]) -> None:
+        for name, problem in found:
+            self.found.append((files.files[name].node, files.files[name].source, problem))
+
+    def _add_failure(self, files: FileSet, error: CheckerFailed) -> None:
+        """Report once that the checker does not work, and what is wrong without it."""
+        for name, file in files.files.items():
+            if isinstance(file.content, BrokenModule):
+                problem = Problem(Family.SYNTAX, file.content.message, file.content.span)
+                self._add(files, [(name, problem)])
+            elif not self.has_failed:
+                self.has_failed = True
+                message = f"the type checker did not check the Python code: {error}"
+                problem = Problem(Family.NOT_CHECKED, message, Span(file.text, 1, 1))
+                self._add(files, [(name, problem)])
 
 
 def start(classes: Sequence[tuple[Node, BehaviorSource]], interfaces: Interfaces) -> RunningCheck:

@@ -1,4 +1,4 @@
-"""Keeps what the checker said about a set of files, by their content.
+"""Keeps the problems that the type checker found in a set of files, by their content.
 
 A project is checked far more often than its Python changes. The folder belongs to the user alone;
 whatever goes wrong with it, the checker runs instead.
@@ -8,47 +8,61 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+
+from composer.python_code.checker.file_sets import FileSet
+from composer.python_code.problems import Family, Problem
+from composer.source import Span
 
 _MAXIMUM_ENTRIES = 500
 _MAXIMUM_BYTES = 4_000_000
 
 
-def entry_of(files: Mapping[str, str], options: Iterable[str]) -> Path:
-    """Return the file that keeps what the checker says about files, with the given options."""
+def entry_of(state: Iterable[str]) -> Path:
+    """Return the file that keeps the problems of files; ``state`` is all that they depend on."""
     home = os.environ.get("XDG_CACHE_HOME", "")
     folder = Path(home) if Path(home).is_absolute() else _home() / ".cache"
     digest = sha256()
-    for part in (*options, *(text for name in sorted(files) for text in (name, files[name]))):
+    for part in state:
         digest.update(part.encode(errors="surrogatepass") + b"\0")
     return folder / "ros2-composer" / "checks" / f"{digest.hexdigest()}.json"
 
 
-def read_entry(entry: Path) -> list[dict[str, Any]] | None:
-    """Return what was kept, or None."""
+def read_entry(entry: Path, files: FileSet) -> list[tuple[str, Problem]] | None:
+    """Return the problems that were kept, each with the name of its file, or None."""
     try:
         status = entry.stat(follow_symlinks=False)
         if status.st_uid != os.geteuid() or status.st_size > _MAXIMUM_BYTES:
             return None
-        kept = json.loads(entry.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        return [
+            (name, Problem(Family[family], message, Span(files.files[name].text, *place), *others))
+            for name, family, message, place, *others in json.loads(entry.read_bytes())
+        ]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
-    is_list = isinstance(kept, list) and all(isinstance(item, dict) for item in kept)
-    return kept if is_list else None
 
 
-def keep_entry(entry: Path, found: list[dict[str, Any]]) -> None:
-    """Keep what the checker said; the oldest entries make room."""
+def keep_entry(entry: Path, problems: Iterable[tuple[str, Problem]]) -> None:
+    """Keep problems, each with the name of its file; the oldest entries make room."""
+    kept = [
+        (
+            name,
+            problem.family.name,
+            problem.message,
+            (problem.span.line, problem.span.column, problem.span.length),
+            problem.hint,
+            problem.is_certain,
+        )
+        for name, problem in problems
+    ]
     with suppress(OSError):
         entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         _remove_oldest(entry.parent)
         written = entry.with_suffix(f".{os.getpid()}")
-        written.write_text(json.dumps(found), encoding="utf-8")
+        written.write_text(json.dumps(kept), encoding="utf-8")
         written.replace(entry)
 
 
@@ -56,6 +70,8 @@ def _home() -> Path:
     try:
         return Path.home()
     except RuntimeError:  # in a container, users may be missing in /etc/passwd
+        import tempfile  # noqa: PLC0415 - rare, and slow to import
+
         return Path(tempfile.gettempdir())
 
 

@@ -14,6 +14,7 @@ from typing import TypeGuard
 
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.callbacks import callback_signatures
+from composer.python_code.checker.file_sets import ClassEdit
 from composer.python_code.stubs.behaviors import Signature
 from composer.python_code.stubs.messages import interface_modules
 from composer.python_code.syntax import Module
@@ -24,18 +25,6 @@ _IMPORTS = (
     "import composer.behavior, composer.typed, rclpy.action, rclpy.lifecycle, "
     "rclpy.parameter, rclpy.task, typing"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class ClassEdit:
-    """What a class of the project gets: a base class, "" for none, and signatures by method.
-
-    ``ports`` are the types of the action clients of a behavior, by what its code calls them.
-    """
-
-    base: str = ""
-    signatures: Mapping[str, Signature] = field(default_factory=dict)
-    ports: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)

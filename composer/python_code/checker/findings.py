@@ -9,18 +9,15 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from dataclasses import field
 
 from composer.diagnostics import nearest
 from composer.fast_dataclass import dataclass
-from composer.interfaces import Interfaces
-from composer.model import Node
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.owners import Owners
-from composer.python_code.checker.project import CheckedFile
 from composer.python_code.checker.pyrefly import Finding
-from composer.python_code.checker.relevance import Relevance, reassigned, unguarded_value
+from composer.python_code.checker.relevance import Relevance, unguarded_value
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family, Problem
@@ -61,7 +58,7 @@ _ASSIGNMENT = (
     r"`(?P<given>.+?)` is not assignable to (?:attribute `\w+` with type |declared return type )?"
     r"`(?P<expected>.+?)`"
 )
-_MISSING_RETURN = "missing an explicit `return`"
+MISSING_RETURN = "missing an explicit `return`"
 #: The types that rclpy and the composer expect from functions, with what these return.
 _RESULTS = {
     "Response": ("the response", "response"),
@@ -90,80 +87,12 @@ _RCLPY_MODULES = tuple(f"rclpy.{path.stem}" for path in (LIBRARIES / "rclpy").it
 _COMPLETE_MODULES = frozenset({"composer", "numpy", "rclpy"})
 
 
-def problems_of(
-    findings: Iterable[Finding],
-    files: Mapping[str, CheckedFile],
-    behaviors: Mapping[str, Node],
-    interfaces: Interfaces,
-) -> list[tuple[Node, BehaviorSource, Problem]]:
-    """Return what the findings mean, each with the class because of which its file is checked.
-
-    One wrong name, type or call has one report for each file, where it is first used.
-    """
-    owners = Owners(behaviors, interfaces)
-    found: list[tuple[Node, BehaviorSource, Problem]] = []
-    seen: set[tuple[str, str]] = set()
-    for finding, span, code, relevance in _relevant(findings, files, owners):
-        checked = files[finding.path]
-        reader = _Reader(finding, checked, code, relevance, owners, span)
-        problem = reader.problem()
-        keys = {(finding.path, about) for about in reader.about}
-        if problem is not None:
-            keys.add((finding.path, problem.message))
-            if seen.isdisjoint(keys):
-                found.append((checked.node, checked.source, problem))
-        seen |= keys
-    return found
-
-
-def _relevant(
-    findings: Iterable[Finding], files: Mapping[str, CheckedFile], owners: Owners
-) -> Iterator[tuple[Finding, Span, CodeIndex, Relevance]]:
-    """Yield the findings that matter, with their places in users' files."""
-    by_path: dict[str, list[tuple[Finding, Span]]] = {}
-    for finding in findings:
-        checked = files.get(finding.path)
-        # A missing 'return' is reported at the type of the result, which may be inserted.
-        if checked is not None and (
-            finding.message.endswith(_MISSING_RETURN)
-            or not checked.copy.is_inserted(finding.line, finding.column)
-        ):
-            by_path.setdefault(finding.path, []).append((finding, _span(finding, checked)))
-    codes = {path: CodeIndex(files[path].copy.module) for path in by_path}
-    attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
-    classes = frozenset(name for item in files.values() for name in item.copy.module.classes)
-    for path, in_file in by_path.items():
-        changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
-        relevance = Relevance(
-            codes[path],
-            is_class=files[path].node.behavior is None,
-            reassigned=reassigned(codes[path], changed),
-            attributes=attributes,
-            classes=classes,
-            messages=owners.messages,
-        )
-        for finding, span in in_file:
-            if relevance.keeps(finding, span):
-                yield finding, span, codes[path], relevance
-
-
-def _span(finding: Finding, checked: CheckedFile) -> Span:
-    """Return the place of a finding in the original file."""
-    source = checked.copy.module.source
-    line, column = checked.copy.place(finding.line, finding.column)
-    end_line, end = checked.copy.place(finding.end_line, finding.end_column)
-    text = source.line(line)
-    if end_line != line:
-        end = len(text) + 1
-    return Span(source, line, min(column, len(text) + 1), max(end - column, 1))
-
-
 @dataclass(slots=True)
-class _Reader:
+class Reader:
     """One finding, with what is known about the code around it."""
 
     finding: Finding
-    checked: CheckedFile
+    source: BehaviorSource
     code: CodeIndex
     relevance: Relevance
     owners: Owners
@@ -228,7 +157,7 @@ class _Reader:
         if named == "property":
             return None  # a class instead of a message, which is reported where it is sent
         node = self.code.expression_at(self.span)
-        module = self.checked.copy.module
+        module = self.code.module
         is_own = named in module.classes
         owner = None if is_own else self.owners.named(named, module, with_api=not self._is_class)
         at = self.span.text.rfind(name)
@@ -262,7 +191,7 @@ class _Reader:
         name, module = found["name"] or found["imported"], found["module"]
         top = module.partition(".")[0]
         is_standard = top in sys.stdlib_module_names
-        own = {item.path.stem for item in self.checked.source.own_modules}
+        own = {item.path.stem for item in self.source.own_modules}
         is_interface = top in self.owners.interfaces.packages()
         if found["imported"]:
             self.about += [f"name {other}" for other in self.code.names if _is_near(other, name)]
@@ -356,7 +285,7 @@ class _Reader:
         elif name in API_CLASSES:
             hint = f"add 'from composer.behavior import {name}'"
         else:
-            module = self.checked.copy.module
+            module = self.code.module
             names = self.code.names | {*module.imports, *module.classes}
             alike = [x for x in names - {name} if x[:1].lower() == name[:1].lower()]
             hint = _did_you_mean(name, alike) or "import it, or define it"
@@ -370,7 +299,7 @@ class _Reader:
     def _return(self) -> Problem | None:
         found = re.search(_ASSIGNMENT, self.finding.message)
         function = self.code.function_at(self.span.line)
-        if self.finding.message.endswith(_MISSING_RETURN) and function is not None:
+        if self.finding.message.endswith(MISSING_RETURN) and function is not None:
             return self._missing_return(function)
         if found is None or "Falsy" in found["given"]:
             return None if found is not None else self._in_its_words()

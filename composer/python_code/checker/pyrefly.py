@@ -10,14 +10,14 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 from composer.fast_dataclass import dataclass
-from composer.python_code.checker.cache import entry_of, keep_entry, read_entry
-from composer.python_code.stubs.folder import LIBRARIES
+from composer.python_code.checker.file_sets import package_folders
+from composer.python_code.problems import CheckerFailed
 
 #: Kinds that the composer checks itself, or that say nothing about what happens at run time.
 _IGNORED = (
@@ -47,10 +47,6 @@ _LIMITS = {
 PYTHON_VERSION = max(sys.version_info[:2], (3, 12))
 
 
-class CheckerFailed(Exception):
-    """The checker cannot run or has no result; the message is the reason."""
-
-
 @dataclass(frozen=True, slots=True)
 class Finding:
     """What the checker says about a place in a file; lines and columns count from 1."""
@@ -65,20 +61,14 @@ class Finding:
 
 
 @dataclass(slots=True)
-class Check:
-    """A check that runs in the background, or whose result was kept from an earlier one."""
+class Process:
+    """A process of the checker that runs in the background."""
 
-    _entry: Path
-    _kept: list[dict[str, Any]] | None = None
-    _folder: tempfile.TemporaryDirectory[str] | None = None
-    _process: subprocess.Popen[bytes] | None = None
+    _folder: tempfile.TemporaryDirectory[str]
+    _process: subprocess.Popen[bytes]
 
-    def result(self) -> list[Finding]:
-        """Wait for the findings. Raises CheckerFailed."""
-        if self._kept is not None:
-            return _findings(self._kept)
-        if self._process is None or self._folder is None:
-            raise CheckerFailed("it was not started")
+    def findings(self) -> list[Finding]:
+        """Wait for what the checker finds. Raises CheckerFailed."""
         try:
             self._process.wait(timeout=TIME_LIMIT_S)
         except subprocess.TimeoutExpired:
@@ -86,45 +76,36 @@ class Check:
         finally:
             output, errors = (_read(Path(self._folder.name, name)) for name in _OUTPUTS)
             self.close()
-        found = _parsed(output, errors, self._process.returncode)
-        findings = _findings(found)
-        keep_entry(self._entry, found)
-        return findings
+        return _findings(output, errors, self._process.returncode)
 
     def close(self) -> None:
         """End the process and remove its files."""
-        if self._process is not None and self._process.poll() is None:
+        if self._process.poll() is None:
             self._process.kill()
             self._process.wait()
-        if self._folder is not None:
-            self._folder.cleanup()
+        self._folder.cleanup()
 
 
-def start_check(
+def start_process(
     files: Mapping[str, str], checked: Iterable[str], search_paths: Iterable[str]
-) -> Check:
-    """Start to check files, unless it is kept what the checker said about them.
+) -> Process:
+    """Start to check files.
 
     ``checked`` are the files to report about, ``search_paths`` the folders to import from. All
     are relative to a private folder that the files are written into. Raises CheckerFailed.
     """
-    arguments = [*_options(search_paths), "--", *checked]
-    entry = entry_of(files, (*arguments, *_state_of_packages()))
-    kept = read_entry(entry)
-    if kept is not None:
-        return Check(entry, kept)
-    program = _program()
+    command = [_program(), *_options(search_paths), "--", *checked]
     try:
         folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
     except OSError as error:
         raise CheckerFailed(f"no temporary folder: {error.strerror}") from None
     try:
-        process = _start([program, *arguments], Path(folder.name), files)
+        process = _start(command, Path(folder.name), files)
     except OSError as error:
         folder.cleanup()
         raise CheckerFailed(f"it cannot be started: {error.strerror}") from None
     _limit(process.pid)
-    return Check(entry, None, folder, process)
+    return Process(folder, process)
 
 
 def _start(command: list[str], root: Path, files: Mapping[str, str]) -> subprocess.Popen[bytes]:
@@ -166,18 +147,7 @@ def _options(search_paths: Iterable[str]) -> list[str]:
     options += [f"--ignore={kind}" for kind in _IGNORED]
     options += [f"--error={kind}" for kind in _REPORTED]
     options += [f"--search-path={path}" for path in search_paths]
-    return [*options, *(f"--site-package-path={path}" for path in _package_folders())]
-
-
-def _package_folders() -> list[str]:
-    """Return the folders of installed packages."""
-    return [path for path in sys.path if path.endswith("-packages") and Path(path).is_dir()]
-
-
-def _state_of_packages() -> Iterator[str]:
-    """Yield what changes if a package is installed, or if one of our own stubs is changed."""
-    for path in (*map(Path, _package_folders()), *sorted(LIBRARIES.rglob("*.pyi"))):
-        yield f"{path} {path.stat().st_mtime_ns}"
+    return [*options, *(f"--site-package-path={path}" for path in package_folders())]
 
 
 def _environment(root: Path) -> dict[str, str]:
@@ -200,8 +170,8 @@ def _read(path: Path) -> bytes:
         return b""
 
 
-def _parsed(output: bytes, errors: bytes, code: int) -> list[dict[str, Any]]:
-    """Return the errors that the checker has printed. Raises CheckerFailed."""
+def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
+    """Return what the checker has printed. Raises CheckerFailed."""
     if code < 0:
         raise CheckerFailed(f"it was ended by {signal.Signals(-code).name}")
     try:
@@ -209,24 +179,9 @@ def _parsed(output: bytes, errors: bytes, code: int) -> list[dict[str, Any]]:
     except (ValueError, KeyError, TypeError, RecursionError):
         lines = errors.decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
         raise CheckerFailed(f"it failed: {lines[-1][:200]}") from None
-    return found
-
-
-def _findings(found: Iterable[Mapping[str, Any]]) -> list[Finding]:
-    """Return the errors as findings. Raises CheckerFailed."""
+    names = ("path", "line", "column", "stop_line", "stop_column", "name", "description")
     try:
-        return [
-            Finding(
-                item["path"],
-                item["line"],
-                item["column"],
-                item["stop_line"],
-                item["stop_column"],
-                item["name"],
-                item["description"],
-            )
-            for item in found
-            if item["severity"] in ("error", "warn")
-        ]
+        reported = [item for item in found if item["severity"] in ("error", "warn")]
+        return [Finding(*(item[name] for name in names)) for item in reported]
     except (KeyError, TypeError):
         raise CheckerFailed("its output has an unknown form") from None

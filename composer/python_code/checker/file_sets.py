@@ -1,4 +1,4 @@
-"""Which files a check reads: the copies of a project's modules, and the stubs that they need.
+"""The sets of files that the type checker reads together, with the stubs that they need.
 
 Modules of one name in different folders, and a class that two node types use, cannot be in one
 check: each gets a check of its own.
@@ -7,6 +7,7 @@ check: each gets a check of its own.
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
@@ -15,9 +16,9 @@ from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node, PortKind
-from composer.python_code.checker.copies import ClassEdit, Copy, edited_copy
 from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.stubs.behaviors import (
+    Signature,
     behavior_class_name,
     behavior_module,
     port_type,
@@ -26,6 +27,7 @@ from composer.python_code.stubs.behaviors import (
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
 from composer.python_code.syntax import Module
+from composer.source import SourceFile
 from composer.typed import SUFFIX
 
 _FILES = "files"
@@ -39,29 +41,45 @@ _RCLPY_PACKAGES = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class CheckedFile:
-    """A copy, and the node and class because of which it is checked."""
+class ClassEdit:
+    """What a class of the project gets: a base class, "" for none, and signatures by method.
 
-    copy: Copy
+    ``ports`` are the types of the action clients of a behavior, by what its code calls them.
+    """
+
+    base: str = ""
+    signatures: Mapping[str, Signature] = field(default_factory=dict)
+    ports: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedFile:
+    """A file, and the node and class because of which it is checked."""
+
+    content: Module | BrokenModule
     node: Node
     source: BehaviorSource
+
+    @property
+    def text(self) -> SourceFile:
+        """The file with its text."""
+        return self.content.source if isinstance(self.content, Module) else self.content.span.file
 
 
 @dataclass(slots=True)
 class FileSet:
-    """The files of one check.
+    """The files of one check, by their names below its folder.
 
     ``behaviors`` are the generated base classes by name, each with its node. ``folders`` are the
-    folders from which modules are imported, by their top-level names. ``broken`` are the files that
-    this Python cannot parse: the checker knows newer syntax.
+    folders from which modules are imported, by their top-level names. This Python cannot parse some
+    files: the checker knows newer syntax.
     """
 
+    files: dict[str, CheckedFile] = field(default_factory=dict)
     behaviors: dict[str, Node] = field(default_factory=dict)
     edits: dict[Path, dict[str, ClassEdit]] = field(default_factory=dict)
-    modules: dict[Path, tuple[Module, Node, BehaviorSource]] = field(default_factory=dict)
     folders: dict[str, Path] = field(default_factory=dict)
     search: dict[Path, None] = field(default_factory=dict)
-    broken: dict[str, tuple[BrokenModule, Node, BehaviorSource]] = field(default_factory=dict)
 
     def accepts(self, source: BehaviorSource) -> bool:
         """Return whether the files of a class can be in this check."""
@@ -76,10 +94,11 @@ class FileSet:
         """Add the class of a node, with the files that it imports."""
         reference = source.reference
         self.search |= dict.fromkeys((reference.folder, *reference.node_folders))
-        for broken in source.broken:
-            self.broken[f"{_FILES}{broken.path.as_posix()}"] = (broken, node, source)
+        files: list[Module | BrokenModule] = [*source.own_modules, *source.broken]
+        for file in files:
+            checked = CheckedFile(file, node, source)
+            self.files.setdefault(f"{_FILES}{file.path.as_posix()}", checked)
         for module in source.own_modules:
-            self.modules.setdefault(module.path, (module, node, source))
             name, folder = _import_root(module)
             self.folders[name] = folder
             self.search[folder] = None
@@ -99,14 +118,26 @@ class FileSet:
             edit = ClassEdit(start, handlers, types)
             self.edits.setdefault(module.path, {})[class_.name] = edit
 
-    def copies(self) -> dict[str, CheckedFile]:
-        """Return the copies, by their names below the folder of the check."""
-        found = {}
-        for path, (module, node, source) in self.modules.items():
-            is_behavior = node.behavior is not None
-            copy = edited_copy(module, self.edits.get(path, {}), is_behavior=is_behavior)
-            found[f"{_FILES}{path.as_posix()}"] = CheckedFile(copy, node, source)
-        return found
+    @property
+    def modules(self) -> Iterator[Module]:
+        """The files that this Python can parse."""
+        contents = (file.content for file in self.files.values())
+        yield from (item for item in contents if isinstance(item, Module))
+
+    def state(self, stubs: Mapping[str, str]) -> Iterator[str]:
+        """Yield all that the findings depend on: texts, uses, packages and our own code."""
+        yield f"{sys.version_info} {self.search_paths()}"
+        for name, file in self.files.items():
+            edits = self.edits.get(file.content.path, {})
+            bases = [(class_, edit.base) for class_, edit in edits.items()]
+            yield f"{name} {file.node.name} {file.node.behavior is None} {bases}"
+            yield file.text.text
+        for name, text in stubs.items():
+            yield name
+            yield text
+        own = sorted(Path(__file__).parent.parent.rglob("*.py*"))
+        for path in (*map(Path, package_folders()), *own):
+            yield f"{path} {path.stat().st_mtime_ns}"
 
     def stubs(self, interfaces: Interfaces) -> dict[str, str]:
         """Return the stubs that the files need, by their names below the folder of the check."""
@@ -114,7 +145,7 @@ class FileSet:
         names.update(_API_MESSAGES)
         packages: set[str] = set()
         typed: set[str] = set()  # also the class of a base type, of which a node type inherits
-        for module, _, _ in self.modules.values():
+        for module in self.modules:
             for imported, name in _imports(module.tree):
                 package, _, folder = imported.partition(".")
                 if package == "rclpy" or "self.node" in module.source.text:
@@ -138,7 +169,7 @@ class FileSet:
 
     def search_paths(self) -> list[str]:
         """Return the folders from which the files import, stubs first."""
-        parents = {parent for path in self.modules for parent in path.parents}
+        parents = {parent for module in self.modules for parent in module.path.parents}
         used = (path for path in self.search if path in parents)  # others are not in the copy
         return [_STUBS, str(LIBRARIES), *(f"{_FILES}{path.as_posix()}" for path in used)]
 
@@ -157,6 +188,11 @@ def file_sets(
             sets.append(fitting)
         fitting.add(node, source, interfaces)
     return sets
+
+
+def package_folders() -> list[str]:
+    """Return the folders of installed packages."""
+    return [path for path in sys.path if path.endswith("-packages") and Path(path).is_dir()]
 
 
 def _unused_name(node: Node, taken: Mapping[str, Node]) -> str:
