@@ -12,7 +12,7 @@ from typing import TypeVar
 from composer.analysis.class_ports import CREATORS, qos_profile
 from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
-from composer.importing.branches import conditions_of_calls, negated
+from composer.importing.branches import ALWAYS, Condition, conditions_of_calls
 from composer.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.model import BehaviorReference, PortKind
 from composer.project import Project
@@ -122,8 +122,8 @@ class _ClassReader:
     unknown: list[str]
     name: str = ""
     #: The place and the condition, if any, of each call that creates something.
-    created: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
-    _condition: str = ""  # of the call that is being read
+    created: dict[str, list[tuple[str, Condition]]] = field(default_factory=dict)
+    _condition: Condition = ALWAYS  # of the call that is being read
 
     def read(self, scope: Scope) -> None:
         """Read one method."""
@@ -132,7 +132,7 @@ class _ClassReader:
             if not isinstance(call, ast.Call):
                 continue
             place = f"{Path(scope.source.path).name}:{call.lineno}"
-            self._condition = conditions.get(call, "")
+            self._condition = conditions.get(call, ALWAYS)
             name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
             full_name = scope.full_name(call.func)
             if name in CREATORS and full_name.startswith("self."):
@@ -186,7 +186,8 @@ class _ClassReader:
         """List what no call creates without a condition, nor calls on opposite conditions."""
         for what, calls in self.created.items():
             conditions = {condition for _, condition in calls}
-            if "" not in conditions and conditions.isdisjoint(map(negated, conditions)):
+            opposites = {condition.negated for condition in conditions}
+            if ALWAYS not in conditions and conditions.isdisjoint(opposites):
                 place, condition = calls[0]
                 self.unknown.append(f"{place}: whether there is the {what}: only if {condition}")
 

@@ -173,6 +173,15 @@ class Guard(Node):
             self.create_publisher(String, "looped", 10)
         self.ready() and self.create_publisher(String, "ready", 10)
         pub = self.create_publisher(String, "x", 10) if self.name else None
+        if not alarm or limit:
+            self.create_publisher(String, "either", 10)
+        if alarm or limit:
+            self.create_publisher(String, "either", 10)
+        if not (alarm and limit):
+            self.create_publisher(String, "always", 10)
+        if alarm and limit:
+            self.create_publisher(String, "always", 10)
+        (alarm or limit) or self.create_publisher(String, "neither", 10)
         if not self.name:
             return
         self.create_publisher(String, "last", 10)
@@ -191,7 +200,9 @@ def test_what_is_open_is_listed_and_the_file_is_valid(tmp_path: Path) -> None:
         "guard.py:24: whether there is the publisher matched: only if self.name matches 'a'",
         "guard.py:27: whether there is the publisher ready: only if self.ready()",
         "guard.py:28: whether there is the publisher x: only if self.name",
-        "guard.py:31: whether there is the publisher last: only if self.name",
+        "guard.py:30: whether there is the publisher either: only if not alarm or limit",
+        "guard.py:37: whether there is the publisher neither: only if not (alarm or limit)",
+        "guard.py:40: whether there is the publisher last: only if self.name",
         "guard.py:7: the value of argument area of the constructor: 'arguments' sets it",
         "guard.py:7: the value of argument alarm of the constructor: 'arguments' sets it",
     )
