@@ -27,6 +27,7 @@ from composer.python_code.stubs.behaviors import (
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
 from composer.python_code.syntax import Module
+from composer.python_code.trees import walk
 from composer.source import SourceFile
 from composer.typed import SUFFIX
 
@@ -135,8 +136,8 @@ class FileSet:
         for name, text in stubs.items():
             yield name
             yield text
-        own = sorted(Path(__file__).parent.parent.rglob("*.py*"))
-        for path in (*map(Path, package_folders()), *own):
+        own = (*Path(__file__).parents[1].rglob("*.py"), *LIBRARIES.rglob("*.pyi"))
+        for path in (*map(Path, package_folders()), *sorted(own)):
             yield f"{path} {path.stat().st_mtime_ns}"
 
     def stubs(self, interfaces: Interfaces) -> dict[str, str]:
@@ -157,8 +158,9 @@ class FileSet:
                 else:
                     packages.add(package)
         packages &= interfaces.packages()
-        every = (name for folder in FOLDERS for name in interfaces.names(folder) if packages)
-        names.update(name for name in every if name.partition("/")[0] in packages)
+        for folder in FOLDERS if packages else ():
+            listed = interfaces.names(folder)
+            names.update(name for name in listed if name.partition("/")[0] in packages)
         files = message_stubs(interfaces, sorted(names))
         files["composer/__init__.pyi"] = ""
         files["composer/behavior.pyi"] = api_stub()
@@ -206,7 +208,7 @@ def _unused_name(node: Node, taken: Mapping[str, Node]) -> str:
 
 def _imports(tree: ast.Module) -> Iterator[tuple[str, str]]:
     """Yield the modules that a file imports anywhere, with the name that it takes from each."""
-    for node in ast.walk(tree):
+    for node in walk(tree.body, closed=(ast.expr,)):
         if isinstance(node, ast.Import):
             yield from ((item.name, "") for item in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

@@ -70,6 +70,7 @@ _RESULTS = {
 }
 _NAME = r"Could not find name `(\w+)`"
 _FUNCTION = r"in function `([\w.]+)`"
+_CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
 _OF_MESSAGE = r"(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)"
@@ -223,6 +224,11 @@ class Reader:
         given, expected, function = found["given"], found["expected"], found["function"]
         if _may_be_none(given, expected):
             return self._none()
+        node = self.code.expression_at(self.span)
+        if isinstance(node, ast.Call) and found["name"] in _CALLBACKS:
+            name = dotted(node.func)
+            message = f"'{name}' is called here, not passed"
+            return self._made(Family.SIGNATURE, message, f"write '{name}' without '()'")
         self._is_about_call(function)
         message_class = re.fullmatch(_OF_MESSAGE, function)
         if message_class is not None:

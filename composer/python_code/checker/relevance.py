@@ -171,7 +171,7 @@ class Relevance:
         if given.startswith("(") and (is_ros or expected.startswith("(")):
             # Annotations of functions are often loose, the number of arguments never is.
             return not is_ros and _arity(given) in (_arity(expected), None)
-        if self.is_class and "Unknown" in given:
+        if self.is_class and "Unknown" in given and not given.startswith("Coroutine["):
             return True
         types = re.sub(r"\bLiteral\[-?\d+\]", "int", given).split(" | ")
         members = {*types} - {"Any", "Unknown"}

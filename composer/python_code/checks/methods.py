@@ -9,11 +9,8 @@ from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.problems import Family, Problem
 from composer.python_code.syntax import Method
 from composer.python_code.trees import (
-    SCOPES,
     Function,
-    called_name,
     dotted,
-    is_empty,
     positional_arguments,
     walk,
 )
@@ -22,13 +19,7 @@ from composer.python_code.trees import (
 _METHODS = frozenset(
     {"abort", "cancel", "canceled", "destroy", "publish", "publish_feedback", "reset", "succeed"}
 )
-_RETURNS = (ast.Return, ast.Yield, ast.YieldFrom)
 _CLASS_METHODS = frozenset({"__new__", "__init_subclass__", "__class_getitem__"})
-_TAKING_CALLBACKS = frozenset(
-    {"ActionServer", "add_done_callback", "add_on_set_parameters_callback"}
-    | {"create_guard_condition", "create_service", "create_subscription", "create_timer"}
-    | {"send_goal", "send_goal_async"}
-)
 
 
 def unused_values(scope: NodeScope) -> Iterator[Problem]:
@@ -84,19 +75,6 @@ def missing_self(code: Code) -> Iterator[Problem]:
                 yield Problem(Family.SELF, message, method.span, hint, is_behavior)
 
 
-def callback_problems(scope: NodeScope) -> Iterator[Problem]:
-    """Yield the callbacks that are called at once."""
-    for call in scope.nodes:
-        if not isinstance(call, ast.Call) or called_name(call) not in _TAKING_CALLBACKS:
-            continue
-        for item in (*call.args, *(keyword.value for keyword in call.keywords)):
-            method = _method(item.func, scope) if isinstance(item, ast.Call) else None
-            if method is not None and (method.is_async or _returns_nothing(method.node)):
-                message = "the function is called here, not passed"
-                hint = f"write self.{method.name} without '()'"
-                yield scope.problem(Family.SIGNATURE, message, item, hint)
-
-
 def _lacks_self(function: Function) -> bool:
     """Return whether a method has no argument at all, or uses ``self`` without having it."""
     if function.decorator_list or function.name in _CLASS_METHODS:
@@ -107,15 +85,6 @@ def _lacks_self(function: Function) -> bool:
     names = (node for node in ast.walk(function) if isinstance(node, ast.Name))
     uses = {type(node.ctx) for node in names if node.id == "self"}
     return uses == {ast.Load} and all(item.arg != "self" for item in arguments)
-
-
-def _returns_nothing(function: Function | None) -> bool:
-    """Return whether a method returns None and does not wait to be overridden."""
-    statements = function.body if function is not None else []
-    return not is_empty(statements) and not any(
-        isinstance(node, _RETURNS) and node.value is not None
-        for node in walk(statements, closed=SCOPES)
-    )
 
 
 def _method(node: ast.expr | None, scope: NodeScope) -> Method | None:

@@ -137,15 +137,11 @@ FILES = [
     class Robot:
         async def on_tick(self):
             goal = await self.action_clients.count.send_goal(None, on_feedback=self.show)
-            await self.action_clients.count.send_goal(None, on_feedback=self.print())  # SIGNATURE
             await self.action_clients.count.send_goal(None, on_feedback=lambda: 1)
             await self.action_clients.count.send_goal(None, on_feedback=lambda feedback: 1)
 
         def show(self, name, feedback):
             pass
-
-        def print(self):
-            self.log.info("a")
     """,
     """
     class Robot:

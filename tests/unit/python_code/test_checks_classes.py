@@ -22,36 +22,6 @@ from std_srvs.srv import SetBool, Trigger
 from tf2_ros import Buffer, TransformListener
 
 """
-WRONG_CALLBACKS = [
-    "self.create_timer(1.0, self.tick())  # SIGNATURE",
-    "self.create_timer(1.0, callback=self.run())  # SIGNATURE",
-]
-RIGHT_CALLBACKS = [
-    "self.create_timer(1.0, self.tick)",
-    "self.create_timer(1.0, self.on_optional)",
-    "self.create_timer(1.0, self.anything)",
-    "self.create_timer(1.0, self.static)",
-    "self.create_timer(1.0, lambda: None)",
-    "self.create_timer(1.0, lambda topic='a': None)",
-    "self.create_timer(1.0, partial(self.on_message, None))",
-    "self.create_timer(1.0, partial(self.on_service, response=1, request=2))",
-    "self.create_timer(1.0, partial(self.on_service, *self.arguments))",
-    "self.create_timer(1.0, self.make())",
-    "self.create_timer(1.0, self.callback)",
-    "self.create_timer(1.0, getattr(self, 'on_message'))",
-    "self.create_timer(1.0, self.decorated)",
-    "self.timers.create_timer(1.0, self.on_message)",
-    "self.create_subscription(String, 'a', self.on_message, 10)",
-    "self.create_subscription(String, 'a', lambda message, info: None, 10)",
-    "self.create_subscription(String, 'a', partial(self.on_named, name='a'), 10)",
-    "self.create_service(Trigger, 'a', self.on_service)",
-    "self.create_service(Trigger, 'a', self.on_failing_service)",
-    "self.group = ReentrantCallbackGroup()\n"
-    "self.create_timer(1.0, self.tick, callback_group=self.group)",
-    "self.client.call_async(1).add_done_callback(self.on_message)",
-    "ActionServer(self, Fibonacci, 'a', self.run_goal, goal_callback=lambda request: 1)",
-    "def done(future):\n    pass\nself.future.add_done_callback(done)",
-]
 METHODS = """
 def tick(self):
     self.count = 1
@@ -88,16 +58,6 @@ def node(body: str) -> str:
     body = textwrap.indent(body, "        ")
     end = "def module_function(argument):\n    pass\n"
     return f"{IMPORTS}{start}{body}\n{textwrap.indent(METHODS, '    ')}\n{end}"
-
-
-@pytest.mark.parametrize("body", WRONG_CALLBACKS)
-def test_wrong_callbacks(body: str, tmp_path: Path) -> None:
-    check(node(body), tmp_path, "class")
-
-
-@pytest.mark.parametrize("body", RIGHT_CALLBACKS)
-def test_right_callbacks(body: str, tmp_path: Path) -> None:
-    check(node(body), tmp_path, "class")
 
 
 PARAMETERS = [

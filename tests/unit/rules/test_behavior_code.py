@@ -130,6 +130,12 @@ MISTAKES = [
         "invalid-value",
         "'success'",
     ),
+    (
+        "drive",
+        "await self.action_clients.turn.send_goal(Navigate.Goal(), on_feedback=self.turn())",
+        "handler-signature",
+        "self.turn()",
+    ),
     ("turning", "feedback.feedback", "unknown-field", "feedback"),
     ("odometry", "total += 1", "type-error", "total"),
     ("odometry", "self.scale()", "call-arguments", "()"),

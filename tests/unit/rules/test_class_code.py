@@ -103,6 +103,9 @@ class Robot(LifecycleNode):
 
     def count_up(self):
         self.count += 1
+
+    async def run(self):
+        return self.count
 """
 PLACES = ("init", "point", "reset", "tick", "accept", "goal", "stopped", "parameters", "activate")
 PLACES += ("typed_goal",)
@@ -122,6 +125,7 @@ MISTAKES = [
     ("init", "self.create_client(SetBool)", "call-arguments", "(SetBool)"),
     ("init", "self.create_timer(self.on_tick, 1.0)", "call-arguments", "self.on_tick"),
     ("init", "self.create_timer(1.0, self.count_up())", "handler-signature", "self.count_up()"),
+    ("init", "self.create_timer(1.0, callback=self.run())", "handler-signature", "self.run()"),
     ("init", "self.create_timer(1.0, self.on_tik)", "missing-attribute", "on_tik"),
     (
         "init",
