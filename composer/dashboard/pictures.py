@@ -13,7 +13,7 @@ from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
 from composer.graph.formats.svg import contents, markers
 from composer.graph.layout import Size, arrange_for_pages
-from composer.graph.scenes.scene import Scene
+from composer.graph.scene import Scene
 from composer.model import PortKind
 
 #: Stand where the page writes the state of a node and the rate of a topic, as the longest usual

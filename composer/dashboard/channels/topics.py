@@ -11,7 +11,7 @@ from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
-from composer.graph.labels import qos_facts
+from composer.graph.facts import qos_facts
 from composer.model import PortKind
 
 if TYPE_CHECKING:

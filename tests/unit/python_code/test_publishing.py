@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from composer.analysis import rates as publications
-from composer.graph.scenes import rates
+from composer.graph import publishing_rates
 from composer.model import BehaviorReference
 from composer.python_code.lookup import find_behavior
 from composer.source import Located, SourceFile, Span
@@ -33,8 +33,8 @@ def uses(body: str, folder: Path) -> Uses:
     source = find_behavior(BehaviorReference(Located("robot:Robot", PLACE), folder))
     (method,) = source.methods
     return Uses(
-        always=[*rates._unconditional(method)].count("out") == 1,
-        anywhere="self.publishers.out" in rates._names(method),
+        always=[*publishing_rates._unconditional(method)].count("out") == 1,
+        anywhere="self.publishers.out" in publishing_rates._names(method),
         passed_on=publications._passed_on(source) == {"out"},
     )
 
@@ -112,7 +112,7 @@ SYSTEM = """
 def rates_hz(folder: Path, python: str = SENDER, system: str = SYSTEM) -> dict[str, float]:
     (folder / "sender.py").write_text(dedent(python))
     (node,) = system_of(system, folder).nodes
-    return rates.publishing_rates_hz(node)
+    return publishing_rates.publishing_rates_hz(node)
 
 
 def test_the_rate_is_that_of_the_timer_whose_handler_publishes(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from composer.diagram_options import FORMATS_BY_SUFFIX, Format, View
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
-    from composer.graph.scenes.scene import Scene
+    from composer.graph.scene import Scene
     from composer.model import System
 
 EPILOGS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 
+from composer.graph.facts import timer_rate_hz
 from composer.model import Node, PortKind, Timer
 from composer.python_code.lookup import find_behavior
 from composer.python_code.nodes import published_port
@@ -12,12 +13,6 @@ from composer.python_code.syntax import Method
 
 #: Statements that may leave a method early.
 _EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)
-
-
-def timer_rate_hz(node: Node, timer: Timer) -> float | None:
-    """Return the timer's rate with the parameters the node starts with; None if unknown."""
-    period_s = node.period_s(timer)
-    return None if period_s is None else 1.0 / period_s
 
 
 def publishing_rates_hz(node: Node) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Details of nodes, ports and channels for diagrams."""
+"""What diagrams say about nodes, ports and channels: short labels, and all details."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping
 
 from composer.graph.diagram import Details
-from composer.graph.labels import qos_facts
-from composer.graph.scenes.rates import timer_rate_hz
-from composer.graph.scenes.scene import SceneChannel, SceneEndpoint
+from composer.graph.scene import SceneChannel, SceneEndpoint
 from composer.model import (
     DEFAULT_EXECUTOR,
     ChannelKind,
@@ -16,7 +14,9 @@ from composer.model import (
     Node,
     Port,
     StaticTransform,
+    Timer,
 )
+from composer.qos import PRESETS, History, QosProfile
 from composer.tree import Plain
 
 _SOURCES = {
@@ -29,6 +29,67 @@ _SINKS = {
     ChannelKind.SERVICE: "clients",
     ChannelKind.ACTION: "clients",
 }
+
+
+def short_type(interface: str) -> str:
+    """Return ``Odometry`` for ``nav_msgs/msg/Odometry``."""
+    return interface.rpartition("/")[2] or interface
+
+
+def rate(hertz: float) -> str:
+    """Return a rate such as ``10 Hz``, with three significant digits."""
+    return f"{float(f'{hertz:.3g}'):g} Hz"
+
+
+def qos_label(profile: QosProfile) -> str:
+    """Return the name of a matching preset, else the policies of the profile."""
+    for name in ("command", "sensor_data", "state"):
+        if profile == PRESETS[name]:
+            return name
+    return ", ".join([profile.reliability, profile.durability, _history(profile), *_times(profile)])
+
+
+def discovered_qos_label(profile: QosProfile) -> str:
+    """Return the policies that discovery reports, which exclude history and depth."""
+    return ", ".join([profile.reliability, profile.durability, *_times(profile)])
+
+
+def qos_facts(profile: QosProfile) -> dict[str, Plain]:
+    """Return all policies that are set, with the keys of YAML."""
+    facts: dict[str, Plain] = {
+        "reliability": profile.reliability.value,
+        "durability": profile.durability.value,
+        "history": profile.history.value,
+    }
+    if profile.history is History.KEEP_LAST:
+        facts["depth"] = profile.depth
+    facts["liveliness"] = profile.liveliness.value
+    for name in ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms"):
+        value = getattr(profile, name)
+        if value is not None:
+            facts[name] = value
+    return facts
+
+
+def _history(profile: QosProfile) -> str:
+    if profile.history is History.KEEP_ALL:
+        return "keep_all"
+    return f"keep_last {profile.depth}"
+
+
+def _times(profile: QosProfile) -> list[str]:
+    times = {
+        "deadline": profile.deadline_ms,
+        "lifespan": profile.lifespan_ms,
+        "lease": profile.liveliness_lease_duration_ms,
+    }
+    return [f"{name} {value:g} ms" for name, value in times.items() if value is not None]
+
+
+def timer_rate_hz(node: Node, timer: Timer) -> float | None:
+    """Return the timer's rate with the parameters the node starts with; None if unknown."""
+    period_s = node.period_s(timer)
+    return None if period_s is None else 1.0 / period_s
 
 
 def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:

@@ -7,16 +7,15 @@ from collections.abc import Iterator, Mapping
 
 from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 from composer.graph.diagram import Details, Problem
-from composer.graph.labels import discovered_qos_label, qos_facts
-from composer.graph.namespaces import parent_of
-from composer.graph.scenes.scene import ExecutorGroup, Scene, SceneNode, ScenePort
+from composer.graph.facts import discovered_qos_label, qos_facts
+from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort, parent_of
 from composer.model import PortKind
 from composer.tree import Plain
 
 _TITLE = "ROS graph"
 
 
-def scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
+def live_scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
     """Return the scene of a snapshot. ``rates_hz`` are measured rates by topic."""
     publishers = Counter(
         endpoint.name

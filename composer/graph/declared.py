@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from composer.analysis.frames import kind_of, topic_of
+from composer.diagnostics import Diagnostic, Severity
 from composer.drift.compare import states_after_bring_up
 from composer.fast_dataclass import dataclass
-from composer.graph.diagram import Problem, worst
-from composer.graph.labels import qos_label
-from composer.graph.scenes.diagnostics import DiagnosticIndex
-from composer.graph.scenes.facts import node_facts, port_facts, transform_facts
-from composer.graph.scenes.rates import publishing_rates_hz
-from composer.graph.scenes.scene import (
+from composer.graph.diagram import Mark, Problem, worst
+from composer.graph.facts import node_facts, port_facts, qos_label, transform_facts
+from composer.graph.publishing_rates import publishing_rates_hz
+from composer.graph.scene import (
     ExecutorGroup,
     Scene,
     SceneNode,
@@ -23,15 +22,18 @@ from composer.graph.scenes.scene import (
 )
 from composer.model import (
     DEFAULT_EXECUTOR,
+    DynamicTransform,
     Executor,
     ExecutorKind,
     ImplementationKind,
     Node,
     Port,
+    StaticTransform,
     System,
 )
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up
+from composer.source import Span
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +52,18 @@ class _BroughtUp:
         return cls(labels, states_after_bring_up(system))
 
 
-def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
-    """Return the nodes of one or several systems as one scene.
+def scene_of(systems: Sequence[System], diagnostics: Iterable[Diagnostic] = ()) -> Scene:
+    """Return the nodes of one or several systems as one scene. What has diagnostics is marked.
 
     If several nodes have the same full name, the first is drawn and marked as wrong.
     """
+    problems = _Problems(diagnostics)
     several = len(systems) > 1
     nodes: dict[str, SceneNode] = {}
     for system in systems:
         brought_up = _BroughtUp.of(system)
         for node in system.nodes:
-            scene_node = _scene_node(node, system, brought_up, diagnostics, several)
+            scene_node = _scene_node(node, system, brought_up, problems, several)
             known = nodes.get(scene_node.full_name)
             nodes[scene_node.full_name] = scene_node if known is None else _with_duplicate(known)
     return Scene(
@@ -71,7 +74,7 @@ def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
             transform
             for system in systems
             for node in system.nodes
-            for transform in _transforms(node, diagnostics)
+            for transform in _transforms(node, problems)
         ),
         executors=tuple(
             dict.fromkeys(group for system in systems for group in _groups(system, several))
@@ -80,7 +83,7 @@ def scene_of(systems: Sequence[System], diagnostics: DiagnosticIndex) -> Scene:
 
 
 def _scene_node(
-    node: Node, system: System, brought_up: _BroughtUp, diagnostics: DiagnosticIndex, several: bool
+    node: Node, system: System, brought_up: _BroughtUp, problems: _Problems, several: bool
 ) -> SceneNode:
     rates_hz = publishing_rates_hz(node)
     return SceneNode(
@@ -92,10 +95,10 @@ def _scene_node(
         steps=brought_up.steps.get(node.name.value, ""),
         executor=_executor_key(system, _executor_name(node)),
         ports=tuple(
-            _scene_port(port, rates_hz.get(port.name.value), diagnostics) for port in node.ports
+            _scene_port(port, rates_hz.get(port.name.value), problems) for port in node.ports
         ),
         details=node_facts(node, rates_hz),
-        problem=diagnostics.about_node(node),
+        problem=problems.about_node(node),
     )
 
 
@@ -117,7 +120,7 @@ def _note(node: Node, system: System, several: bool) -> str:
     return " · ".join(filter(None, (labels, kind, more, system.name.value if several else "")))
 
 
-def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex) -> ScenePort:
+def _scene_port(port: Port, rate_hz: float | None, problems: _Problems) -> ScenePort:
     return ScenePort(
         kind=port.kind,
         name=port.name.value,
@@ -126,11 +129,11 @@ def _scene_port(port: Port, rate_hz: float | None, diagnostics: DiagnosticIndex)
         qos=qos_label(port.qos.profile) if port.qos.explicit else "",
         rate_hz=rate_hz,
         details=port_facts(port, rate_hz),
-        problem=diagnostics.about_port(port),
+        problem=problems.about_port(port),
     )
 
 
-def _transforms(node: Node, diagnostics: DiagnosticIndex) -> Iterator[SceneTransform]:
+def _transforms(node: Node, problems: _Problems) -> Iterator[SceneTransform]:
     for item in node.transforms.broadcasts if node.transforms is not None else ():
         yield SceneTransform(
             topic=topic_of(node, item),
@@ -139,7 +142,7 @@ def _transforms(node: Node, diagnostics: DiagnosticIndex) -> Iterator[SceneTrans
             kind=kind_of(item),
             node=node.full_name,
             details=transform_facts(item),
-            problem=diagnostics.about_transform(item),
+            problem=problems.about_transform(item),
         )
 
 
@@ -200,3 +203,69 @@ def _kind(executor: Executor | None) -> str:
     if executor.kind is ExecutorKind.MULTI_THREADED:
         return f"{executor.kind}, {executor.threads} threads"
     return executor.kind.value
+
+
+class _Problems:
+    """Errors and warnings by location, as marks of what they are about."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self._by_place: dict[tuple[str, int, int], Problem] = {}
+        for diagnostic in diagnostics:
+            if diagnostic.severity is Severity.INFO:
+                continue
+            mark = Mark.WRONG if diagnostic.severity is Severity.ERROR else Mark.DOUBTFUL
+            problem = Problem(f"{diagnostic.rule.code} {diagnostic.message}", mark)
+            for span in (diagnostic.primary, *(label.span for label in diagnostic.related)):
+                place = _place(span)
+                self._by_place[place] = worst((self._by_place.get(place), problem)) or problem
+
+    def about_port(self, port: Port) -> Problem | None:
+        """Return the diagnostic about a port's declaration, if there is one."""
+        return self._first(_port_spans(port))
+
+    def about_node(self, node: Node) -> Problem | None:
+        """Return the diagnostic about a node itself, if there is one."""
+        return self._first(_node_spans(node))
+
+    def about_transform(self, declared: StaticTransform | DynamicTransform) -> Problem | None:
+        """Return the diagnostic about the frames of a transform, if there is one."""
+        return self._first((declared.child.span, declared.parent.span))
+
+    def _first(self, spans: Iterable[Span]) -> Problem | None:
+        return worst(self._by_place.get(_place(span)) for span in spans)
+
+
+def _place(span: Span) -> tuple[str, int, int]:
+    return (span.file.path, span.line, span.column)
+
+
+def _port_spans(port: Port) -> Iterator[Span]:
+    yield port.span
+    yield port.name.span
+    yield port.interface.span
+    yield port.ros_name.span
+    yield port.qos.span
+    for _, span in port.qos.policy_spans:
+        yield span
+
+
+def _node_spans(node: Node) -> Iterator[Span]:
+    yield node.span
+    yield node.name.span
+    yield node.namespace.span
+    if node.type_name is not None:
+        yield node.type_name.span
+    if node.behavior is not None:
+        yield node.behavior.text.span
+    if node.hosted_class is not None:
+        yield node.hosted_class.reference.text.span
+    if node.executable is not None:
+        yield from (node.executable.span, *(key.span for key in node.executable.given))
+    if node.executor is not None:
+        yield node.executor.span
+    for dependency in node.depends_on:
+        yield dependency.node.span
+    for parameter in node.parameters:
+        yield parameter.span
+        if parameter.value is not None:
+            yield parameter.value.span

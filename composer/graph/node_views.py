@@ -1,0 +1,222 @@
+"""Views of nodes: bring-up order, deployment, lifecycle states, and the frames of tf2."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from composer.graph.diagram import (
+    Cluster,
+    Details,
+    Direction,
+    Edge,
+    EdgeKind,
+    Graph,
+    Vertex,
+    VertexKind,
+    worst,
+)
+from composer.graph.scene import (
+    Namespaces,
+    Scene,
+    SceneNode,
+    SceneTransform,
+    channels,
+    node_key,
+)
+from composer.model import ChannelKind
+
+#: An arrow that stands for more names than these says how many.
+_MAX_NAMES = 3
+
+_STATES = ("unconfigured", "inactive", "active", "finalized")
+
+#: (from, transition, to): design.ros2.org/articles/node_lifecycle.html, primary states only.
+_TRANSITIONS = (
+    ("unconfigured", "configure", "inactive"),
+    ("inactive", "activate", "active"),
+    ("active", "deactivate", "inactive"),
+    ("inactive", "cleanup", "unconfigured"),
+    ("unconfigured", "shutdown", "finalized"),
+    ("inactive", "shutdown", "finalized"),
+    ("active", "shutdown", "finalized"),
+)
+
+#: A state with more nodes than these says how many more there are.
+_MAX_NODES = 24
+
+
+def node_vertex(node: SceneNode, name: str, note: str, cluster: str) -> Vertex:
+    """Return the vertex of a node, with an optional ``note`` below its name."""
+    return Vertex(
+        key=node_key(node),
+        kind=VertexKind.NODE,
+        lines=(name, note) if note else (name,),
+        cluster=cluster,
+        namespace=node.namespace,
+        details=node.details,
+        problem=node.problem,
+    )
+
+
+def lifecycle_view(scene: Scene) -> Graph:
+    """Return the bring-up order. Arrows point from a node to those that wait for it."""
+    namespaces = Namespaces(node.namespace for node in scene.nodes)
+    return Graph(
+        title=scene.title,
+        view="lifecycle",
+        direction=Direction.DOWN,
+        vertices=tuple(
+            node_vertex(
+                node,
+                node.name,
+                node.steps or "stays unconfigured",
+                namespaces.around(node.namespace),
+            )
+            for node in scene.nodes
+        ),
+        edges=tuple(
+            Edge(
+                key=f"node:{wait.waited_for} -> node:{wait.waiting} {wait.reason}",
+                source=f"node:{wait.waited_for}",
+                target=f"node:{wait.waiting}",
+                kind=EdgeKind.IMPLIED if wait.implied else EdgeKind.DEPENDENCY,
+                lines=(wait.reason,),
+            )
+            for wait in scene.waits
+        ),
+        clusters=namespaces.clusters(),
+    )
+
+
+def deployment_view(scene: Scene) -> Graph:
+    """Return the graph of executors with their nodes, and of what passes between nodes.
+
+    In a running graph, the frames are processes and hosts, and nodes have their states.
+    """
+    return Graph(
+        title=scene.title,
+        view="deployment",
+        direction=Direction.RIGHT,
+        vertices=tuple(
+            node_vertex(node, node.full_name, node.note if scene.is_live else "", node.executor)
+            for node in scene.nodes
+        ),
+        edges=tuple(_deployment_edges(scene)),
+        clusters=tuple(Cluster(group.key, group.label, group.parent) for group in scene.executors),
+    )
+
+
+def _deployment_edges(scene: Scene) -> Iterator[Edge]:
+    """Return one arrow per pair of nodes and kind of channel."""
+    names: dict[tuple[str, str, ChannelKind], dict[str, None]] = {}
+    for channel in channels(scene.nodes):
+        for source in channel.sources:
+            for sink in channel.sinks:
+                keys = (node_key(source.node), node_key(sink.node))
+                if channel.kind is not ChannelKind.TOPIC:
+                    keys = keys[::-1]
+                names.setdefault((*keys, channel.kind), {})[channel.name] = None
+    for (begin, end, kind), joined in sorted(names.items()):
+        yield Edge(
+            key=f"{begin} -> {end} {kind}",
+            source=begin,
+            target=end,
+            kind=EdgeKind(kind.value),
+            lines=_names_in_short(tuple(joined), kind),
+            details=(("carries", [*joined]),),
+        )
+
+
+def _names_in_short(names: tuple[str, ...], kind: ChannelKind) -> tuple[str, ...]:
+    if len(names) <= _MAX_NAMES:
+        return names
+    return (*names[: _MAX_NAMES - 1], f"and {len(names) - _MAX_NAMES + 1} more {kind}s")
+
+
+def states_view(scene: Scene) -> Graph:
+    """Return the state machine; each state lists the nodes that are in it."""
+    others = sorted({node.state for node in scene.nodes} - {*_STATES, ""})
+    return Graph(
+        title=scene.title,
+        view="states",
+        direction=Direction.RIGHT,
+        vertices=tuple(_state(state, scene) for state in (*_STATES, *others)),
+        edges=tuple(
+            Edge(
+                f"state:{begin} -> state:{end}",
+                f"state:{begin}",
+                f"state:{end}",
+                EdgeKind.TRANSITION,
+                (name,),
+            )
+            for begin, name, end in _TRANSITIONS
+        ),
+    )
+
+
+def _state(state: str, scene: Scene) -> Vertex:
+    nodes = [node for node in scene.nodes if node.state == state]
+    names = [node.full_name for node in nodes]
+    shown = names if len(names) <= _MAX_NODES else names[: _MAX_NODES - 1]
+    more = [f"and {len(names) - len(shown)} more"] if len(names) > len(shown) else []
+    return Vertex(
+        key=f"state:{state}",
+        kind=VertexKind.STATE,
+        lines=(state, *shown, *more),
+        details=(("nodes", [*names]),),
+        problem=worst(node.problem for node in nodes),
+    )
+
+
+def frames_view(scene: Scene) -> Graph:
+    """Return the tree of frames of tf2. Arrows point from a parent to its child."""
+    topics = tuple(dict.fromkeys(item.topic for item in scene.transforms))
+    several = len(topics) > 1
+    return Graph(
+        title=scene.title,
+        view="frames",
+        direction=Direction.DOWN,
+        vertices=tuple(_frame_vertices(scene.transforms, several=several)),
+        edges=tuple(_frame_edges(scene.transforms)),
+        clusters=tuple(Cluster(_topic_cluster(topic), topic) for topic in topics)
+        if several
+        else (),
+    )
+
+
+def _frame_vertices(transforms: tuple[SceneTransform, ...], *, several: bool) -> Iterator[Vertex]:
+    frames = dict.fromkeys(
+        (item.topic, name) for item in transforms for name in (item.parent, item.child)
+    )
+    for topic, name in frames:
+        own = [item for item in transforms if (item.topic, item.child) == (topic, name)]
+        details: Details = (("broadcast by", [item.node for item in own]),) if own else ()
+        yield Vertex(
+            key=_frame_key(topic, name),
+            kind=VertexKind.FRAME,
+            lines=(name,),
+            cluster=_topic_cluster(topic) if several else "",
+            details=details,
+        )
+
+
+def _frame_edges(transforms: tuple[SceneTransform, ...]) -> Iterator[Edge]:
+    for number, item in enumerate(transforms, 1):
+        parent, child = _frame_key(item.topic, item.parent), _frame_key(item.topic, item.child)
+        yield Edge(
+            key=f"{parent} -> {child} {number}",
+            source=parent,
+            target=child,
+            kind=EdgeKind.TRANSFORM,
+            lines=(item.node, item.kind),
+            details=(("node", item.node), ("kind", item.kind), *item.details),
+            problem=item.problem,
+        )
+
+
+def _frame_key(topic: str, frame: str) -> str:
+    return f"frame:{topic}:{frame}"
+
+
+def _topic_cluster(topic: str) -> str:
+    return f"topic:{topic}"

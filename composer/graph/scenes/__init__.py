@@ -1,1 +1,0 @@
-"""Scenes: what a diagram is about, from declared systems or from a running ROS graph."""

@@ -1,1 +1,0 @@
-"""One module per view of a system: ``build(system, diagnostics) -> Graph``."""
