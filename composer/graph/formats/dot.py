@@ -14,31 +14,22 @@ from composer.graph.diagram import (
     Vertex,
     VertexKind,
 )
-from composer.graph.formats.theme import MARK_COLORS
+from composer.graph.formats.theme import LIGHT_COLORS
 
-_VERTICES = {
-    VertexKind.NODE: 'shape=box, style="filled,rounded", fillcolor="#dbeafe", color="#1d4ed8"',
-    VertexKind.TOPIC: 'shape=ellipse, style=filled, fillcolor="#dcfce7", color="#15803d"',
-    VertexKind.SERVICE: 'shape=hexagon, style=filled, fillcolor="#ffedd5", color="#c2410c"',
-    VertexKind.ACTION: (
-        'shape=box, peripheries=2, style=filled, fillcolor="#f3e8ff", color="#7e22ce"'
-    ),
-    VertexKind.PORT: 'shape=box, style="filled,rounded", fillcolor="#f8fafc", color="#64748b"',
-    VertexKind.STATE: 'shape=box, style="filled,rounded", fillcolor="#e2e8f0", color="#475569"',
-    VertexKind.FRAME: 'shape=ellipse, style=filled, fillcolor="#fef9c3", color="#a16207"',
+_SHAPES = {
+    VertexKind.NODE: 'shape=box, style="filled,rounded"',
+    VertexKind.TOPIC: "shape=ellipse, style=filled",
+    VertexKind.SERVICE: "shape=hexagon, style=filled",
+    VertexKind.ACTION: "shape=box, peripheries=2, style=filled",
+    VertexKind.PORT: 'shape=box, style="filled,rounded"',
+    VertexKind.STATE: 'shape=box, style="filled,rounded"',
+    VertexKind.FRAME: "shape=ellipse, style=filled",
 }
-
-_EDGES = {
-    EdgeKind.TOPIC: 'color="#15803d"',
-    EdgeKind.SERVICE: 'color="#c2410c", style=dashed',
-    EdgeKind.ACTION: 'color="#7e22ce", style=bold',
-    EdgeKind.DEPENDENCY: 'color="#475569"',
-    EdgeKind.IMPLIED: 'color="#475569", style=dashed',
-    EdgeKind.TRANSITION: 'color="#475569"',
-    EdgeKind.TRANSFORM: 'color="#a16207"',
+_STROKES = {
+    EdgeKind.SERVICE: ["style=dashed"],
+    EdgeKind.ACTION: ["style=bold"],
+    EdgeKind.IMPLIED: ["style=dashed"],
 }
-
-_MARKS = {mark: f'color="{color}", penwidth=3' for mark, color in MARK_COLORS.items()}
 
 
 def render(graph: Graph) -> str:
@@ -79,13 +70,14 @@ def _frame(cluster: Cluster, graph: Graph, indent: str) -> Iterator[str]:
 
 
 def _vertex(vertex: Vertex) -> str:
-    attributes = [f"label={_label(vertex.lines)}", _VERTICES[vertex.kind]]
-    attributes += _mark(vertex.problem)
+    fill, line = LIGHT_COLORS[vertex.kind], LIGHT_COLORS[f"{vertex.kind}-line"]
+    attributes = [f"label={_label(vertex.lines)}", _SHAPES[vertex.kind]]
+    attributes += [f'fillcolor="{fill}"', f'color="{line}"', *_mark(vertex.problem)]
     return f"{_key(vertex.key)} [{', '.join(attributes)}]"
 
 
 def _edge(edge: Edge) -> str:
-    attributes = [_EDGES[edge.kind]]
+    attributes = [f'color="{LIGHT_COLORS[f"{edge.kind}-line"]}"', *_STROKES.get(edge.kind, ())]
     if edge.lines:
         attributes.append(f"label={_label(edge.lines)}")
     attributes += _mark(edge.problem)
@@ -95,7 +87,8 @@ def _edge(edge: Edge) -> str:
 def _mark(problem: Problem | None) -> list[str]:
     if problem is None:
         return []
-    return [_MARKS[problem.mark], f"tooltip={_text(problem.text)}"]
+    color = LIGHT_COLORS[problem.mark]
+    return [f'color="{color}"', "penwidth=3", f"tooltip={_text(problem.text)}"]
 
 
 def _label(lines: tuple[str, ...]) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.characters import escape_line
-from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Vertex, VertexKind
-from composer.graph.formats.theme import MARK_COLORS
+from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Mark, Vertex, VertexKind
+from composer.graph.formats.theme import LIGHT_COLORS
 
 #: Mermaid's default limits (``maxTextSize``, ``maxEdges``).
 MAX_CHARACTERS = 50_000
@@ -33,18 +33,13 @@ _ARROWS = {
     EdgeKind.TRANSFORM: "-->",
 }
 
-_MARKS = {mark: f"stroke:{color},stroke-width:3px" for mark, color in MARK_COLORS.items()}
-
-_STYLES = (
-    "classDef node fill:#dbeafe,stroke:#1d4ed8,color:#172554",
-    "classDef topic fill:#dcfce7,stroke:#15803d,color:#052e16",
-    "classDef service fill:#ffedd5,stroke:#c2410c,color:#431407",
-    "classDef action fill:#f3e8ff,stroke:#7e22ce,color:#3b0764",
-    "classDef port fill:#f8fafc,stroke:#64748b,color:#0f172a",
-    "classDef state fill:#e2e8f0,stroke:#475569,color:#0f172a",
-    "classDef coordinate_frame fill:#fef9c3,stroke:#a16207,color:#422006",
-    *(f"classDef {mark} {style}" for mark, style in _MARKS.items()),
-)
+_MARKS = {mark: f"stroke:{LIGHT_COLORS[mark]},stroke-width:3px" for mark in Mark}
+#: By the name of a class.
+_STYLES = {
+    kind.value: f"fill:{LIGHT_COLORS[kind]},stroke:{LIGHT_COLORS[f'{kind}-line']}"
+    f",color:{LIGHT_COLORS['text']}"
+    for kind in VertexKind
+} | _MARKS
 
 
 def render(graph: Graph) -> str:
@@ -66,9 +61,8 @@ def _lines(graph: Graph) -> Iterator[str]:
     yield from _inside("", graph, identifiers, "  ")
     for edge in graph.edges:
         yield f"  {_arrow(edge, identifiers)}"
-    for style in _STYLES:
-        if style.split()[1] in _classes(graph):
-            yield f"  {style}"
+    used = _classes(graph)
+    yield from (f"  classDef {name} {style}" for name, style in _STYLES.items() if name in used)
     yield from _marked_parts(graph, identifiers)
 
 

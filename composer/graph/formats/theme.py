@@ -33,10 +33,6 @@ _KINDS = {
 }
 
 
-#: On a light page, for formats without style sheets.
-MARK_COLORS = {mark: _PLAIN[mark][0] for mark in Mark}
-
-
 def colors(*, dark: bool) -> dict[str, str]:
     """Return all colors by name: ``page``, ``text``, ..., ``node`` (fill), ``node-line``."""
     side = int(dark)
@@ -44,6 +40,10 @@ def colors(*, dark: bool) -> dict[str, str]:
     for kind, both in _KINDS.items():
         found[kind], found[f"{kind}-line"] = both[side]
     return found
+
+
+#: For formats without style sheets.
+LIGHT_COLORS = colors(dark=False)
 
 
 def color_rules(color: Mapping[str, str]) -> str:
