@@ -1,9 +1,13 @@
-"""Characters that control a terminal, change the direction of text, or are invisible."""
+"""Characters that control a terminal, change the direction of text, or are invisible.
+
+And the width of text in a terminal.
+"""
 
 from __future__ import annotations
 
 import json
 import re
+import unicodedata
 
 #: For a character class of re: characters that change the direction of text or are invisible.
 INVISIBLE = "\u061c\u200b\u200e\u200f\u202a-\u202e\u2060-\u2069"
@@ -17,6 +21,12 @@ UNSAFE = (
 #: Matches a character that is unsafe in a text of several lines.
 UNSAFE_IN_LINES = re.compile(f"[{UNSAFE}\r]")
 _UNSAFE_IN_LINE = re.compile(f"[{UNSAFE}\r\n\t]")
+
+#: Control and format characters (such as bidi overrides), surrogates, private use, line separators,
+#: and spaces that look like the one that YAML accepts.
+_ESCAPED_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp", "Zs"})
+_ZERO_WIDTH_CATEGORIES = frozenset({"Mn", "Me"})
+_TAB = "    "
 
 
 def is_safe(text: str) -> bool:
@@ -37,6 +47,39 @@ def escape_line(text: str) -> str:
 def escape_json(text: str) -> str:
     """Return the JSON ``text`` with the unsafe characters of its strings escaped as in JSON."""
     return UNSAFE_IN_LINES.sub(lambda found: json.dumps(found[0])[1:-1], text)
+
+
+def visible(text: str) -> str:
+    """Return ``text`` for a terminal, with tabs as spaces and control characters escaped."""
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_visible_character(character) for character in text)
+
+
+def width(text: str) -> int:
+    """Return the width of ``visible(text)`` in terminal cells.
+
+    Wide characters take two cells (UAX #11), combining ones none.
+    """
+    shown = visible(text)
+    return len(shown) if shown.isascii() else sum(map(_cells, shown))
+
+
+def _visible_character(character: str) -> str:
+    if character == "\t":
+        return _TAB
+    if character == " " or unicodedata.category(character) not in _ESCAPED_CATEGORIES:
+        return character
+    code = ord(character)
+    if code <= 0xFF:
+        return f"\\x{code:02x}"
+    return f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"
+
+
+def _cells(character: str) -> int:
+    if unicodedata.category(character) in _ZERO_WIDTH_CATEGORIES:
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in {"W", "F"} else 1
 
 
 def _escape(found: re.Match[str]) -> str:

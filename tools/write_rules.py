@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from composer.report.rule_page import all_rules, index
+from composer.report.rules import all_rules, index
 
 PAGE = Path(__file__).parents[1] / "docs" / "rules.md"
 

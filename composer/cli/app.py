@@ -120,9 +120,9 @@ def _add(app: typer.Typer, name: str) -> None:
 
 def _print_version(requested: bool) -> None:
     if requested:
-        from composer.report.tool import tool_version
+        from composer import version
 
-        write(f"compose {tool_version()}")
+        write(f"compose {version()}")
         raise typer.Exit
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from composer import version
 from composer.dashboard.access import Access, is_loopback, new_token, read_token
 from composer.dashboard.context import Dashboard, Options
 from composer.dashboard.declared import Declared
@@ -18,7 +19,6 @@ from composer.dashboard.web.server import listen, serve
 from composer.interfaces import Interfaces
 from composer.node_types import interface_folders
 from composer.project import Project
-from composer.report.tool import tool_version
 
 PROTOCOL_VERSION = 1
 #: On a busy computer. A participant that does not leave stays in the graph of others for 20 s.
@@ -66,7 +66,7 @@ def run_dashboard(
         interfaces=interfaces,
         hello={
             "protocol": PROTOCOL_VERSION,
-            "version": tool_version(),
+            "version": version(),
             "read_only": options.read_only,
             "foxglove": options.foxglove,
             "title": _title(options, declared),

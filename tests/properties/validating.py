@@ -11,8 +11,7 @@ from composer.diagnostics import Diagnostic
 from composer.document import read_document
 from composer.interfaces import Interfaces
 from composer.loading import load_bytes
-from composer.report import github, sarif, text
-from composer.report import json as report
+from composer.report import machine, text
 from composer.resources import interfaces_folder, nodes_folder, systems_folder
 from composer.source import Span
 from composer.tree import plain
@@ -57,7 +56,7 @@ OTHERS = (
         },
     },
 )  # fmt: skip
-RENDERERS = (report.render, sarif.render, github.render, text.render)
+RENDERERS = (*machine.RENDERERS.values(), text.render)
 
 
 def contents() -> list[Any]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 
 from composer.document import parse_document, read_document
-from composer.report import json as report
+from composer.report.machine import render_json
 from composer.resources import nodes_folder, systems_folder
 from composer.schema import REPORT, SCHEMAS, check_schema, kind_of, schema
 from composer.source import SourceFile
@@ -113,7 +113,7 @@ def test_shipped_files_are_valid(ajv: Ajv) -> None:
 def test_reports_match_their_schema(ajv: Ajv) -> None:
     tree, _, diagnostics = read_document(Path("/no/such/file"))
     assert tree is None
-    assert ajv([(REPORT, json.loads(report.render(diagnostics)))]) == [[]]
+    assert ajv([(REPORT, json.loads(render_json(diagnostics)))]) == [[]]
     assert ajv([(REPORT, {"version": 1, "diagnostics": []})]) != [[]]
 
 

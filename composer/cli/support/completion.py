@@ -69,7 +69,7 @@ def complete_running_system(incomplete: str) -> list[str]:
 @silent
 def complete_rule(incomplete: str) -> list[str]:
     """Complete the code or the name of a rule."""
-    from composer.report.rule_page import all_rules
+    from composer.report.rules import all_rules
 
     rules = all_rules()
     return _starting_with(

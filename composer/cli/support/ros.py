@@ -193,7 +193,7 @@ def names_of_type(
 
 
 def _warn_of_skipped(session: Session) -> None:
-    from composer.report.display import visible
+    from composer.characters import visible
 
     for warning in session.graph.skipped.warnings():
         say(f"warning: {visible(warning)}")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
+from composer.characters import visible
 from composer.fast_dataclass import dataclass
 from composer.remote.systems.system_reports import invalid_report
-from composer.report.display import visible
 from composer.runtime.metrics.diagnostics import from_statuses
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.ros.diagnostic_arrays import read_array

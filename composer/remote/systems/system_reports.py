@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from typing import TypeAlias, TypeVar
 
+from composer.characters import visible
 from composer.fast_dataclass import dataclass
-from composer.report.display import visible
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, merged_chains
 from composer.runtime.metrics.numbers import finite, optional, whole
 from composer.runtime.ros.diagnostic_arrays import read_array

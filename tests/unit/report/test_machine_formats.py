@@ -10,9 +10,7 @@ import pytest
 from jsonschema import Draft7Validator
 
 from composer.diagnostics import Diagnostic, Label, Severity
-from composer.report import github, sarif
-from composer.report import json as json_report
-from composer.report.fingerprint import fingerprints
+from composer.report.machine import fingerprints, render_github, render_json, render_sarif
 from composer.resources import schemas_folder
 from composer.source import SourceFile, Span
 from tests.unit.support.reporting import diagnostic, rule
@@ -31,12 +29,12 @@ def test_json_matches_its_schema() -> None:
     schema = json.loads((schemas_folder() / "report.schema.json").read_text(encoding="utf-8"))
     Draft7Validator.check_schema(schema)
     for diagnostics in ([], example()):
-        report = json.loads(json_report.render(diagnostics))
+        report = json.loads(render_json(diagnostics))
         assert list(Draft7Validator(schema).iter_errors(report)) == []
 
 
 def test_json_is_complete() -> None:
-    report = json.loads(json_report.render(example()))
+    report = json.loads(render_json(example()))
     assert report["summary"] == {"errors": 2, "warnings": 0, "infos": 1}
     assert report["diagnostics"][0] == {
         "code": "RC202",
@@ -77,7 +75,7 @@ SARIF_PROPERTIES = {
 
 
 def sarif_log(diagnostics: list[Diagnostic]) -> dict[str, Any]:
-    log: dict[str, Any] = json.loads(sarif.render(diagnostics))
+    log: dict[str, Any] = json.loads(render_sarif(diagnostics))
     return log
 
 
@@ -155,7 +153,7 @@ def test_fingerprints_are_unique() -> None:
 
 
 def test_github_commands_have_the_location_and_the_message() -> None:
-    [line] = github.render(example()[:1]).splitlines()
+    [line] = render_github(example()[:1]).splitlines()
     assert line == (
         "::error file=systems/demo.yaml,line=2,endLine=2,col=24,endColumn=29,"
         "title=RC202 made-up::there is no 'relai'%0Ahint: did you mean 'relay'?"
@@ -166,7 +164,7 @@ def test_github_commands_are_escaped() -> None:
     found = diagnostic(
         TEXT, "demo", "100%\n::error::gotcha\r", path="a,line=1::b%.yaml", hint="x\x1b[2J"
     )
-    [line] = github.render([found]).splitlines()
+    [line] = render_github([found]).splitlines()
     assert "file=a%2Cline=1%3A%3Ab%25.yaml,line=1" in line
     assert "100%25\\x0a::error::gotcha\\x0d" in line
     assert "\x1b" not in line
@@ -174,5 +172,5 @@ def test_github_commands_are_escaped() -> None:
 
 def test_github_commands_follow_the_severity() -> None:
     made_by = [rule(severity) for severity in Severity]
-    lines = github.render(diagnostic("a", "a", made_by=item) for item in made_by).splitlines()
+    lines = render_github(diagnostic("a", "a", made_by=item) for item in made_by).splitlines()
     assert [line.split()[0] for line in lines] == ["::error", "::warning", "::notice"]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.diagnostics import Rule
-from composer.report.rule_page import (
+from composer.report.rules import (
     BANDS,
     all_rules,
     explain,

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from composer.loading import load
-from composer.report import sarif
+from composer.report.machine import render_sarif
 from tests.programs import require_module
 
 ROOT = Path(__file__).parents[3]
@@ -32,7 +32,7 @@ def check(log: Any) -> None:
 
 def log_of(path: Path) -> Any:
     found = load(path, shown=str(path.relative_to(ROOT))).diagnostics
-    return json.loads(sarif.render(found))
+    return json.loads(render_sarif(found))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
@@ -43,7 +43,7 @@ def test_diagnostics_match_the_schema(path: Path) -> None:
 
 
 def test_an_empty_log_matches_the_schema() -> None:
-    check(json.loads(sarif.render([])))
+    check(json.loads(render_sarif([])))
 
 
 def _in_result(change: Callable[[Any], None]) -> Any:

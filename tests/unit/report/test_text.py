@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
+from composer.characters import width
 from composer.diagnostics import Label, Severity
-from composer.report.display import width
 from composer.report.text import render, summary
 from composer.source import SourceFile, Span
 from tests.unit.support.reporting import diagnostic, rule, span_of

@@ -8,7 +8,7 @@ import pytest
 
 from composer.diagnostics import Diagnostic, Rule
 from composer.loading import load
-from composer.report.rule_page import all_rules, files_of, page_of
+from composer.report.rules import all_rules, files_of, page_of
 from composer.rules import all_checks
 
 # Examples other than system files, such as command lines, are not tested here.

@@ -381,6 +381,7 @@ def _write_image_and(
     from importlib.metadata import PackageNotFoundError
     from pathlib import PurePosixPath
 
+    from composer import DISTRIBUTION
     from composer.export.container_image import (
         CONTAINERFILE,
         IGNORED_FILES,
@@ -388,7 +389,6 @@ def _write_image_and(
         ignored_files,
     )
     from composer.export.wheel import wheel
-    from composer.report.tool import NAME
 
     if folder is None:
         write_raw("".join(map(str, files.values())))
@@ -399,7 +399,7 @@ def _write_image_and(
             hint="images are built from the files of the project",
         )
     try:
-        name, data = wheel(NAME)
+        name, data = wheel(DISTRIBUTION)
     except (OSError, PackageNotFoundError) as error:
         raise CommandError(f"cannot make a wheel of the composer: {error}") from error
     place = PurePosixPath(folder.resolve().relative_to(result.project.root).as_posix(), name)

@@ -36,7 +36,7 @@ def rule(
     Without CODE, list all rules.
     """
     from composer.diagnostics import suggestion
-    from composer.report.rule_page import all_rules, explain, find_rule
+    from composer.report.rules import all_rules, explain, find_rule
 
     rules = all_rules()
     found = None if code is None else find_rule(code, rules)

@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -173,7 +172,7 @@ def _path_hint(path: Path) -> str | None:
 
 def _listed(paths: Sequence[Path]) -> str:
     """Return the first paths, and how many more there are."""
-    from composer.report.display import visible
+    from composer.characters import visible
 
     named = ", ".join(visible(str(path)) for path in paths[:_MAX_LISTED])
     return named if len(paths) <= _MAX_LISTED else f"{named} and {len(paths) - _MAX_LISTED} more"
@@ -184,8 +183,7 @@ def _selected(
 ) -> list[Diagnostic]:
     if not select and not ignore:
         return diagnostics
-    from composer.report.rule_page import all_rules
-    from composer.report.selection import UnknownRule, select_diagnostics
+    from composer.report.rules import UnknownRule, all_rules, select_diagnostics
 
     try:
         return select_diagnostics(diagnostics, all_rules(), select, ignore)
@@ -205,8 +203,9 @@ def _print(
             _print_text(diagnostics, max_diagnostics)
         return
     # Imported on demand: the other formats are rarely used and slow to import.
-    render = import_module(f"composer.report.{output_format}").render
-    write_raw(render(diagnostics))
+    from composer.report import machine
+
+    write_raw(machine.RENDERERS[output_format](diagnostics))
 
 
 def _print_text(diagnostics: list[Diagnostic], max_diagnostics: int | None) -> None:

@@ -113,15 +113,15 @@ def _check_hosts(loaded: tuple[LoadResult, System, Path], timeout: float) -> Ite
 
 
 def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
+    from composer import version
     from composer.doctor.environment import check_environment, discovery_range
     from composer.doctor.network import check_network
     from composer.doctor.result import Level, note
     from composer.doctor.versions import check_versions
-    from composer.report.tool import tool_version
     from composer.runtime.middleware.environment import complete_environment
     from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 
-    yield from check_versions(tool_version())
+    yield from check_versions(version())
     if system is not None and system.discovery is not None:
         from composer.doctor.discovery import check_declared_discovery
         from composer.runtime.middleware.discovery import use_discovery

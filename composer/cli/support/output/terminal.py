@@ -12,9 +12,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import NoReturn, TextIO
 
-from composer.characters import escape_line, escape_lines
+from composer.characters import escape_line, escape_lines, visible, width
 from composer.cli.support.output.streams import drop
-from composer.report.display import visible, width
 
 #: The exit code that shells report after a write to a closed pipe (128 + SIGPIPE).
 CLOSED_PIPE = 141

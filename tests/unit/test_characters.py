@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.report.display import visible, width
+from composer.characters import visible, width
 
 
 @pytest.mark.parametrize(

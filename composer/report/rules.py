@@ -1,9 +1,9 @@
-"""The pages of the rules in docs/rules, their index, and text for ``compose rule``."""
+"""The rules: their pages in docs/rules, text for ``compose rule``, and which ones are selected."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import groupby
 
 import composer.document
@@ -11,7 +11,7 @@ import composer.expand
 import composer.resolve
 import composer.rules
 import composer.schema
-from composer.diagnostics import Rule, registered_rules
+from composer.diagnostics import Diagnostic, Rule, nearest, registered_rules
 from composer.fast_dataclass import dataclass
 from composer.resources import rules_folder
 
@@ -47,6 +47,42 @@ def find_rule(text: str, rules: Iterable[Rule]) -> Rule | None:
     """Return the rule with the code or name ``text``, or None."""
     name = text.casefold()
     return next((rule for rule in rules if name in {rule.code.casefold(), rule.name}), None)
+
+
+class UnknownRule(Exception):
+    """No rule has that code, code prefix or name; ``hint`` suggests a similar one."""
+
+    def __init__(self, text: str, hint: str | None) -> None:
+        super().__init__(f"no rule is named '{text}'")
+        self.hint = hint
+
+
+def select_diagnostics(
+    diagnostics: Iterable[Diagnostic],
+    rules: Collection[Rule],
+    select: Iterable[str],
+    ignore: Iterable[str],
+) -> list[Diagnostic]:
+    """Return the diagnostics of the selected rules, without those of the ignored rules.
+
+    A rule is given by its code (``RC301``), a code prefix (``RC3``) or its name. If ``select`` is
+    empty, all rules are selected. Raises UnknownRule if a text matches none of ``rules``.
+    """
+    selected, ignored = list(select), list(ignore)
+    for text in [*selected, *ignored]:
+        if not any(rule.matches(text) for rule in rules):
+            raise UnknownRule(text, _hint(text, rules))
+    return [
+        diagnostic
+        for diagnostic in diagnostics
+        if (not selected or any(diagnostic.rule.matches(text) for text in selected))
+        and not any(diagnostic.rule.matches(text) for text in ignored)
+    ]
+
+
+def _hint(text: str, rules: Iterable[Rule]) -> str | None:
+    close = nearest(text, [name for rule in rules for name in (rule.code, rule.name)])
+    return None if close is None else f"did you mean '{close}'?"
 
 
 _PAGE = re.compile(
