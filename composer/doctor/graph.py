@@ -12,7 +12,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from composer.doctor.result import CheckResult, error, note, ok, warning
+from composer.doctor import CheckResult, error, note, ok, warning
 from composer.qos import incompatibilities
 from composer.remote.graph_names import GraphNames
 from composer.remote.session import Deadline, Session

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import asyncssh
 
-from composer.doctor.result import CheckResult, Level, error
+from composer.doctor import CheckResult, Level, error
 from composer.hosts.check import connect_all
 from composer.hosts.connection import HostError, failure_of
 from composer.hosts.remote_command import python_command

@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
 
 from composer.diagnostics import nearest, shown
 from composer.drift.drift import Drift, DriftKind
-from composer.drift.endpoints import compare_endpoints, conflicting_endpoints
-from composer.drift.parameters import compare_parameters
-from composer.drift.snapshot import ObservedNode, Snapshot
-from composer.model import ExecutableKind, LifecycleKind, Node, PrimaryState, System
+from composer.drift.snapshot import ObservedEndpoint, ObservedNode, Snapshot
+from composer.model import (
+    ChannelKind,
+    ExecutableKind,
+    LifecycleKind,
+    Node,
+    Parameter,
+    Port,
+    PortKind,
+    PrimaryState,
+    System,
+)
 from composer.plan import bring_up
+from composer.qos import QosProfile
+from composer.source import Located
+from composer.tree import Plain
 
 _MANAGER = "manager"
 _NODES_HINT = "if its program creates them all, list their names under 'nodes' of the executable"
 _MANAGER_SERVICE = "is_active"
 #: States in which a node has its ports.
 _WITH_PORTS = ("inactive", "active")
+#: The policies that discovery reports for publishers and subscriptions; not history and depth.
+_DISCOVERED_POLICIES = (
+    "reliability",
+    "durability",
+    "deadline_ms",
+    "lifespan_ms",
+    "liveliness",
+    "liveliness_lease_duration_ms",
+)
+#: Policies that apply to publishers only.
+_PUBLISHERS_ONLY = ("lifespan_ms",)
 
 
 def compare(
@@ -53,11 +75,11 @@ def _differences(
         if observed is None:
             if _may_be_absent(node, state):
                 continue
-            yield _missing(node, [other for other in others if not other.is_hidden])
+            yield _missing_node(node, [other for other in others if not other.is_hidden])
         else:
             yield from _of_node(node, observed, state)
     for other in others:
-        yield from conflicting_endpoints(system, other)
+        yield from _conflicting_endpoints(system, other)
         is_expected = other.is_hidden or _is_manager(system, other)
         if not is_expected and not any(fnmatchcase(other.full_name, glob) for glob in ignored):
             yield Drift(DriftKind.EXTRA_NODE, other.full_name)
@@ -92,7 +114,7 @@ def _is_manager(system: System, other: ObservedNode) -> bool:
     )
 
 
-def _missing(node: Node, others: Sequence[ObservedNode]) -> Drift:
+def _missing_node(node: Node, others: Sequence[ObservedNode]) -> Drift:
     names = {other.full_name: other.full_name for other in others}
     by_last_part = {name.rpartition("/")[2]: name for name in names}
     close = nearest(node.full_name, names)
@@ -116,8 +138,8 @@ def _of_node(node: Node, observed: ObservedNode, state: str) -> Iterator[Drift]:
     yield from _of_state(node, observed, state)
     is_described = node.ports or node.implementation.in_process
     if is_described and (state in _WITH_PORTS or observed.state in _WITH_PORTS):
-        yield from compare_endpoints(node, observed)
-    yield from compare_parameters(node, observed)
+        yield from _of_endpoints(node, observed)
+    yield from _of_parameters(node, observed)
 
 
 def _of_state(node: Node, observed: ObservedNode, state: str) -> Iterator[Drift]:
@@ -142,3 +164,165 @@ def states_after_bring_up(system: System, autostart: PrimaryState | None = None)
     states = {node.name.value: PrimaryState.UNCONFIGURED for node in system.nodes}
     reached = bring_up(system, autostart).states_after(states)
     return {name: state.value for name, state in reached.items()}
+
+
+def _of_endpoints(node: Node, observed: ObservedNode) -> Iterator[Drift]:
+    """Yield the differences between the ports of a node and its endpoints."""
+    declared: dict[tuple[PortKind, str], list[Port]] = {}
+    for port in node.visible_ports:
+        declared.setdefault((port.kind, port.full_name), []).append(port)
+    live: dict[tuple[PortKind, str], list[ObservedEndpoint]] = {}
+    for endpoint in observed.endpoints:
+        live.setdefault((endpoint.kind, endpoint.name), []).append(endpoint)
+    extra = {key: endpoints for key, endpoints in live.items() if key not in declared}
+    for key, ports in declared.items():
+        if key not in live:
+            yield _missing_endpoint(node, ports[0], observed, extra)
+        else:
+            yield from _of_same_endpoint(node, ports, live[key])
+    for kind, name in extra:
+        yield Drift(DriftKind.EXTRA_ENDPOINT, node.full_name, f"{kind} {shown(name)}")
+
+
+def _conflicting_endpoints(system: System, other: ObservedNode) -> Iterator[Drift]:
+    """Yield the endpoints of an undeclared node that use a declared name with another type."""
+    types: dict[tuple[ChannelKind, str], Port] = {}
+    for node in system.nodes:
+        for port in node.ports:
+            types.setdefault((port.kind.channel, port.full_name), port)
+    for endpoint in other.endpoints:
+        known = types.get((endpoint.kind.channel, endpoint.name))
+        if known is not None and endpoint.type != known.interface.value:
+            yield Drift(
+                DriftKind.WRONG_TYPE,
+                other.full_name,
+                f"type of its {endpoint.kind} {endpoint.name}",
+                known.interface.value,
+                shown(endpoint.type),
+                span=known.interface.span,
+            )
+
+
+def _missing_endpoint(
+    node: Node,
+    port: Port,
+    observed: ObservedNode,
+    extra: dict[tuple[PortKind, str], list[ObservedEndpoint]],
+) -> Drift:
+    close = nearest(port.full_name, [name for kind, name in extra if kind is port.kind])
+    hint = f"it has '{shown(close)}': did you mean that?" if close is not None else ""
+    if observed.state in ("unconfigured", "finalized"):
+        hint = f"the node is {observed.state}: it has no ports"
+    return Drift(
+        DriftKind.MISSING_ENDPOINT,
+        node.full_name,
+        f"{port.kind} {port.full_name}",
+        port.interface.value,
+        hint=hint,
+        span=port.name.span,
+    )
+
+
+def _of_same_endpoint(
+    node: Node, ports: list[Port], endpoints: list[ObservedEndpoint]
+) -> Iterator[Drift]:
+    port = ports[0]
+    subject = f"{port.kind} {port.full_name}"
+    others = [endpoint for endpoint in endpoints if endpoint.type != port.interface.value]
+    for endpoint in others:
+        yield Drift(
+            DriftKind.WRONG_TYPE,
+            node.full_name,
+            f"type of {subject}",
+            port.interface.value,
+            shown(endpoint.type),
+            span=port.interface.span,
+        )
+    profiles = [each.qos.profile for each in ports]
+    for endpoint in endpoints:
+        if (
+            endpoint not in others
+            and endpoint.qos is not None
+            and not _matches_any(endpoint.qos, profiles, port.kind)
+        ):
+            yield from _qos_differences(node, port, subject, endpoint.qos)
+
+
+def _matches_any(live: QosProfile, declared: list[QosProfile], kind: PortKind) -> bool:
+    """Return whether the live profile matches one of the declared profiles."""
+    return any(not _differing(live, profile, kind) for profile in declared)
+
+
+def _differing(live: QosProfile, declared: QosProfile, kind: PortKind) -> list[str]:
+    return [
+        policy
+        for policy in _DISCOVERED_POLICIES
+        if getattr(live, policy) != getattr(declared, policy)
+        and not (policy in _PUBLISHERS_ONLY and kind is not PortKind.PUBLISHER)
+    ]
+
+
+def _qos_differences(node: Node, port: Port, subject: str, live: QosProfile) -> Iterator[Drift]:
+    for policy in _differing(live, port.qos.profile, port.kind):
+        yield Drift(
+            DriftKind.WRONG_QOS,
+            node.full_name,
+            f"{policy} of {subject}",
+            _format(getattr(port.qos.profile, policy)),
+            _format(getattr(live, policy)),
+            span=port.qos.policy_span(policy),
+        )
+
+
+def _format(value: object) -> str:
+    if value is None:
+        return "no limit"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _of_parameters(node: Node, observed: ObservedNode) -> Iterator[Drift]:
+    """Yield the declared parameters that the node does not have, and those with another value.
+
+    Further parameters of the node, such as ``use_sim_time``, are ignored.
+    """
+    declared = _with_values(node.parameters)
+    if observed.parameters is None:
+        if declared:
+            yield Drift(DriftKind.NO_ANSWER, node.full_name, "parameters", span=node.name.span)
+        return
+    names = {parameter.name.value for parameter, _ in declared}
+    for parameter, value in declared + _with_values(node.undeclared_parameters):
+        name = parameter.name.value
+        subject = f"parameter {name}"
+        if name in observed.parameters:
+            live = observed.parameters[name]
+            if not _same(value.value, live):
+                yield Drift(
+                    DriftKind.WRONG_PARAMETER,
+                    node.full_name,
+                    subject,
+                    shown(value.value),
+                    shown(live),
+                    span=value.span,
+                )
+        elif name in names:
+            yield Drift(
+                DriftKind.MISSING_PARAMETER,
+                node.full_name,
+                subject,
+                shown(value.value),
+                span=parameter.name.span,
+            )
+
+
+def _with_values(parameters: Iterable[Parameter]) -> list[tuple[Parameter, Located[Plain]]]:
+    return [(item, item.value) for item in parameters if item.value is not None]
+
+
+def _same(declared: object, live: object) -> bool:
+    """Return whether two values are equal in ROS: true is not 1, but 1 is 1.0."""
+    if isinstance(declared, list) and isinstance(live, list):
+        return len(declared) == len(live) and all(map(_same, declared, live))
+    if isinstance(declared, bool) or isinstance(live, bool):
+        return declared is live
+    return declared == live

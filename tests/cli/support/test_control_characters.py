@@ -19,7 +19,7 @@ from composer.cli.commands.systems import ps
 from composer.cli.support.output.progress import Progress
 from composer.cli.support.output.results import as_json, as_yaml, print_names
 from composer.cli.support.output.terminal import columns, lines, say, write
-from composer.doctor.result import warning
+from composer.doctor import warning
 from composer.drift.drift import Drift, DriftKind
 from composer.model import LogLevel
 from composer.runtime.supervision.events import Logged, Stopping

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from composer.doctor.discovery import check_declared_discovery
-from composer.doctor.environment import check_environment, discovery_range
-from composer.doctor.interfaces import check_interfaces
-from composer.doctor.network import check_network
-from composer.doctor.result import CheckResult, Level
-from composer.doctor.versions import check_rclpy
+from composer.doctor import CheckResult, Level
+from composer.doctor.installation import (
+    check_environment,
+    check_interfaces,
+    check_rclpy,
+    discovery_range,
+)
+from composer.doctor.network import check_declared_discovery, check_network
 from composer.interfaces import Interfaces
 from composer.model import Discovery, DiscoveryKind, Host
 from composer.source import Located, SourceFile, Span

@@ -27,7 +27,7 @@ from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import ShowWarnings, complete_system, runnable_system
 
 if TYPE_CHECKING:
-    from composer.doctor.result import CheckResult, Level
+    from composer.doctor import CheckResult, Level
     from composer.loading import LoadResult
     from composer.model import System
 
@@ -74,7 +74,7 @@ def doctor(
 
     Exit code 1 if there are errors, or warnings with --strict.
     """
-    from composer.doctor.result import Level
+    from composer.doctor import Level
 
     if hosts:
         if system is None:
@@ -113,19 +113,20 @@ def _check_hosts(loaded: tuple[LoadResult, System, Path], timeout: float) -> Ite
 
 
 def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
-    from composer import version
-    from composer.doctor.environment import check_environment, discovery_range
-    from composer.doctor.network import check_network
-    from composer.doctor.result import Level, note
-    from composer.doctor.versions import check_versions
+    from composer.doctor import Level, note
+    from composer.doctor.installation import (
+        check_environment,
+        check_security,
+        check_versions,
+        discovery_range,
+    )
+    from composer.doctor.network import check_declared_discovery, check_network
+    from composer.runtime.middleware.discovery import use_discovery
     from composer.runtime.middleware.environment import complete_environment
     from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 
-    yield from check_versions(version())
+    yield from check_versions()
     if system is not None and system.discovery is not None:
-        from composer.doctor.discovery import check_declared_discovery
-        from composer.runtime.middleware.discovery import use_discovery
-
         yield from check_declared_discovery(system.discovery, os.environ)
         use_discovery(system.discovery, os.environ)
     variables = dict(os.environ)
@@ -145,8 +146,6 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
     elif find_spec("rclpy") is None:
         yield note("graph", "not checked: rclpy is not installed", _RETRY)
     else:
-        from composer.doctor.security import check_security
-
         with _started_server(system):
             yield from _check_live_graph(timeout)
         yield check_security(variables)
@@ -154,7 +153,7 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
 
 def _started_server(system: System | None) -> AbstractContextManager[None]:
     """Return a block with the discovery server that 'compose run' would start."""
-    from composer.doctor.discovery import starts_server
+    from composer.doctor.network import starts_server
     from composer.runtime.children.discovery_server import discovery_servers
 
     discovery = None if system is None else system.discovery
@@ -165,7 +164,7 @@ def _started_server(system: System | None) -> AbstractContextManager[None]:
 
 def _check_interfaces(system: System | None) -> Iterator[CheckResult]:
     """Check the interface packages of the project, and those that the system uses."""
-    from composer.doctor.interfaces import check_interfaces
+    from composer.doctor.installation import check_interfaces
     from composer.interfaces import Interfaces
     from composer.interfaces.sources import find_packages
     from composer.node_types import interface_folders
@@ -182,7 +181,7 @@ def _check_interfaces(system: System | None) -> Iterator[CheckResult]:
 
 
 def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
-    from composer.doctor.result import error
+    from composer.doctor import error
 
     try:
         with ros_session("compose doctor", timeout, carries_messages=True) as (session, deadline):
