@@ -67,10 +67,13 @@ def make_command(
 
 
 def _names(node: Node) -> Iterator[str]:
-    """Yield the arguments for the name and the namespace that the program does not keep."""
+    """Yield the arguments for the name and the namespace that the program does not keep.
+
+    In ``/``, nodes keep namespaces that the program gives them, as with ``ros2 run``.
+    """
     if not node.keeps_names:
         yield from ("-r", f"__node:={node.ros_name.value}")
-    if not node.keeps_names or node.namespace.value != "/":
+    if node.namespace.value != "/":
         yield from ("-r", f"__ns:={node.namespace.value}")
 
 

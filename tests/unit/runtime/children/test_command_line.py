@@ -77,6 +77,26 @@ def test_command(tmp_path: Path) -> None:
     assert command.environment["PATH"] == f"{Path(sys.executable).parent}:/usr/bin"
 
 
+@pytest.mark.parametrize(
+    ("nodes", "namespace", "names"),
+    [
+        ("", "", ["__node:=driver"]),
+        ("", ", namespace: left", ["__node:=driver", "__ns:=/left"]),
+        (", nodes: [base]", "", []),
+        (", nodes: [base]", ", namespace: left", ["__ns:=/left"]),
+    ],
+)
+def test_names_that_the_system_gives_to_a_program(
+    tmp_path: Path, nodes: str, namespace: str, names: list[str]
+) -> None:
+    driver = f"executable: {{command: [sh]{nodes}}}{namespace}"
+    text = f"{{system: robot, nodes: {{driver: {{{driver}}}}}}}"
+    node = system_of(text, tmp_path).nodes[0]
+    assert node.executable is not None
+    words = make_command(node, node.executable, LogLevel.WARN, {"PATH": "/bin:/usr/bin"}).words
+    assert [word for word in words if word.startswith("__")] == names
+
+
 def test_remappings(tmp_path: Path) -> None:
     node = system_of(SYSTEM, tmp_path).nodes[0]
     parts = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
