@@ -20,8 +20,8 @@ from rclpy.subscription import Subscription
 from composer.qos import QosProfile
 from composer.remote.messages.values import class_of
 from composer.remote.session import Deadline, Session
-from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.loop import Taken
+from composer.runtime.executors.entities.sources import Taken
+from composer.runtime.executors.loop import Loop
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.ros_graph.changes import GraphChanges
 
@@ -57,7 +57,7 @@ class SharedSession(Session):
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
-        self._loop = EventLoop("messages", _log_exception)
+        self._loop = Loop("messages", _log_exception)
         self._loop.start()
         self._thread = threading.Thread(target=self._spin, name="ros session", daemon=True)
         self._thread.start()

@@ -38,7 +38,7 @@ from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import PROGRAM_LOGGER, join
 from composer.plan import Fault, Plan
 from composer.runtime.children.discovery_server import discovery_servers
-from composer.runtime.executors.process_limits import (
+from composer.runtime.executors.placement import (
     memory_excess,
     place_process,
     switch_threads_sooner,

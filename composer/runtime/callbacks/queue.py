@@ -135,6 +135,7 @@ class ReentrantQueue(CallbackQueue[T]):
 
     def put(self, item: T) -> None:
         """Work on ``item`` at once."""
+        self._context.loop.overlap()
         coroutine = self._work(item)
         if coroutine is not None:
             self._context.spawn(coroutine)

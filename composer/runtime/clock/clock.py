@@ -17,7 +17,8 @@ from rclpy.time_source import USE_SIM_TIME_NAME
 
 from composer.runtime.clock.sim_time import UNKNOWN, SimTimeSource
 from composer.runtime.clock.sim_timers import SimTimers
-from composer.runtime.executors.loop import Loop, TimerHandle
+from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.tasks import TimerHandle
 
 
 class NodeTime:

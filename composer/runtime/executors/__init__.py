@@ -1,1 +1,1 @@
-"""Event loops: the composer's own scheduler and rclpy's executors behind one interface."""
+"""Event loops: one scheduler for executors of all kinds, on one thread or on several."""

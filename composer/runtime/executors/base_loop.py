@@ -1,4 +1,4 @@
-"""What loops of every kind share: tasks, timers, calls from other threads and error reports."""
+"""Tasks, timers, calls from other threads and error reports of a loop."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from collections.abc import Callable, Coroutine
 from time import monotonic
 from typing import Any, Generic, TypeVar, cast
 
-from composer.runtime.executors.futures import Future
-from composer.runtime.executors.loop import Awaited, ExceptionHandler
+from composer.runtime.executors.futures import Awaited, Future
 from composer.runtime.executors.stacks import format_stacks
-from composer.runtime.executors.tasks import Task, name_of
+from composer.runtime.executors.tasks import Report, Task, name_of
 from composer.runtime.executors.timer_queue import ScheduledCall
 
 T = TypeVar("T")
@@ -26,13 +25,18 @@ PAUSE_AFTER_FAULT_S = 0.01  # a permanent fault must not fill the log within a s
 
 
 class BaseLoop(ABC):
-    """A :class:`~composer.runtime.executors.loop.Loop`, except how it waits for entities."""
+    """The part of a loop that does not depend on how it waits and on which threads it calls.
 
-    def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
+    Methods may be called from any thread.
+    """
+
+    def __init__(self, name: str, on_exception: Report) -> None:
         self._name = name
         self._on_exception = on_exception
         self._tasks: set[Task[Any]] = set()
         self._waits: set[threading.Event] = set()
+        #: Makes a step of a task.
+        self._step_soon: Callable[[Callable[[], object]], None] = self.call_soon
         self._stopping = False
         self._stopped = False
 
@@ -70,8 +74,12 @@ class BaseLoop(ABC):
         return self._schedule(ScheduledCall(monotonic() + period_s, period_s, callback))
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; return the future of its result. Canceling the future closes it."""
-        task = Task(coroutine, self.call_soon, self.report, self._tasks.discard)
+        """Run a coroutine; return the future of its result.
+
+        Canceling the future throws ``Cancelled`` into the coroutine where it awaits. An exception
+        that is never retrieved from the future is reported.
+        """
+        task = Task(coroutine, self._step_soon, self.report, self._tasks.discard)
         self._tasks.add(task)
         future = task.start()
         if self._stopped:
@@ -81,8 +89,8 @@ class BaseLoop(ABC):
     def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
         """Call ``function`` on the loop and wait for it; on the loop itself, call it at once.
 
-        Raises what ``function`` raises; TimeoutError if it takes longer, after which it is not
-        started; and RuntimeError if the loop has stopped.
+        Raises what ``function`` raises; TimeoutError with the loop's stack if it takes longer,
+        after which it is not started; and RuntimeError if the loop has stopped.
         """
         if self.is_current():
             return function()
@@ -106,18 +114,6 @@ class BaseLoop(ABC):
         """Let all waits return; the loop is stopping."""
         for done in tuple(self._waits):
             done.set()
-
-    def begin_blocking(self, *, expected: bool) -> Any:  # noqa: ARG002  for event loops
-        """Begin a call of code that may block; return what :meth:`end_blocking` needs."""
-        return None
-
-    def end_blocking(self, began: Any) -> bool:  # noqa: ARG002  for event loops
-        """End a call of code that may block; return whether it has blocked."""
-        return False
-
-    def hand_over_blocked(self) -> bool:
-        """Let another thread serve the loop if a call that began to block has not ended."""
-        return False
 
     def current_stack(self) -> str:
         """Return the Python stacks of the callbacks that run now; empty if none does."""

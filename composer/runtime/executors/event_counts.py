@@ -15,9 +15,8 @@ from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from composer.runtime.executors.entities.readiness import EVENT, Signal
-from composer.runtime.executors.entities.source_group import SourceGroup
-from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.entities.readiness import EVENT, Signal, SourceGroup
+from composer.runtime.executors.loop import Loop
 
 
 class EventCounts:
@@ -27,7 +26,7 @@ class EventCounts:
     destroyed. Every method raises rclpy's UnsupportedEventTypeError.
     """
 
-    def __init__(self, loop: EventLoop) -> None:
+    def __init__(self, loop: Loop) -> None:
         """``loop`` makes the calls, whatever loops the nodes have."""
         self._loop = loop
 

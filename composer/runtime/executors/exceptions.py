@@ -12,7 +12,11 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.logging import get_logger
+
+from composer.names import PROGRAM_LOGGER
 from composer.runtime.executors.stacks import calls_user_code, is_internal
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 #: The longest texts, in characters.
 _LINE_LENGTH = 1000
@@ -22,6 +26,8 @@ _TRACEBACK_LENGTH = 20_000
 BEHAVIOR_PACKAGE = "_composer_behavior_"
 #: What Python puts before the names of the exceptions that these modules define.
 _IN_PACKAGE = re.compile(rf"\b{BEHAVIOR_PACKAGE}[0-9a-f]+\.")
+
+_LOGGED = RepeatLimit()
 
 
 def describe(error: BaseException) -> str:
@@ -68,6 +74,14 @@ def printable(text: object) -> str:
     if type(text) is str and text.isascii():
         return text
     return _plain(str(text))
+
+
+def log_exception(what: str, error: BaseException) -> None:
+    """Log an exception that left a callback, at most once a second for each ``what``."""
+    admission = _LOGGED.admit(what)
+    if admission is not None:
+        text = internal_report_of(error) if admission.is_first else describe(error)
+        get_logger(PROGRAM_LOGGER).error(f"{what}: {text}{admission.suffix}")
 
 
 def is_closing(error: BaseException) -> bool:

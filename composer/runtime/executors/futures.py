@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 T = TypeVar("T")
+
+
+class Awaited(Protocol):
+    """A future of rclpy or of this package, as far as a loop waits for it."""
+
+    def done(self) -> bool:
+        """Return whether it has a result or an exception."""
+
+    def add_done_callback(self, callback: Callable[[Any], object]) -> object:
+        """Call ``callback`` once it is done."""
 
 
 class Cancelled(BaseException):

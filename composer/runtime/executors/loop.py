@@ -1,80 +1,64 @@
-"""The interface between nodes and the loops that call their callbacks.
-
-Nodes know a :class:`Loop` but no executor. There are two kinds: the composer's own event loop, and
-rclpy's wait-set executors.
-"""
+"""The loop of an executor: calls, timers, tasks, and the ROS entities that it serves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
-from typing import Any, Protocol, TypeVar
+import inspect
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.client import Client
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+from rclpy.task import Future as RclpyFuture
 
-from composer.runtime.executors.futures import Future
-
-T = TypeVar("T")
-
-#: Called with (what was running, the exception). The loop reports it and continues.
-ExceptionHandler = Callable[[str, BaseException], None]
-
-
-class Awaited(Protocol):
-    """A future of rclpy or of the composer, as far as a loop waits for it."""
-
-    def done(self) -> bool:
-        """Return whether it has a result or an exception."""
-
-    def add_done_callback(self, callback: Callable[[Any], object]) -> object:
-        """Call ``callback`` once it is done."""
-
-
-class Reply(Protocol):
-    """Ends one request, once."""
-
-    def __call__(self, response: Any, /) -> None:
-        """Send the response."""
-
-    def refuse(self, error: BaseException) -> None:
-        """Send no response; a caller in this process gets the error."""
+from composer.model import ExecutorKind
+from composer.runtime.executors.entities.actions import ActionSource, contain_exceptions
+from composer.runtime.executors.entities.readiness import EntitySource, SourceGroup
+from composer.runtime.executors.entities.sources import (
+    ClientSource,
+    Reply,
+    ServiceSource,
+    SubscriptionSource,
+    Taken,
+    is_implicit,
+    source_of,
+)
+from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.scheduler import Scheduler
+from composer.runtime.executors.tasks import Report, TaskRunner, name_of
 
 
-#: A message and the middleware's information about it.
-Taken = tuple[Any, Any]
-
-
-def unused_callback(_: Any, response: Any) -> Any:
-    """Satisfy rclpy, which requires a service callback; the loop calls another one."""
-    return response
-
-
-class TimerHandle(Protocol):
-    """A scheduled call. Canceling it twice is harmless."""
-
-    @property
-    def late_s(self) -> float:
-        """How long ago the call was due, in seconds. Valid during the call."""
-
-    def cancel(self) -> None:
-        """Never call again."""
-
-
-class Loop(Protocol):
-    """Calls callbacks on one or several threads. Methods may be called from any thread.
+class Loop(Scheduler):
+    """Calls callbacks on one thread at a time, or on several. Any thread may call its methods.
 
     An exception of a callback, SystemExit and KeyboardInterrupt included, goes to the exception
     handler with the callback's name, and the loop continues. An entity is served from when it is
     added, including what it received before, until it is removed.
     """
 
-    @property
-    def name(self) -> str:
-        """The name of the executor in YAML."""
+    def __init__(
+        self,
+        name: str,
+        on_exception: Report = log_exception,
+        kind: ExecutorKind = ExecutorKind.EVENTS,
+        threads: int = 1,
+    ) -> None:
+        """Create a loop, not started, for an executor of this name in YAML.
+
+        ``threads`` counts for ``multi_threaded`` only. rclpy must be initialized.
+        """
+        super().__init__(name, on_exception, kind, threads)
+        self._group_of: dict[object, SourceGroup] = {}  # by the entity that was added
+        self._nodes: dict[Node, _ImplicitEntities] = {}
+        self._executor = NodeExecutor(self, lambda: None)
+        # rcl has one callback per entity, so two threads must not add it to two groups.
+        self._changing = threading.RLock()
 
     def add_node(self, node: Node) -> None:
         """Serve the entities that rclpy creates for a node: parameter and logger services.
@@ -82,14 +66,23 @@ class Loop(Protocol):
         Everything the node has now is served by its own callbacks. Of what it gets later, only the
         simulated clock and QoS events are served; other entities must be added.
         """
+        with self._changing:
+            self._nodes[node] = _ImplicitEntities(self, node, self._changing)
 
     def remove_node(self, node: Node) -> None:
         """Stop serving the node and all its entities. Call it before the node is destroyed."""
+        with self._changing:
+            entities = self._nodes.pop(node, None)
+            if entities is not None:
+                entities.close()
+            for entity in _entities_of(node):
+                self.remove(entity)
 
     def add_subscription(
         self, subscription: Subscription, callback: Callable[[Taken], None]
     ) -> None:
         """Call ``callback((message, information))`` for each message."""
+        self._serve(subscription, SubscriptionSource(subscription, callback))
 
     def add_service(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
         """Call ``callback(request, reply)``; ``reply(response)`` responds, now or later.
@@ -97,86 +90,144 @@ class Loop(Protocol):
         If ``callback`` raises, the client gets an empty response. ``reply`` raises TypeError for
         another type than the service's response, RuntimeError if there was a response already.
         """
+        self._serve(service, ServiceSource(service, callback))
 
     def add_client(self, client: Client) -> None:
         """Complete the futures of ``client.call_async``."""
+        self._serve(client, ClientSource(client, self._executor))
 
     def add_action_server(self, server: ActionServer) -> None:
         """Handle the server's goal, cancel and result requests.
 
         If one of its callbacks raises, the goal is rejected or aborted, the cancellation rejected.
         """
+        contain_exceptions(server, self.report)
+        self._serve(server, ActionSource(server, self._executor, self))
 
     def add_action_client(self, client: ActionClient) -> None:
         """Complete the futures of the client and deliver its feedback."""
+        self._serve(client, ActionSource(client, self._executor, self))
 
     def remove(self, entity: object) -> None:
         """Stop serving an entity. Call it before the entity is destroyed."""
+        with self._changing:
+            group = self._group_of.pop(entity, None)
+            if group is not None:
+                self.remove_group(group)
 
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the loop as soon as it is free."""
+    def implicit_source(self, entity: object) -> EntitySource | None:
+        """Return the source of an entity that rclpy created, or None if it needs none."""
+        return source_of(entity, self._executor, self.run_task)
 
-    def call_later(self, delay_s: float, callback: Callable[[], object]) -> TimerHandle:
-        """Call ``callback`` once, ``delay_s`` seconds from now."""
+    def _serve(self, entity: object, source: EntitySource) -> None:
+        with self._changing:
+            self.remove(entity)
+            for entities in self._nodes.values():
+                entities.discard(entity)
+            self._group_of[entity] = self.add_group(source)
 
-    def call_every(self, period_s: float, callback: Callable[[], object]) -> TimerHandle:
-        """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next."""
 
-    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; return the future of its result.
+class _ImplicitEntities:
+    """The entities of a node that were not added explicitly, served as one group.
 
-        Canceling the future throws ``Cancelled`` into the coroutine where it awaits. An exception
-        that is never retrieved from the future is reported.
+    All are rarely used. A file descriptor for each would be thousands in a large system.
+    """
+
+    def __init__(self, loop: Loop, node: Any, changing: threading.RLock) -> None:
+        self._loop = loop
+        self._node = node
+        self._changing = changing
+        self._group = loop.add_group()
+        self._sources: dict[object, EntitySource] = {}
+        self._update_pending = False
+        self._closed = False
+        self._executor = NodeExecutor(loop, self._update_soon)  # the node refers to it weakly
+        node.executor = self._executor
+        for entity in _entities_of(node):
+            self._add(entity)
+
+    def discard(self, entity: object) -> None:
+        """Stop serving an entity: it was destroyed, or added explicitly."""
+        source = self._sources.pop(entity, None)
+        if source is not None:
+            self._group.discard(source)
+
+    def close(self) -> None:
+        """Stop serving the node."""
+        self._closed = True
+        self._node.executor = None
+        self._sources.clear()
+        self._loop.remove_group(self._group)
+
+    def _update_soon(self) -> None:
+        if not self._update_pending:
+            self._update_pending = True
+            self._loop.call_soon(self._update)
+
+    def _update(self) -> None:
+        """Follow the entities that were created or destroyed meanwhile."""
+        with self._changing:
+            self._update_pending = False
+            if self._closed:
+                return
+            present = _entities_of(self._node)
+            for destroyed in self._sources.keys() - set(present):
+                self.discard(destroyed)
+            for entity in filter(is_implicit, present):
+                self._add(entity)
+
+    def _add(self, entity: object) -> None:
+        source = None if entity in self._sources else self._loop.implicit_source(entity)
+        if source is None:
+            return
+        try:
+            self._group.add(source)
+        except InvalidHandle:
+            return  # destroyed meanwhile
+        self._sources[entity] = source
+
+
+def _entities_of(node: Any) -> list[object]:
+    return [*node.subscriptions, *node.services, *node.clients, *node.waitables]
+
+
+class NodeExecutor:
+    """``node.executor``: the part of ``rclpy.executors.Executor`` that rclpy's own code uses.
+
+    An ActionServer runs goals by ``create_task``, rclpy's futures their done callbacks. A node
+    calls ``wake`` when one of its entities was created or destroyed.
+    """
+
+    def __init__(self, loop: TaskRunner, on_wake: Callable[[], None]) -> None:
+        self._loop = loop
+        self._on_wake = on_wake
+
+    def create_task(self, callback: Callable[..., Any], *args: Any, **kwargs: Any) -> RclpyFuture:
+        """Call ``callback``, plain or ``async def``, on the loop; return the future of its result.
+
+        An exception goes to the loop's handler.
         """
+        outcome = RclpyFuture()
 
-    def run(self, function: Callable[[], T], timeout_s: float | None = None) -> T:
-        """Call ``function`` on the loop and wait for it; on the loop itself, call it at once.
+        def call() -> None:
+            outcome.set_result(callback(*args, **kwargs))
 
-        Raises what ``function`` raises; TimeoutError with the loop's stack if it takes longer,
-        after which it is not started; and RuntimeError if the loop has stopped.
-        """
+        async def run() -> None:
+            outcome.set_result(await callback(*args, **kwargs))
 
-    def is_current(self) -> bool:
-        """Return whether the calling thread is in a callback of the loop."""
+        call.__qualname__ = run.__qualname__ = name_of(callback)
+        if inspect.iscoroutinefunction(callback):
+            self._loop.call_soon(partial(self._loop.run_task, run()))
+        else:
+            self._loop.call_soon(call)
+        return outcome
 
-    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
-        """Block until ``future`` is done; return false if that takes longer, or the loop stops.
+    def wake(self) -> None:
+        """Check the node's entities soon."""
+        self._on_wake()
 
-        An event loop gives itself another thread meanwhile. A thread of another loop only blocks,
-        so that its other threads have to complete the future.
-        """
+    def add_node(self, node: object) -> None:
+        """Do nothing: nodes are added by ``Loop.add_node``."""
 
-    def begin_blocking(self, *, expected: bool) -> Any:
-        """Begin a call of code that may block; return what :meth:`end_blocking` needs.
-
-        If it is ``expected`` to block, another thread serves an event loop at once.
-        """
-
-    def end_blocking(self, began: Any) -> bool:
-        """End a call of code that may block; return whether it has blocked."""
-
-    def hand_over_blocked(self) -> bool:
-        """Let another thread serve an event loop if a call that began to block has not ended.
-
-        It is called periodically: a call that has begun before the last time blocks. Returns
-        whether there is a call that may.
-        """
-
-    def start(self) -> None:
-        """Start the threads of the loop."""
-
-    def native_thread_ids(self) -> tuple[int, ...]:
-        """Return Linux's ids of all threads of the loop, once it was started."""
-
-    def stop(self, timeout_s: float) -> bool:
-        """Stop the threads; return false if a callback did not return in time.
-
-        Tasks are canceled and get a moment to clean up. On the loop itself, this requests the stop
-        and returns false.
-        """
-
-    def current_stack(self) -> str:
-        """Return the Python stacks of the callbacks that run now; empty if none does."""
-
-    def busy_threads(self) -> tuple[int, ...]:
-        """Return the identifiers of the threads that are in a callback now."""
+    def remove_node(self, node: object) -> None:
+        """Do nothing: nodes are removed by ``Loop.remove_node``."""

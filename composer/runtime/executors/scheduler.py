@@ -15,11 +15,11 @@ from functools import partial
 from math import inf
 from time import monotonic, sleep
 
+from composer.model import ExecutorKind
 from composer.runtime.executors.base_loop import BUSY_S, YIELD_S
-from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
-from composer.runtime.executors.loop import ExceptionHandler
+from composer.runtime.executors.entities.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.poller import Poller
-from composer.runtime.executors.tasks import name_of
+from composer.runtime.executors.tasks import Report, name_of
 from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
 from composer.runtime.executors.turns import Turn, TurnTaking
 
@@ -31,8 +31,8 @@ _MAX_FINAL_ROUNDS = 64  # of calls that other calls cause at shutdown
 class Scheduler(TurnTaking):
     """Runs calls, timers, tasks and groups of sources. It runs once: start, then stop."""
 
-    def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
-        super().__init__(name, on_exception)
+    def __init__(self, name: str, on_exception: Report, kind: ExecutorKind, threads: int) -> None:
+        super().__init__(name, on_exception, kind, threads)
         self._poller = Poller()
         self._timers = TimerQueue()
         self._calls: deque[Callable[[], object]] = deque()
@@ -40,6 +40,7 @@ class Scheduler(TurnTaking):
         self._groups: dict[int, SourceGroup] = {}  # by the file descriptor of their signal
         self._timer: ScheduledCall | None = None  # whose callback is being called
         self._sleeping = False
+        self._yield_at_s = inf  # not known yet
 
     def call_soon(self, callback: Callable[[], object]) -> None:
         """Call ``callback`` on the loop as soon as it is free."""
@@ -76,12 +77,11 @@ class Scheduler(TurnTaking):
     def _leave_call(self) -> None:
         """Serve the timer or the group again whose callback is being called."""
         self._end_timer()
-        running = self._running
-        for group in list(self._groups.values()):
-            if running in group.sources:
-                group.due = max(0, group.due - 1)  # the item that was taken
-                if group.due:
-                    self._ready.append(group)
+        group = self._running
+        if isinstance(group, SourceGroup):
+            group.due = max(0, group.due - 1)  # the item that was taken
+            if group.due:
+                self._ready.append(group)
 
     def _recover(self) -> None:
         self._ready.clear()  # one group may have been in neither list
@@ -97,7 +97,6 @@ class Scheduler(TurnTaking):
         """Serve calls, timers and groups until another thread has the turn or the loop stops."""
         timers, calls, poller = self._timers, self._calls, self._poller
         groups, ready = self._groups, self._ready
-        yield_at_s = inf  # not known yet
         while self._turn is turn and not self._stopping:
             now_s = monotonic()
             if now_s >= timers.next_s:
@@ -107,10 +106,10 @@ class Scheduler(TurnTaking):
             if self._turn is not turn:
                 return
             if calls or ready:
-                yield_at_s = _yield_if_due(yield_at_s, now_s)
+                self._yield_at_s = _yield_if_due(self._yield_at_s, now_s)
                 signaled = poller.poll()
             else:
-                yield_at_s = inf
+                self._yield_at_s = inf
                 self._sleeping = True
                 # Check again: a call may have been added before ``_sleeping`` was set.
                 is_idle = not (calls or self._stopping)
@@ -164,10 +163,9 @@ class Scheduler(TurnTaking):
         ready, timers = self._ready, self._timers
         until_s = monotonic() + _ROUND_S
         while True:
-            group = ready.popleft()
+            self._running = group = ready.popleft()
             taken_count = 0
             for source in group.sources:
-                self._running = source
                 try:
                     taken = source.take()
                 except BaseException as error:

@@ -1,7 +1,7 @@
 """Strands: run one callback of a node at a time, on a loop with any number of threads.
 
-A loop of one thread needs no strand. With several threads, a strand queues the callbacks of a node
-without blocking a thread while they wait.
+A loop whose callbacks do not overlap needs no strand. On others, a strand queues the callbacks of a
+node without blocking a thread while they wait.
 """
 
 from __future__ import annotations
@@ -22,6 +22,20 @@ T = TypeVar("T")
 Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
 
 
+class OverlappingLoop(Protocol):
+    """The part of a loop that strands need."""
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether callbacks may overlap."""
+
+    def overlap(self) -> None:
+        """Let other threads serve the loop while a callback runs, if it is parallel."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+
 class Strand(Protocol):
     """Runs the callbacks of one node, which must not raise."""
 
@@ -36,7 +50,7 @@ class Strand(Protocol):
 
 
 class InlineStrand:
-    """The strand of a node whose loop has one thread, and of reentrant ports."""
+    """The strand of a node whose loop calls one callback at a time."""
 
     def post(self, call: Callable[[], object], _is_due: object = None) -> None:
         """Run ``call`` now."""
@@ -47,11 +61,24 @@ class InlineStrand:
         return coroutine
 
 
-class SerialStrand:
-    """The strand of a node whose loop has several threads."""
+class ReentrantStrand(InlineStrand):
+    """The strand of a reentrant callback group: its callbacks overlap on several threads."""
 
-    def __init__(self, call_soon: Callable[[Callable[[], object]], None]) -> None:
-        self._call_soon = call_soon
+    def __init__(self, loop: OverlappingLoop) -> None:
+        self._loop = loop
+
+    def post(self, call: Callable[[], object], _is_due: object = None) -> None:
+        """Run ``call`` now."""
+        self._loop.overlap()
+        call()
+
+
+class SerialStrand:
+    """The strand of a node whose callbacks the loop may let overlap or wait."""
+
+    def __init__(self, loop: OverlappingLoop) -> None:
+        self._call_soon = loop.call_soon
+        self._overlap = loop.overlap if loop.is_parallel else None
         self._lock = threading.Lock()
         self._is_held = False
         # A waiting coroutine is a future: setting its result hands the strand over.
@@ -97,6 +124,8 @@ class SerialStrand:
 
     def _run(self, call: Callable[[], object]) -> None:
         try:
+            if self._overlap is not None:
+                self._overlap()
             call()
         finally:
             self.leave()

@@ -15,7 +15,7 @@ from composer.runtime.executors.futures import Cancelled, Future, awaited_rclpy_
 
 T = TypeVar("T")
 
-#: Called with (what was running, the exception).
+#: Called with (what was running, the exception). The loop reports it and continues.
 Report = Callable[[str, BaseException], None]
 
 
@@ -26,11 +26,29 @@ class Cancellable(Protocol):
         """Do not make the call."""
 
 
+class TimerHandle(Cancellable, Protocol):
+    """A scheduled call of a loop. Canceling it twice is harmless."""
+
+    @property
+    def late_s(self) -> float:
+        """How long ago the call was due, in seconds. Valid during the call."""
+
+
 class SupportsCallLater(Protocol):
     """A loop, which waits by the steady clock, or a node's clock."""
 
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> Cancellable:
         """Call ``callback`` once, ``delay_s`` seconds from now."""
+
+
+class TaskRunner(SupportsCallLater, Protocol):
+    """The part of a loop that runs rclpy's own code."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
+        """Run a coroutine; return the future of its result."""
 
 
 class Task(Generic[T]):

@@ -1,8 +1,11 @@
-"""Turns: one thread at a time serves a loop, and another one while a callback blocks.
+"""Turns: one thread at a time serves a loop, and another one while a callback runs or blocks.
 
-A callback that waits gives its turn away, and gets it back at the end of the wait. From a call of
-code that may block, :class:`~composer.runtime.executors.turn_watch.TurnWatch` takes the turn when
-it lasts; it goes on without. So a loop of one node needs no pool of threads to be always served.
+- ``events``: a callback that waits gives its turn away, and gets it back at the end of the wait.
+  From a call of code that may block, :class:`TurnWatch` takes the turn when it lasts; it goes on
+  without. So a loop of one node needs no pool of threads to be always served.
+- ``multi_threaded``: each callback of a node gives its turn away when it begins, so that as many
+  run at the same time as the executor has threads.
+- ``single_threaded``: no callback gives its turn away.
 """
 
 from __future__ import annotations
@@ -11,16 +14,23 @@ import os
 import queue
 import threading
 from abc import abstractmethod
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from threading import get_ident
 from time import monotonic, sleep
 
+from composer.model import ExecutorKind
 from composer.runtime.executors.base_loop import PAUSE_AFTER_FAULT_S, BaseLoop
-from composer.runtime.executors.loop import Awaited, ExceptionHandler
+from composer.runtime.executors.futures import Awaited
 from composer.runtime.executors.poller import use_precise_wakeups
+from composer.runtime.executors.tasks import Report
 
 #: A call that is expected to block, and takes less, is not expected to next time.
 _BLOCKS_S = 0.005
+#: A call blocks if it keeps its loop for one of these periods after it was noticed.
+_WATCH_PERIOD_S = 0.02
+#: The watch looks less often while it meets no call: each look costs 30 us of CPU.
+_LONGEST_WATCH_PERIOD_S = 0.1
 
 
 class Turn:
@@ -40,9 +50,22 @@ class Turn:
 class TurnTaking(BaseLoop):
     """The threads of a loop, of which one has the turn."""
 
-    def __init__(self, name: str, on_exception: ExceptionHandler) -> None:
+    def __init__(
+        self,
+        name: str,
+        on_exception: Report,
+        kind: ExecutorKind,
+        threads: int,
+    ) -> None:
         super().__init__(name, on_exception)
-        self._running: object = None  # the source or callback that is being called
+        self._replaces_blocked = kind is ExecutorKind.EVENTS
+        #: With several threads, an item for each callback that may begin.
+        self._slots: queue.SimpleQueue[None] | None = None
+        if kind is ExecutorKind.MULTI_THREADED:
+            self._slots = queue.SimpleQueue()
+            self._free_slots(threads)
+            self._step_soon = self._step_in_parallel
+        self._running: object = None  # the group or callback that is being called
         self._turn = Turn()
         #: The identifiers of threads in a callback that have lost their turn.
         self._blocked: set[int] = set()
@@ -90,12 +113,13 @@ class TurnTaking(BaseLoop):
         until_s = monotonic() + timeout_s
         self._stopping = True
         self._end_waits()
-        if self.is_current():
-            return False
         if self._threads[0].ident is None:  # never started
             self._shut_down()
             return True
+        self._free_slots(1)
         self._wake()
+        if self.is_current():
+            return False
         for thread in tuple(self._threads):
             thread.join(max(0.0, until_s - monotonic()))
         if not any(thread.is_alive() for thread in self._threads):
@@ -113,7 +137,22 @@ class TurnTaking(BaseLoop):
         """Return whether the calling thread belongs to the loop."""
         return self._has_turn() or get_ident() in self._blocked
 
-    # --- callbacks that block
+    # --- callbacks that overlap, or block
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether callbacks may overlap."""
+        return self._slots is not None
+
+    def overlap(self) -> None:
+        """Let another thread serve a loop of several threads from now on, in a callback.
+
+        Waits until the callback may begin. Without effect on a thread that has no turn.
+        """
+        if self._slots is not None and self._has_turn() and not self._stopping:
+            self._slots.get()
+            with self._handing_over:
+                self._hand_over()
 
     def begin_blocking(self, *, expected: bool) -> list[bool] | float | None:
         """Begin a call of code that may block; return what :meth:`end_blocking` needs.
@@ -121,7 +160,7 @@ class TurnTaking(BaseLoop):
         If it is ``expected`` to block, another thread serves the loop at once.
         """
         turn = self._turn
-        if turn.call is not None or turn.thread != get_ident():
+        if turn.call is not None or turn.thread != get_ident() or not self._replaces_blocked:
             return None
         if expected:
             with self._handing_over:
@@ -160,11 +199,13 @@ class TurnTaking(BaseLoop):
     def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
         """Block until ``future`` is done; return false if that takes longer, or the loop stops.
 
-        In a callback, another thread serves the loop meanwhile. The callback continues with its
-        turn, so that it overlaps with no other callback of the loop.
+        In a callback, another thread serves the loop meanwhile, if its kind allows it. On a loop
+        of kind *events*, the callback continues with its turn, so that it overlaps with no other
+        one.
         """
+        self.overlap()
         with self._handing_over:
-            had_turn = self._has_turn() and not future.done()
+            had_turn = self._replaces_blocked and self._has_turn() and not future.done()
             call = self._turn.call
             if had_turn:
                 if call is not None:
@@ -213,6 +254,18 @@ class TurnTaking(BaseLoop):
             has_turn.wait()
         self._waits.discard(has_turn)
 
+    def _step_in_parallel(self, step: Callable[[], object]) -> None:
+        def overlapping() -> None:
+            self.overlap()
+            step()
+
+        self.call_soon(overlapping)
+
+    def _free_slots(self, number: int) -> None:
+        if self._slots is not None:
+            for _ in range(number):
+                self._slots.put(None)
+
     def _add_thread(self, turn: Turn) -> threading.Thread:
         number = f" {len(self._threads) + 1}" if self._threads else ""
         thread = threading.Thread(
@@ -249,6 +302,7 @@ class TurnTaking(BaseLoop):
     def _next_turn(self) -> Turn | None:
         """Return the turn of this thread, which has lost its last one; None if the loop stops."""
         self._blocked.discard(get_ident())
+        self._free_slots(1)
         if self._has_turn():
             return self._turn
         self._idle.append(threading.current_thread())
@@ -259,3 +313,27 @@ def _place_like(thread: int) -> None:
     """Give the calling thread the CPUs and the priority of another one, by its Linux id."""
     os.sched_setaffinity(0, os.sched_getaffinity(thread))
     os.sched_setscheduler(0, os.sched_getscheduler(thread), os.sched_getparam(thread))
+
+
+class TurnWatch:
+    """A thread that takes the turn away from callbacks of classes that block."""
+
+    def __init__(self, loops: Callable[[], Iterable[TurnTaking]]) -> None:
+        self._loops = loops
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="turn watch", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop the thread."""
+        self._end.set()
+
+    def _run(self) -> None:
+        period_s = _WATCH_PERIOD_S
+        while not self._end.wait(period_s):
+            is_calling = [loop.hand_over_blocked() for loop in tuple(self._loops())]
+            longer_s = min(2 * period_s, _LONGEST_WATCH_PERIOD_S)
+            period_s = _WATCH_PERIOD_S if any(is_calling) else longer_s

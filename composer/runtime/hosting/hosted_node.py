@@ -106,8 +106,8 @@ class HostedNode(LocalNode):
         node.__class__ = shared_class(cast(Any, type(node)))
         return node
 
-    def _make_strand(self, _options: NodeOptions) -> Strand:
-        return ExclusiveStrand(self.loop.call_soon)  # a callback may wait while the loop goes on
+    def _make_strand(self) -> Strand:
+        return ExclusiveStrand(self.loop)  # a callback may wait while the loop goes on
 
     def _context_of_transitions(self) -> NodeContext:
         # Not on the strand of the callbacks: one of them may wait for what a transition ends.

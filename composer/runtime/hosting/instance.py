@@ -18,9 +18,8 @@ from rclpy.service import Service
 
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.futures import Future
-from composer.runtime.executors.loop import Awaited
-from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
+from composer.runtime.executors.futures import Awaited, Future
+from composer.runtime.executors.strand import ExclusiveStrand, ReentrantStrand, Strand
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.callback_groups import OwnGroup
 from composer.runtime.hosting.declared_ports import DeclaredPorts
@@ -180,9 +179,9 @@ class Instance:
 
     def _strand(self, group: CallbackGroup, entity: Any) -> Strand:
         if type(group) is ReentrantCallbackGroup:
-            return InlineStrand()
+            return ReentrantStrand(self.context.loop)
         if type(group) is MutuallyExclusiveCallbackGroup:
-            return ExclusiveStrand(self.context.loop.call_soon)
+            return ExclusiveStrand(self.context.loop)
         if group not in self._own_groups:
             self._own_groups[group] = OwnGroup(self, group)
         entity.callback_group = ReentrantCallbackGroup()  # rclpy's executors would ask as well

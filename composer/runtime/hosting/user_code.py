@@ -115,7 +115,7 @@ class _Steps:
         self.function = function
         self._instance = function._instance
         self._before: Instance | None = None
-        self._began: object = None
+        self._began: list[bool] | float | None = None
 
     def enter(self) -> None:
         """Begin a step, at once."""

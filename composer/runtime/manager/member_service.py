@@ -13,9 +13,9 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 
-from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
 from composer.runtime.metrics.repeat_limit import RepeatLimit
@@ -79,7 +79,7 @@ class MemberService:
     def __init__(
         self,
         node: Node,
-        loop: EventLoop,
+        loop: Loop,
         callbacks: MemberCallbacks,
         participant: str,
         log: Callable[[str], None],

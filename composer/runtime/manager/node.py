@@ -36,10 +36,10 @@ from composer.model import LogLevel
 from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.clock.clock import NodeTime
 from composer.runtime.clock.sim_time import SimTimeSource
+from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.factory import log_exception
-from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.manager.other_instances import Instance, OtherInstances
@@ -138,7 +138,7 @@ class ManagerNode:
         self._status = status
         self._host = host
         self._started_s = time.monotonic()
-        self._loop = EventLoop(NAME, log_exception)
+        self._loop = Loop(NAME, log_exception)
         self._is_waiting = False  # for subscriptions that do not have the last message yet
         self._publish_due = threading.Lock()  # held while a message with changes is due
         self._batch_s = _BATCH_S

@@ -21,8 +21,8 @@ from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.executors.entities.sources import Reply, unused_callback
+from composer.runtime.executors.loop import Loop
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
 from composer.runtime.ros_graph.graph import participant, servers_of
 
@@ -78,7 +78,7 @@ class OtherInstances:
     def __init__(
         self,
         node: Node,
-        loop: EventLoop,
+        loop: Loop,
         own: Callable[[], Instance],
         *,
         on_older: Callable[[Instance], None],
@@ -163,7 +163,7 @@ class _Call:
     def __init__(
         self,
         node: Node,
-        loop: EventLoop,
+        loop: Loop,
         name: str,
         on_response: Callable[[str, Any], None],
     ) -> None:

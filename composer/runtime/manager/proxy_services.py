@@ -25,8 +25,8 @@ from rcl_interfaces.msg import (
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.node import Node
 
-from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.loop import Reply, unused_callback
+from composer.runtime.executors.entities.sources import Reply, unused_callback
+from composer.runtime.executors.loop import Loop
 from composer.runtime.node.managed_node import InProcessNode, ManagedNode
 from composer.runtime.node.parameter_services import (
     NodeParameterStore,
@@ -46,7 +46,7 @@ class ProxyLifecycleService:
     """The service ``change_state`` for the nodes that ``nodes()`` returns."""
 
     def __init__(
-        self, node: Node, loop: EventLoop, nodes: Nodes, publish_states: Callable[[], None]
+        self, node: Node, loop: Loop, nodes: Nodes, publish_states: Callable[[], None]
     ) -> None:
         """Add the service to ``node``; call ``publish_states`` after each response, on the loop."""
         self._loop = loop

@@ -13,7 +13,7 @@ from typing import Any
 
 from rcl_interfaces.msg import ParameterValue
 
-from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.proxy_services import ProxyParameterStore
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
@@ -46,7 +46,7 @@ class ManagerQueries:
 
     def __init__(
         self,
-        loop: EventLoop,
+        loop: Loop,
         graph: GraphObserver,
         parameters: ProxyParameterStore,
         status: Callable[[], Iterable[Status]],

@@ -134,7 +134,7 @@ class LocalNode(ABC):
             loop=loop,
             clock=NodeTime(self._ros, loop, options.process.simulated_time, self._time_switched),
             gate=LifecycleGate(model.full_name, PendingFutures(loop.call_later)),
-            strand=self._make_strand(options),
+            strand=self._make_strand(),
             log=log,
             error_log=error_log,
             statistics=self.statistics,
@@ -234,9 +234,9 @@ class LocalNode(ABC):
     def _make_ros_node(self) -> RosNode:
         return make_ros_node(self.model)
 
-    def _make_strand(self, options: NodeOptions) -> Strand:
+    def _make_strand(self) -> Strand:
         """Return what keeps callbacks apart where the loop does not."""
-        return SerialStrand(self.loop.call_soon) if options.parallel else InlineStrand()
+        return SerialStrand(self.loop) if self.loop.is_parallel else InlineStrand()
 
     def _context_of_transitions(self) -> NodeContext:
         """Return the context whose strand runs transitions."""

@@ -33,8 +33,8 @@ class NodeOptions:
 
     ``router`` connects its ports with those of the other nodes of the process; ``chains`` are
     those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
-    ``parallel`` is true if its loop has several threads; ``system_is_up`` is false during the
-    bring-up, when errors do not count as faults: some nodes wait for others.
+    ``system_is_up`` is false during the bring-up, when errors do not count as faults: some nodes
+    wait for others.
     ``make_library_node(node)`` returns the rclpy node that the libraries of its behavior use.
     """
 
@@ -42,7 +42,6 @@ class NodeOptions:
     chains: Chains
     process: ProcessContext
     seen_messages: MessageSnapshots | None = None
-    parallel: bool = False
     log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0
     system_is_up: bool = False

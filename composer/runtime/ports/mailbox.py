@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from composer.model import Port
 from composer.runtime.callbacks.callback import Callback
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.loop import Taken
+from composer.runtime.executors.entities.sources import Taken
 from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.metrics.statistics import CallbackStatistics
 
@@ -251,6 +251,10 @@ class OverlappingMailbox(Mailbox):
     __slots__ = ()
 
     _overlaps = True
+
+    def _call(self, message: Any) -> Coroutine[Any, Any, None] | None:
+        self._context.loop.overlap()
+        return super()._call(message)
 
     def _wait_for(self, rest: Coroutine[Any, Any, None]) -> None:
         self._context.spawn(rest)

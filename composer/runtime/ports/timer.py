@@ -12,7 +12,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.callbacks.timing import mutation_checked
-from composer.runtime.executors.loop import TimerHandle
+from composer.runtime.executors.tasks import TimerHandle
 
 
 class TimerPort(Callback):

@@ -23,11 +23,11 @@ from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.log import Write
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.executors.exceptions import describe
-from composer.runtime.executors.factory import log_exception, make_loop, place_threads
+from composer.runtime.executors.exceptions import describe, log_exception
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.turn_watch import TurnWatch
+from composer.runtime.executors.placement import place_threads
+from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode
 from composer.runtime.intra_process.eligibility import shared_channels
@@ -329,7 +329,6 @@ class NodeSet:
             router=self._router,
             process=self._process,
             seen_messages=self._seen_messages,
-            parallel=executor.kind is ExecutorKind.MULTI_THREADED,
             log_level=self._log_level_of(node),
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
@@ -366,7 +365,7 @@ class NodeSet:
     def _loop_of(self, executor: Executor) -> Loop:
         name = executor.name.value
         if name not in self.loops:
-            self.loops[name] = make_loop(executor, _log_exception)
+            self.loops[name] = Loop(name, _log_exception, executor.kind, executor.threads)
         return self.loops[name]
 
     def _timeout_s(self, node: Node) -> float:

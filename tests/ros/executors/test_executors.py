@@ -12,12 +12,10 @@ import rclpy
 
 from composer.model import ExecutorKind
 from composer.runtime.executors import scheduler
-from composer.runtime.executors.factory import make_loop
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
-from composer.runtime.executors.wait_set import executors
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, executor_of
+from tests.ros.support.loops import KINDS, Bench, bench, loop_of
 
 
 @pytest.fixture(params=KINDS)
@@ -275,8 +273,7 @@ def test_a_busy_loop_does_not_starve_other_threads(
         rests_s.append(seconds)
         time.sleep(seconds)
 
-    for module in (scheduler, executors):
-        monkeypatch.setattr(module, "sleep", rest)
+    monkeypatch.setattr(scheduler, "sleep", rest)
     on.loop.run_task(_never_idle(on))
     wait_until(lambda: len(rests_s) > 10, "pauses of the loop")
     assert min(rests_s) > 0.0
@@ -289,12 +286,36 @@ async def _never_idle(on: Bench) -> None:
         await turn
 
 
+def test_as_many_callbacks_overlap_as_the_executor_has_threads() -> None:
+    release = threading.Event()
+    begun: list[int] = []
+
+    def callback() -> None:
+        on.loop.overlap()
+        begun.append(threading.get_ident())
+        release.wait()
+
+    with bench(ExecutorKind.MULTI_THREADED) as on:
+        for _ in range(3):
+            on.loop.call_soon(callback)
+        wait_until(lambda: len(begun) == 3)
+        assert on.loop.run(lambda: "served meanwhile", 5.0) == "served meanwhile"
+        on.loop.call_soon(callback)
+        with pytest.raises(TimeoutError, match="was not started"):
+            on.loop.run(lambda: None, 0.05)
+        assert len(set(begun)) == len(begun) == 3
+        release.set()
+        wait_until(lambda: len(begun) == 4)
+        wait_until(lambda: not on.loop.busy_threads())
+        assert len(on.loop.native_thread_ids()) <= 5
+
+
 class TestStopping:
     @pytest.mark.parametrize("kind", KINDS)
     def test_a_loop_that_never_started_stops(self, kind: ExecutorKind) -> None:
         rclpy.init()
         try:
-            assert make_loop(executor_of(kind)).stop(1.0)
+            assert loop_of(kind).stop(1.0)
         finally:
             rclpy.shutdown()
 
@@ -303,7 +324,7 @@ class TestStopping:
         rclpy.init()
         release = threading.Event()
         try:
-            loop = make_loop(executor_of(kind))
+            loop = loop_of(kind)
             loop.start()
             loop.call_soon(release.wait)
             wait_until(loop.current_stack)

@@ -17,9 +17,9 @@ from std_srvs.srv import Trigger
 
 from composer.model import ExecutorKind
 from composer.runtime.executors.entities import readiness
-from composer.runtime.executors.entities.source_group import EntitySource, SourceGroup
-from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.entities.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.futures import Future
+from composer.runtime.executors.loop import Loop
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.loops import Bench, bench, peer
 
@@ -118,7 +118,7 @@ def test_a_response_behind_those_to_other_clients_is_taken_at_once(on: Bench) ->
 
 
 def group_of(on: Bench, subscription: object) -> SourceGroup:
-    assert isinstance(on.loop, EventLoop)
+    assert isinstance(on.loop, Loop)
     return on.loop._group_of[subscription]
 
 

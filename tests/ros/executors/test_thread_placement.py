@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,9 +11,12 @@ import pytest
 import rclpy
 
 from composer.model import Executor, ExecutorKind
-from composer.runtime.executors.factory import make_loop, place_threads
+from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.placement import place_threads
 from composer.source import Located, SourceFile, Span
 from tests.ros.support.in_process import running
+from tests.ros.support.loops import PATIENCE_S
 
 NOWHERE = Span(SourceFile("nowhere.yaml", ""), 1, 1, 1)
 CPU = min(os.sched_getaffinity(0))
@@ -42,12 +46,16 @@ def ros() -> Iterator[None]:
 @pytest.mark.parametrize("kind", list(ExecutorKind))
 def test_every_thread_of_an_executor_is_placed(kind: ExecutorKind) -> None:
     wanted = executor(kind, cpus=(CPU,), priority=7, threads=3)
-    loop = make_loop(wanted)
+    loop = Loop(wanted.name.value, log_exception, kind, wanted.threads)
     loop.start()
     try:
+        refused = place_threads(wanted, loop.native_thread_ids())
+        overlapping = threading.Barrier(wanted.threads + 1 if loop.is_parallel else 2)
+        for _ in range(overlapping.parties - 1):  # the other threads start when they are needed
+            loop.call_soon(lambda: (loop.overlap(), overlapping.wait(PATIENCE_S)))
+        overlapping.wait(PATIENCE_S)
         ids = loop.native_thread_ids()
-        refused = place_threads(wanted, ids)
-        assert len(set(ids)) == {"events": 1, "single_threaded": 2, "multi_threaded": 5}[kind.value]
+        assert len(set(ids)) == (4 if loop.is_parallel else 1)
         assert [os.sched_getaffinity(thread_id) for thread_id in ids] == [{CPU}] * len(ids)
         if real_time_is_allowed():
             assert refused == ()

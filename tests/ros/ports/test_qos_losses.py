@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.executors.event_loop import EventLoop
+from composer.runtime.executors.loop import Loop
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, running, wait_until
 
@@ -138,7 +138,7 @@ def test_events_are_watched_from_the_start(tmp_path: Path) -> None:
 def test_constantly_taken_statuses_do_not_deadlock(peer: Peer) -> None:
     # Taking a status that is not available waits for the thread that reports the next, which
     # waits too: it deadlocked within two seconds.
-    loop = EventLoop("loop", lambda _, error: pytest.fail(repr(error)))
+    loop = Loop("loop", lambda _, error: pytest.fail(repr(error)))
     loop.start()
     qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=1_000_000))
     subscription = peer.node.create_subscription(String, "/late", lambda _: None, qos)

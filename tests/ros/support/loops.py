@@ -13,10 +13,11 @@ import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
-from composer.model import Executor, ExecutorKind
-from composer.runtime.executors.factory import make_loop
-from composer.runtime.executors.loop import Loop, Taken
-from composer.source import Located, SourceFile, Span
+from composer.model import ExecutorKind
+from composer.runtime.executors.entities.sources import Taken
+from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.tasks import Report
 from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.leaving import leave
 
@@ -61,10 +62,8 @@ class Bench:
         return client
 
 
-def executor_of(kind: ExecutorKind) -> Executor:
-    source = SourceFile("test", "")
-    span = Span(source, 1, 1, 1)
-    return Executor(Located("default", span), kind, span, threads=3)
+def loop_of(kind: ExecutorKind, on_exception: Report = log_exception) -> Loop:
+    return Loop("default", on_exception, kind, threads=3)
 
 
 @contextmanager
@@ -73,7 +72,7 @@ def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
     rclpy.init()
     try:
         reports: list[tuple[str, BaseException]] = []
-        loop = make_loop(executor_of(kind), lambda *report: reports.append(report))
+        loop = loop_of(kind, lambda *report: reports.append(report))
         node = Node(name, enable_logger_service=True)
         loop.add_node(node)
         loop.start()

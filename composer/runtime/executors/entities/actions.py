@@ -6,10 +6,10 @@ Together with ``sources`` and ``readiness``, everything that uses rclpy's intern
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from action_msgs.msg import GoalInfo
 from action_msgs.srv import CancelGoal
@@ -28,20 +28,8 @@ from unique_identifier_msgs.msg import UUID
 from composer.runtime.executors.entities import readiness
 from composer.runtime.executors.entities.readiness import Handle, SetCallback, Signal
 from composer.runtime.executors.exceptions import is_closing
-from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.tasks import Report, SupportsCallLater, name_of
-
-T = TypeVar("T")
-
-
-class TaskRunner(SupportsCallLater, Protocol):
-    """The part of a loop that actions need."""
-
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the loop as soon as it is free."""
-
-    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; return the future of its result."""
+from composer.runtime.executors.futures import Cancelled
+from composer.runtime.executors.tasks import Report, TaskRunner, name_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +40,19 @@ class _Role:
     handle: str  # the attribute that holds the handle
     setters: tuple[SetCallback, ...]
     ready_flags: tuple[str, ...]  # the attributes that select what ``take_data`` takes
+    unused_flag: str  # selects what is never taken
 
 
-#: Converting the statuses of all goals of a server to Python objects takes longer than a goal, and
-#: ports do not use them: an event-driven loop leaves the last one in the reader. With a wait set,
-#: which would be ready forever, they are taken.
-_STATUS = "_is_status_ready"
 _SERVER = _Role(
     "action server",
     "_handle",
     readiness.ACTION_SERVER,
     ("_is_goal_request_ready", "_is_cancel_request_ready", "_is_result_request_ready"),
+    "_is_goal_expired",
 )
-# In this order: after taking the result, rclpy drops feedback that was not taken.
+# In this order: after taking the result, rclpy drops feedback that was not taken. The statuses of
+# goals stay in the reader: converting all of them takes longer than a goal, and ports do not use
+# them.
 _CLIENT = _Role(
     "action client",
     "_client_handle",
@@ -74,8 +62,8 @@ _CLIENT = _Role(
         "_is_feedback_ready",
         "_is_cancel_response_ready",
         "_is_result_response_ready",
-        _STATUS,
     ),
+    "_is_status_ready",
 )
 #: The attributes of an action client with the requests that wait for each kind of response.
 _PENDING = {
@@ -97,7 +85,7 @@ class ActionSource:
     ) -> None:
         self._waitable: Any = waitable
         self._role = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
-        self._taken = self._role.ready_flags
+        setattr(waitable, self._role.unused_flag, False)
         self.may_skip = self._role is _CLIENT
         self._handle: Handle = getattr(waitable, self._role.handle)
         self._executor = executor
@@ -110,7 +98,6 @@ class ActionSource:
 
     def attach(self, signal: Signal) -> None:
         """Signal all items of the action, except the statuses of goals."""
-        self._taken = tuple(flag for flag in self._role.ready_flags if flag != _STATUS)
         signal.attach(self._handle, *self._role.setters)
 
     def detach(self, signal: Signal) -> None:
@@ -120,8 +107,7 @@ class ActionSource:
     def take(self) -> Any:
         """Return one item, by its kind."""
         waitable = self._waitable
-        waitable._is_goal_expired = False  # handled by expire_goals
-        for selected in self._taken:
+        for selected in self._role.ready_flags:
             for flag in self._role.ready_flags:
                 setattr(waitable, flag, flag == selected)
             if taken := waitable.take_data():
@@ -152,16 +138,6 @@ class ActionSource:
             and getattr(self._waitable, _PENDING[kind]).get(item[0]) not in self._waitable._futures
             for kind, item in taken.items()
         )
-
-
-async def expire_goals(server: ActionServer) -> None:
-    """Discard the goals that ended longer ago than the server's result timeout."""
-    with server._lock:
-        kept = len(server._goal_handles)
-        if not kept:  # rcl rejects a capacity of zero
-            return
-        expired = server._handle.expire_goals(kept)
-    await server._execute_expire_goals(expired)
 
 
 def contain_exceptions(server: ActionServer, report: Report) -> None:

@@ -37,8 +37,7 @@ class GoalServer(ActionServer):
     def end(self, identity: bytes, response: Any) -> None:
         """Send the result response of a goal that has succeeded, or was canceled or aborted."""
         with self._changing:
-            if identity not in self._results:  # an executor may have been faster
-                self._ended[identity] = False
+            self._ended[identity] = False
         future = self._result_futures[identity]
         future.set_result(response)
         super().remove_future(future)
@@ -62,11 +61,6 @@ class GoalServer(ActionServer):
         """Remove the future of a goal that has not ended: executors visit all futures."""
         if not future.done():
             super().remove_future(future)
-
-    async def _execute_expire_goals(self, expired_goals: Iterable[Any]) -> None:
-        """Keep the results of goals that an executor has let rcl discard."""
-        with self._changing:
-            self._on_expired(expired_goals)
 
     def _on_expired(self, infos: Iterable[Any]) -> None:
         for info in infos:

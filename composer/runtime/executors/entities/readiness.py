@@ -7,6 +7,8 @@ a deadlock, observed within a second under load. So the callback handed to rcl i
 ``void (*)(const void * user_data, size_t count)`` on x86-64 and arm64. No Python runs there.
 
 All knowledge of rcl's and rclpy's internals (rclpy 7.1, ROS 2 Jazzy) is in this package.
+
+A loop serves sources, in groups that share one eventfd.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import os
 import resource
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import rclpy  # noqa: F401  loads librcl of the ROS installation in use
 
@@ -41,6 +43,8 @@ SetCallback = Callable[[int, ctypes.c_void_p | None, int], int]
 _RCL = ctypes.CDLL("librcl.so")
 _RCL_ACTION = ctypes.CDLL("librcl_action.so")
 _WRITE = ctypes.cast(ctypes.CDLL(None).eventfd_write, ctypes.c_void_p)
+#: More items than can be waiting: take until nothing is left.
+_ALL = 1 << 32
 
 
 def _set_callback(library: ctypes.CDLL, name: str) -> SetCallback:
@@ -123,6 +127,75 @@ class Signal:
     def __del__(self) -> None:
         # Not earlier: a thread about to read must not read a file descriptor that was reused.
         os.close(self.fd)
+
+
+class EntitySource(Protocol):
+    """One entity that a loop serves: one item at a time, so that a loop can serve them in turn.
+
+    ``may_skip`` is true if a take may return nothing although more items follow. A client receives
+    all responses of its service and skips those to other clients.
+    """
+
+    @property
+    def may_skip(self) -> bool:
+        """See above."""
+
+    @property
+    def name(self) -> str:
+        """A description of the entity, for reports."""
+
+    def attach(self, signal: Signal) -> None:
+        """Make ``signal`` signal the items of the entity."""
+
+    def detach(self, signal: Signal) -> None:
+        """Stop that."""
+
+    def take(self) -> Any:
+        """Return the next item, or None."""
+
+    def call(self, taken: Any, /) -> object:
+        """Pass the item to its callback."""
+
+
+class SourceGroup:
+    """Sources that share one signal. The loop serves them together, one item each."""
+
+    __slots__ = ("_may_skip", "due", "signal", "sources")
+
+    def __init__(self) -> None:
+        self.signal = Signal()
+        self.sources: tuple[EntitySource, ...] = ()
+        self.due = 0  # items that were signaled and not taken yet
+        self._may_skip = True
+
+    def add(self, source: EntitySource) -> None:
+        """Serve ``source`` from now on. Raises InvalidHandle if its entity is destroyed."""
+        self.sources = (*self.sources, source)
+        self._may_skip = self._may_skip and source.may_skip
+        try:
+            source.attach(self.signal)
+        except BaseException:
+            self.discard(source)
+            raise
+        # Items from before may have been signaled to another group.
+        self.signal.write(1 if self._may_skip else _ALL)
+
+    def finish_round(self, taken: int) -> None:
+        """Update ``due`` after a take from each source, ``taken`` of which returned an item."""
+        if taken < self.due and (taken or self._may_skip):
+            self.due -= taken or 1
+        else:
+            self.due = 0  # nothing taken: a full queue has dropped what was signaled
+
+    def discard(self, source: EntitySource) -> None:
+        """Stop serving ``source``."""
+        self.sources = tuple(kept for kept in self.sources if kept is not source)
+        source.detach(self.signal)
+
+    def close(self) -> None:
+        """Stop serving all sources."""
+        self.sources = ()
+        self.signal.close()
 
 
 def _raise_file_limit(fd: int) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Coroutine
 from functools import partial, wraps
-from typing import Any
+from typing import Any, Protocol
 
 from rclpy.client import Client
 from rclpy.event_handler import EventHandler
@@ -17,14 +17,29 @@ from rclpy.subscription import Subscription
 from rclpy.time_source import TimeSource
 
 from composer.runtime.executors.entities import readiness
-from composer.runtime.executors.entities.readiness import Signal
-from composer.runtime.executors.entities.source_group import EntitySource
-from composer.runtime.executors.loop import Reply, Taken
+from composer.runtime.executors.entities.readiness import EntitySource, Signal
 from composer.runtime.executors.tasks import name_of
 
 RunTask = Callable[[Coroutine[Any, Any, Any]], object]
+#: A message and the middleware's information about it.
+Taken = tuple[Any, Any]
 
 # Some of rclpy's own type hints are wrong (a service's type has no Request): hence Any below.
+
+
+class Reply(Protocol):
+    """Ends one request, once."""
+
+    def __call__(self, response: Any, /) -> None:
+        """Send the response."""
+
+    def refuse(self, error: BaseException) -> None:
+        """Send no response; a caller in this process gets the error."""
+
+
+def unused_callback(_: Any, response: Any) -> Any:
+    """Satisfy rclpy, which requires a service callback; the loop calls another one."""
+    return response
 
 
 class SubscriptionSource:

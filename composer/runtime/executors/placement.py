@@ -1,50 +1,57 @@
-"""Creates the loop of an executor and places its threads on CPUs."""
+"""The CPUs, the priority and the memory limit of threads and processes."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
-from rclpy.logging import get_logger
+from composer.model import Executor, ExecutorKind, Process
 
-from composer.model import Executor, ExecutorKind
-from composer.names import PROGRAM_LOGGER
-from composer.runtime.executors.event_loop import EventLoop
-from composer.runtime.executors.exceptions import describe, internal_report_of
-from composer.runtime.executors.loop import ExceptionHandler, Loop
-from composer.runtime.executors.wait_set.loop import WaitSetLoop
-from composer.runtime.metrics.repeat_limit import RepeatLimit
-
-_EXCEPTIONS = RepeatLimit()
 _PRIORITY_HINT = (
     "it is allowed to root, with CAP_SYS_NICE, or up to the 'rtprio' of the user in"
     " /etc/security/limits.conf"
 )
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+_MEGABYTE = 1e6
+#: Python's default is 5 ms.
+_SWITCH_INTERVAL_S = 0.001
 
 
-def make_loop(executor: Executor, on_exception: ExceptionHandler | None = None) -> Loop:
-    """Return the loop for an executor, not started. rclpy must be initialized.
+def switch_threads_sooner() -> None:
+    """Let a thread wait less for the interpreter while another one computes.
 
-    ``on_exception`` is called with every exception that leaves a callback; by default it is
-    logged.
+    See docs/decisions/0069-turns-of-threads.md. A shorter interval that is set already is kept.
     """
-    name = executor.name.value
-    handler = on_exception or log_exception
-    match executor.kind:
-        case ExecutorKind.EVENTS:
-            return EventLoop(name, handler)
-        case ExecutorKind.SINGLE_THREADED:
-            return WaitSetLoop(name, handler, threads=None)
-        case ExecutorKind.MULTI_THREADED:
-            return WaitSetLoop(name, handler, threads=executor.threads)
+    sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
 
 
-def log_exception(what: str, error: BaseException) -> None:
-    """Log an exception that left a callback, at most once a second for each ``what``."""
-    admission = _EXCEPTIONS.admit(what)
-    if admission is not None:
-        text = internal_report_of(error) if admission.is_first else describe(error)
-        get_logger(PROGRAM_LOGGER).error(f"{what}: {text}{admission.suffix}")
+def place_process(process: Process) -> tuple[str, ...]:
+    """Apply the CPUs and the priority to this thread, and so to all that it starts.
+
+    Returns a message for each request that Linux refuses.
+    """
+    settings = Executor(
+        process.name,
+        ExecutorKind.EVENTS,
+        process.span,
+        cpus=process.cpus,
+        priority=process.priority,
+    )
+    return place_threads(settings, (0,))
+
+
+def memory_excess(process: Process) -> str | None:
+    """Return why this process uses too much memory, or None."""
+    limit = process.memory_mb
+    if limit is None:
+        return None
+    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
+    used_mb = int(pages) * _PAGE_BYTES / _MEGABYTE
+    if used_mb <= limit.value:
+        return None
+    return f"process '{process.name}' uses {used_mb:.0f} MB of memory, more than {limit.value:g} MB"
 
 
 def place_threads(executor: Executor, native_thread_ids: Iterable[int]) -> tuple[str, ...]:
