@@ -15,14 +15,7 @@ SET = "--set"
 NAMESPACE = "--namespace"
 USE_SIM_TIME_OPTION = "--use-sim-time"
 
-RULE = error(
-    code="RC041",
-    name="invalid-override",
-    summary="A value on the command line is not of the form node.parameter=value.",
-    why="The value is read like one in a file: a YAML scalar or list in flow style.",
-    bad="compose run systems/pipeline.yaml --set max_velocity 2.0",
-    good="compose run systems/pipeline.yaml --set planner.max_velocity=2.0",
-)
+RULE = error("RC041", "invalid-override")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,17 +10,7 @@ from composer.tree import Mapping
 SYSTEM = "system"
 NODE = "node"
 
-RULE = error(
-    code="RC040",
-    name="wrong-kind-of-file",
-    summary="A file is neither a system nor a node type, or is the wrong one of the two.",
-    why=(
-        "The first key of a file says what it is: `system:` or `node:`. Without it, "
-        "the other keys cannot be checked."
-    ),
-    bad="nodes: {talker: {}}",
-    good="system: demo\nnodes: {talker: {}}",
-)
+RULE = error("RC040", "wrong-kind-of-file")
 
 _WORDS = {SYSTEM: "a system", NODE: "a node type"}
 

@@ -10,26 +10,7 @@ from composer.source import Located, Span
 from composer.templates import Template, compile_template
 from composer.tree import Entry, Mapping, Scalar, Tree
 
-RULE = error(
-    code="RC440",
-    name="invalid-expression",
-    summary="An expression, or a string with {...}, cannot be compiled.",
-    why=(
-        "Expressions are a small, safe language: fields of messages, numbers, comparisons, "
-        "and, or, not, and a few functions. Invalid ones are reported before anything starts, "
-        "not when a message arrives."
-    ),
-    bad="""\
-system: demo
-nodes:
-  robot: {timers: {tick: {rate_hz: 10, when: count >, log: tick}}}
-""",
-    good="""\
-system: demo
-nodes:
-  robot: {timers: {tick: {rate_hz: 10, when: count > 5, log: tick}}}
-""",
-)
+RULE = error("RC440", "invalid-expression")
 
 #: The keys of a reaction of a port, a timer or a lifecycle transition.
 KEYS = ("when", "set", "log", "publish", "call", "respond")

@@ -26,27 +26,7 @@ from composer.schema.kinds import NODE, check_kind
 from composer.source import Located, Span
 from composer.tree import Entry, Mapping, Plain, Tree, plain
 
-RULE = error(
-    code="RC287",
-    name="missing-variable",
-    summary="A node lacks a value for a variable of its type.",
-    why="A variable without default is required by the node type.",
-    bad="""\
-system: demo
-nodes:
-  source:
-    type: timer_source
-    publishers: {output: {external: true}}
-""",
-    good="""\
-system: demo
-nodes:
-  source:
-    type: timer_source
-    variables: {message_type: std_msgs/msg/String}
-    publishers: {output: {external: true}}
-""",
-)
+RULE = error("RC287", "missing-variable")
 
 
 @dataclass(frozen=True, slots=True)
