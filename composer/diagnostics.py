@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from enum import Enum
+from typing import TypeAlias
 
 from composer.fast_dataclass import dataclass
 from composer.source import Span
@@ -54,15 +55,23 @@ class Label:
     message: str
 
 
+#: A thing that a diagnostic is about, by its kind and name: ``("executor", "motion")``.
+Subject: TypeAlias = tuple[str, str]
+
+
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """A problem at a location. ``hint`` says how to fix it, in the imperative."""
+    """A problem at a location. ``hint`` says how to fix it, in the imperative.
+
+    ``subjects`` are the things that it is about, the most important one first.
+    """
 
     rule: Rule
     message: str
     primary: Span
     related: tuple[Label, ...] = ()
     hint: str | None = None
+    subjects: tuple[Subject, ...] = ()
 
     @property
     def severity(self) -> Severity:

@@ -24,7 +24,7 @@ _SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERV
 #: What depends on the names that connections give to ports.
 _OF_CONNECTIONS = frozenset(
     {
-        "broken-chain",
+        "impossible-chain",
         "client-without-server",
         "competing-commands",
         "duplicate-server",
@@ -48,32 +48,32 @@ _OF_FOLDERS = frozenset({"unknown-interface", "module-not-installed", "unknown-i
 _FOLLOWING = {
     "class-port-missing": frozenset({"unknown-port"}),
     "class-port-type": frozenset({"type-mismatch"}),
-    "duplicate-full-name": frozenset({"unknown-parameter"}),
+    "duplicate-name": frozenset({"unknown-parameter"}),
     "key-without-value": frozenset({"unknown-name", "unknown-word"}),
-    "invalid-include": frozenset({"invalid-ros-name", "unknown-node", "unknown-port"}),
+    "invalid-include": frozenset({"invalid-name", "unknown-node", "unknown-port"}),
     "invalid-namespace": _OF_CONNECTIONS | {"unmatched-parameters"},
     "node-as-behavior": frozenset(
         {"call-arguments", "handler-signature", "handler-without-port", "missing-attribute"}
         | {"missing-handler", "missing-return", "too-early", "type-error", "unknown-attribute"}
         | {"unused-remapping"}
     ),
-    "outside-qos": frozenset({"reliable-sensor-stream", "unreliable-command"}),
+    "outside-qos": frozenset({"reliable-sensor-stream", "unreliable-delivery"}),
     "parameter-file": frozenset({"missing-parameter"}),
-    "parameter-range": frozenset(
-        {"executor-busy", "executor-overloaded", "timer-period", "unusual-rate"}
+    "parameter-value": frozenset(
+        {"executor-overloaded", "index-out-of-range", "invalid-value", "timer-period"}
+        | {"unusual-rate"}
     ),
-    "parameter-choice": frozenset({"invalid-value"}),
-    "parameter-type": frozenset({"index-out-of-range", "unusual-rate"}),
     "type-mismatch": frozenset(
         {"handler-annotation", "invalid-value", "port-connected-twice", "unknown-field"}
         | {"wrong-message-type"}
     ),
     "undeclared-parameter": frozenset({"class-parameter"}),
-    "unknown-key": frozenset({"transform-source", "unused-restart"}),
+    "unknown-key": frozenset({"transform-source", "restart-settings"}),
     "unknown-port": frozenset({"handler-without-port"}),
-    "unknown-process": frozenset({"conflicting-process", "split-executor", "unmeasured-chain"}),
     "yaml-syntax": frozenset({"missing-parameter"}),
 }
+#: What depends on the nodes of a process.
+_OF_PROCESSES = frozenset({"conflicting-process", "split-executor", "unmeasured-chain"})
 #: Mistakes that may be the reason for all reports of the other rules: the name of what an
 #: unreadable file would set is not known.
 _WITHOUT_NAMES = frozenset({"parameter-file", "yaml-syntax"})
@@ -98,7 +98,9 @@ class Consequences:
                 self._add(_OF_NAMES, _names_with(quoted(item.message)[0], context))
             elif rules is not None:
                 self._add(rules, _names(item, context))
-            if item.rule.name in _WRONG_ENDS or item.rule.name == "invalid-ros-name":
+            if any(kind == "process" for kind, _ in item.subjects):
+                self._add(_OF_PROCESSES, (*quoted(item.message), *quoted(item.hint)))
+            if item.rule.name in _WRONG_ENDS or item.rule.name == "invalid-name":
                 wrong.setdefault(_line(item.primary), []).append(item)
         ports: _Ports = _ports(context) if wrong else {}
         for connection in context.system.connections if wrong else ():

@@ -15,7 +15,13 @@ _MANY = 3  # different unknown names: a file or a section is probably missing
 _MAX_UNKNOWN = 20  # further unknown names in the labels of one diagnostic
 _NEARBY_LINES = 3  # between the ends of a connection
 _SEVERITIES = tuple(Severity)  # the most severe one first
-_NODE = "a node of this system"
+#: The kinds of names that are declared elsewhere, with what a name of that kind should be.
+_DECLARED = {
+    "executor": "an executor of this system",
+    "node": "a node of this system",
+    "process": "a process of this system",
+    "QoS profile": "a QoS profile",
+}
 _PORT = re.compile(r"'(?:[^'.]*\.)?(?:on_|accept_)?([^'.]+)'")
 _INTERFACE = re.compile(r"^([a-z][a-z0-9_]*)/\w+/\w+ has no ")
 
@@ -31,8 +37,8 @@ _OF_WRONG_KIND = frozenset(
         "unknown-key",
     }
 )
-#: Infos about what nothing uses; a mistake elsewhere in the file may be the reason.
-_UNUSED = frozenset({"unused-variable", "unused-executor", "unused-qos-profile"})
+#: The info about what nothing uses; a mistake elsewhere in the file may be the reason.
+_UNUSED = "unused-declaration"
 
 
 def without_follow_ups(
@@ -54,19 +60,21 @@ def without_follow_ups(
         if not consequences.include(item)
         and not (is_misplaced and item.rule.name == "unmeasured-chain")
         and not (item.rule.name in _OF_WRONG_KIND and _mentions(item, wrong_ports))
-        and not (item.rule.name in _UNUSED and item.primary.file.path in wrong_files)
+        and not (item.rule.name == _UNUSED and item.primary.file.path in wrong_files)
     ]
     return _joined(_without_ports(_without_sections(kept)), context)
 
 
 def _names_no_node(item: Diagnostic) -> bool:
     """Return whether a process lacks nodes, because it names what is not one."""
-    return item.rule.name == "unknown-process" and item.message.endswith(_NODE)
+    return {"node", "process"} == {kind for kind, _ in item.subjects}
 
 
 def _without_sections(found: list[Diagnostic]) -> list[Diagnostic]:
     """Leave out sections of parameter files for nodes that connections do not find either."""
-    unknown = {_named(item)[-1] for item in found if item.rule.name == "unknown-node"}
+    unknown = {
+        name for item in found if item.rule.name == "unknown-node" for _, name in item.subjects[:1]
+    }
     return [
         item
         for item in found
@@ -83,7 +91,7 @@ def _without_ports(found: list[Diagnostic]) -> list[Diagnostic]:
         for item in found
         if not _is_in_loop(item, "unknown-port")
         or not any(
-            _named(item)[-1] in _named(node)[-1]
+            _named(item)[-1] in dict(node.subjects).get("node", "")
             and node.primary.file == item.primary.file
             and abs(node.primary.line - item.primary.line) <= _NEARBY_LINES
             for node in nodes
@@ -112,7 +120,7 @@ def _mentions(item: Diagnostic, ports: frozenset[str]) -> bool:
 
 
 def _files_of_infos(found: Iterable[Diagnostic]) -> set[str]:
-    return {item.primary.file.path for item in found if item.rule.name in _UNUSED}
+    return {item.primary.file.path for item in found if item.rule.name == _UNUSED}
 
 
 def _joined(found: list[Diagnostic], context: Context) -> list[Diagnostic]:
@@ -150,23 +158,13 @@ def _renamed(item: Diagnostic, context: Context) -> tuple[str, ...] | None:
             port = next((name for name in _named(item) if name == item.primary.text), None)
             return ("port", port or _named(item)[-1], item.hint)
         case _:
-            kind = _unknown_kind(item)
-            return None if kind is None else (kind, _named(item)[-1])
+            return item.subjects[0] if _is_undeclared(item) else None
 
 
-def _unknown_kind(item: Diagnostic) -> str | None:
-    """Return of what kind the name is that a diagnostic reports as unknown, or None."""
-    match item.rule.name:
-        case "unknown-node":
-            return _NODE
-        case "unknown-process":
-            return _NODE if item.message.endswith(_NODE) else "a process of this system"
-        case "unknown-executor":
-            return "an executor of this system"
-        case "unknown-qos-profile":
-            return "a QoS profile"
-        case _:
-            return None
+def _is_undeclared(item: Diagnostic) -> bool:
+    """Return whether a diagnostic is about a name that should be declared elsewhere."""
+    is_unknown = item.rule.name in ("unknown-node", "undeclared-name")
+    return is_unknown and bool(item.subjects) and item.subjects[0][0] in _DECLARED
 
 
 def _with_one_of_many(found: list[Diagnostic]) -> list[Diagnostic]:
@@ -176,16 +174,15 @@ def _with_one_of_many(found: list[Diagnostic]) -> list[Diagnostic]:
     """
     unknown: dict[str, list[Diagnostic]] = {}
     for item in found:
-        kind = _unknown_kind(item)
-        if kind is not None and "did you mean" not in (item.hint or ""):
-            unknown.setdefault(kind, []).append(item)
+        if _is_undeclared(item) and "did you mean" not in (item.hint or ""):
+            unknown.setdefault(item.subjects[0][0], []).append(item)
     left_out: set[int] = set()
     first: dict[int, Diagnostic] = {}
     for kind, (item, *others) in unknown.items():
         if len(others) + 1 >= _MANY:
             left_out.update(map(id, others))
             labels = (
-                Label(other.primary, f"'{_named(other)[-1]}' is not {kind} either")
+                Label(other.primary, f"'{other.subjects[0][1]}' is not {_DECLARED[kind]} either")
                 for other in others[:_MAX_UNKNOWN]
             )
             first[id(item)] = replace(item, related=(*item.related, *labels))

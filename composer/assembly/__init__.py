@@ -13,9 +13,10 @@ from composer.assembly.include_entries import IncludeReader
 from composer.assembly.includes import IncludeResolver, system_file
 from composer.assembly.inheritance import Inherited, NodeTypeFile, inherit
 from composer.assembly.limits import IncludeLimits, LimitExceeded
-from composer.assembly.rules import INCLUDE_CYCLE, INVALID_INCLUDE
+from composer.assembly.rules import INVALID_INCLUDE
 from composer.diagnostics import Diagnostic
-from composer.expand.rules import DUPLICATE_NODE_NAME, TOO_LARGE
+from composer.document.rules import TOO_LARGE
+from composer.expand.rules import CYCLE, DUPLICATE_NAME
 from composer.fast_dataclass import dataclass
 from composer.project import Project
 from composer.source import SourceFile, Span
@@ -25,7 +26,7 @@ __all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit"
 
 
 #: Rules about nodes that are missing or have the wrong names.
-_PARTIAL_RULES = (INVALID_INCLUDE, INCLUDE_CYCLE, DUPLICATE_NODE_NAME, TOO_LARGE)
+_PARTIAL_RULES = (INVALID_INCLUDE, CYCLE, DUPLICATE_NAME, TOO_LARGE)
 
 
 @dataclass(frozen=True, slots=True)

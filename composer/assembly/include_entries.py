@@ -13,7 +13,7 @@ from composer.assembly.namespacing import Placement
 from composer.assembly.rules import INVALID_INCLUDE
 from composer.diagnostics import Diagnostic, nearest, shown
 from composer.document import read_document
-from composer.document.rules import FILE_TOO_LARGE, UNREADABLE_FILE
+from composer.document.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.fast_dataclass import dataclass
 from composer.names import namespace_problem
 from composer.project import OUTSIDE_HINT, Project
@@ -112,7 +112,7 @@ class IncludeReader:
         tree, source, found = read_document(path, shown_path)
         self.limits.read(len(source.text), name.span)
         for diagnostic in found:
-            if diagnostic.rule in (UNREADABLE_FILE, FILE_TOO_LARGE):
+            if not source.text and diagnostic.rule in (UNREADABLE_FILE, TOO_LARGE):
                 self._refuse(name, f"cannot be included: {diagnostic.message}", diagnostic.hint)
             else:
                 self.diagnostics.append(diagnostic)

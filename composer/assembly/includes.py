@@ -10,11 +10,11 @@ from composer.assembly.joining import INCLUDE, Part, join_parts
 from composer.assembly.limits import IncludeLimits, LimitExceeded
 from composer.assembly.merging import apply_overrides
 from composer.assembly.namespacing import add_namespace
-from composer.assembly.rules import INCLUDE_CYCLE
 from composer.assembly.wildcards import Wildcards
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.document.limits import MAX_INCLUDE_DEPTH
 from composer.expand import expand
+from composer.expand.rules import CYCLE
 from composer.expand.scope import measure
 from composer.fast_dataclass import dataclass
 from composer.schema import check_schema
@@ -155,8 +155,8 @@ def _cycle(frames: list[_Frame]) -> Diagnostic:
     labels = tuple(Label(span, "through this") for span in spans[1:])
     if len(frames) == 1:
         message = f"'{shown(paths[0])}' includes itself"
-        return Diagnostic(INCLUDE_CYCLE, message, spans[0], hint="remove the include")
-    return Diagnostic(INCLUDE_CYCLE, f"this includes itself: {cycle}", spans[0], labels)
+        return Diagnostic(CYCLE, message, spans[0], hint="remove the include")
+    return Diagnostic(CYCLE, f"this includes itself: {cycle}", spans[0], labels)
 
 
 def system_file(tree: Mapping, source: SourceFile, folder: Path) -> SystemFile:

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from composer.assembly.limits import IncludeLimits, LimitExceeded
 from composer.assembly.merging import merge_maps
-from composer.assembly.rules import EXTENDS_CYCLE, UNKNOWN_BASE
+from composer.assembly.rules import UNKNOWN_BASE
 from composer.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.document import read_document
 from composer.document.limits import MAX_INCLUDE_DEPTH
+from composer.expand.rules import CYCLE
 from composer.expand.scope import measure
 from composer.fast_dataclass import dataclass
 from composer.node_types import NodeTypes
@@ -131,7 +132,7 @@ def _cycle(files: list[NodeTypeFile]) -> Diagnostic:
     labels = tuple(Label(span, "through this") for span in spans[1:])
     through = f": {cycle}" if len(files) > 1 else ""
     message = f"node type '{names[0]}' extends itself{through}"
-    return Diagnostic(EXTENDS_CYCLE, message, spans[0], labels)
+    return Diagnostic(CYCLE, message, spans[0], labels)
 
 
 def _without_extends(tree: Mapping) -> Mapping:

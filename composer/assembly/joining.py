@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from composer.assembly.rules import INCLUDE_CONFLICT
+from composer.assembly.rules import INVALID_INCLUDE
 from composer.diagnostics import Diagnostic, Label, shown
-from composer.expand.rules import DUPLICATE_NODE_NAME
+from composer.expand.rules import DUPLICATE_NAME
 from composer.fast_dataclass import dataclass
 from composer.source import Span
 from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
@@ -74,7 +74,7 @@ def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> It
         message = "this file is included twice with the same node names"
         hint = "give each include its own 'prefix'"
         related = (label,) if str(earlier.span) != str(part.span) else ()
-        diagnostics.append(Diagnostic(DUPLICATE_NODE_NAME, message, part.span, related, hint))
+        diagnostics.append(Diagnostic(DUPLICATE_NAME, message, part.span, related, hint))
 
 
 def _joined_maps(name: str, all_parts: list[Part], diagnostics: list[Diagnostic]) -> Entry | None:
@@ -118,11 +118,11 @@ def _conflict(section: str, entry: Entry, earlier: Entry) -> Iterator[Diagnostic
     if section == "nodes":
         message = f"two nodes are called '{name}'"
         hint = "give an include a 'prefix'"
-        yield Diagnostic(DUPLICATE_NODE_NAME, message, entry.key.span, (label,), hint)
+        yield Diagnostic(DUPLICATE_NAME, message, entry.key.span, (label,), hint)
     elif section == "chains" or plain(entry.value) != plain(earlier.value):
         message = f"there are two different {_MAPS[section]}s '{name}'"
         hint = "make them equal with the 'overrides' of the include, or rename one"
-        yield Diagnostic(INCLUDE_CONFLICT, message, entry.key.span, (label,), hint)
+        yield Diagnostic(INVALID_INCLUDE, message, entry.key.span, (label,), hint)
 
 
 def _system_conflicts(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
@@ -135,7 +135,7 @@ def _system_conflicts(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
             message = f"'{path[-1]}' of an included file differs from that of the system"
             labels = (Label(ours.span, "the system's"),) if ours is not None else ()
             hint = f"set '{'.'.join(path)}' only in the including file"
-            yield Diagnostic(INCLUDE_CONFLICT, message, theirs.span, labels, hint)
+            yield Diagnostic(INVALID_INCLUDE, message, theirs.span, labels, hint)
 
 
 def _setting(tree: Mapping, path: tuple[str, ...]) -> Scalar | None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from composer.assembly.rules import TOO_MUCH_INCLUDED
 from composer.diagnostics import Diagnostic
 from composer.document.limits import MAX_BYTES, MAX_INCLUDED_VALUES, MAX_INCLUDES, MAX_MATCHES
+from composer.document.rules import TOO_LARGE
 from composer.fast_dataclass import dataclass
 from composer.source import Span
 
@@ -17,7 +17,7 @@ class LimitExceeded(Exception):
 
     def __init__(self, message: str, span: Span, hint: str) -> None:
         super().__init__(message)
-        self.diagnostic = Diagnostic(TOO_MUCH_INCLUDED, message, span, hint=hint)
+        self.diagnostic = Diagnostic(TOO_LARGE, message, span, hint=hint)
 
 
 @dataclass(slots=True)

@@ -20,7 +20,7 @@ from composer.document.events import first_excess_value, parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.parameter_files import ParameterFileBuilder
-from composer.document.rules import KEY_WITHOUT_VALUE, NOT_A_MAP
+from composer.document.rules import KEY_WITHOUT_VALUE, YAML_SYNTAX
 from composer.document.scalars import resolve_plain
 from composer.source import SourceFile, Span, shown_path
 from composer.tree import Mapping, Scalar, ScalarValue, Tree, describe
@@ -148,4 +148,4 @@ def _root(
         message, span, hint = f"expected keys and values, found {describe(tree)}", tree.span, None
         if isinstance(tree, Scalar) and ":" in str(tree.value):
             hint = "put a space after the colon"
-    return None, [*diagnostics, Diagnostic(NOT_A_MAP, message, span, hint=hint or first_key_hint)]
+    return None, [*diagnostics, Diagnostic(YAML_SYNTAX, message, span, hint=hint or first_key_hint)]

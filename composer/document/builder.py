@@ -103,7 +103,7 @@ class TreeBuilder:
         span = span_at(self._source, event.start_mark, 3)
         message = "a second document starts here"
         hint = "put each system or node type into its own file"
-        raise Stopped(Diagnostic(rules.SEVERAL_DOCUMENTS, message, span, hint=hint))
+        raise Stopped(Diagnostic(rules.YAML_SYNTAX, message, span, hint=hint))
 
     def _on_scalar(self, event: yaml.ScalarEvent) -> None:
         self._count(1, event.start_mark)
@@ -128,7 +128,7 @@ class TreeBuilder:
         start = span_at(self._source, event.start_mark)
         if len(self._open) >= MAX_DEPTH:
             message = f"maps and lists are nested more than {MAX_DEPTH} levels deep"
-            raise Stopped(Diagnostic(rules.NESTED_TOO_DEEP, message, start))
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, start))
         if event.anchor is not None:
             self._anchors[event.anchor] = None
         self._open.append(_Open(start, is_map, bool(event.flow_style), event.anchor))
@@ -151,14 +151,16 @@ class TreeBuilder:
                 f"'*{name}' is part of the value that it repeats" if inside else _undefined(name)
             )
             hint = None if inside else f"mark the value with '&{name}', or quote the text"
-            raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint=hint))
+            raise Stopped(Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint=hint))
         if self._open and self._open[-1].is_map and not self._open[-1].awaits_value:
             message = f"found the alias '*{name}', expected a key"
-            raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint="write out the key"))
+            raise Stopped(
+                Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint="write out the key")
+            )
         self._count(anchored.values, event.start_mark)
         if len(self._open) + anchored.height > MAX_DEPTH:
             message = f"with '*{name}', values are nested more than {MAX_DEPTH} levels deep"
-            raise Stopped(Diagnostic(rules.NESTED_TOO_DEEP, message, span))
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
         self._add(anchored.tree, anchored.values, anchored.height)
 
     def _add(self, tree: Tree, values: int, height: int) -> None:
@@ -178,7 +180,7 @@ class TreeBuilder:
         else:
             hint = "quote a string with braces or brackets"
             self._report(
-                rules.KEY_NOT_STRING,
+                rules.UNSUPPORTED_YAML,
                 f"a key must be a string, found {describe(tree)}",
                 tree.span,
                 hint,
@@ -212,18 +214,20 @@ class TreeBuilder:
     def _key(self, scalar: Scalar, event: yaml.ScalarEvent, parent: _Open) -> Scalar | None:
         if scalar.value == "<<" and not event.style:
             hint = "write out the keys; put what nodes share into a node type or qos_profiles"
-            self._report(rules.MERGE_KEY, "YAML merge keys are not supported", scalar.span, hint)
+            self._report(
+                rules.UNSUPPORTED_YAML, "YAML merge keys are not supported", scalar.span, hint
+            )
             return None
         if scalar.value is None and not event.value:
             self._report(
-                rules.KEY_NOT_STRING, "a key is missing before this ':'", scalar.span, None
+                rules.UNSUPPORTED_YAML, "a key is missing before this ':'", scalar.span, None
             )
             return None
         key = scalar
         if not isinstance(scalar.value, str):
             text = shown(event.value)
             message = f"a key must be a string, found {describe(scalar)}"
-            self._report(rules.KEY_NOT_STRING, message, scalar.span, f"quote it: '{text}'")
+            self._report(rules.UNSUPPORTED_YAML, message, scalar.span, f"quote it: '{text}'")
             key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
         first = parent.keys.setdefault(str(key.value), key)
         if first is key:
@@ -258,7 +262,7 @@ class TreeBuilder:
     def _report_tag(self, tag: str, mark: Mark | None) -> None:
         hint = "remove it, and quote the value if it is a string"
         message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not supported"
-        self._report(rules.YAML_TAG, message, span_at(self._source, mark), hint)
+        self._report(rules.UNSUPPORTED_YAML, message, span_at(self._source, mark), hint)
 
     def _count(self, values: int, mark: Mark | None) -> None:
         self._values += values
@@ -272,7 +276,7 @@ class TreeBuilder:
 def too_many_values(source: SourceFile, mark: Mark | None) -> Diagnostic:
     """Return the diagnostic for too many values; ``mark`` is the first one beyond MAX_VALUES."""
     message = f"this file has more than {MAX_VALUES:,} values"
-    return Diagnostic(rules.TOO_MANY_VALUES, message, span_at(source, mark))
+    return Diagnostic(rules.TOO_LARGE, message, span_at(source, mark))
 
 
 def _undefined(name: str) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, nearest, shown
 from composer.document.limits import MAX_BYTES
-from composer.document.rules import FILE_TOO_LARGE, NOT_UTF8, UNREADABLE_FILE
+from composer.document.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.source import SourceFile, Span
 
 _KINDS = {
@@ -49,7 +49,7 @@ def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]
 def too_large(source: SourceFile) -> Diagnostic:
     """Return the diagnostic for a text of more than MAX_BYTES."""
     return Diagnostic(
-        FILE_TOO_LARGE,
+        TOO_LARGE,
         f"this file is larger than {MAX_BYTES:,} bytes",
         Span(source, 1, 1),
         hint="split the system, or declare repeated nodes once as a node type",
@@ -74,7 +74,7 @@ def _not_utf8(data: bytes, offset: int, span: Span) -> Diagnostic:
         message = f"this file is {encoding}, not UTF-8"
     else:
         message = f"the byte 0x{data[offset]:02x} is not UTF-8"
-    return Diagnostic(NOT_UTF8, message, span, hint="save the file as UTF-8")
+    return Diagnostic(UNREADABLE_FILE, message, span, hint="save the file as UTF-8")
 
 
 def _read(path: Path) -> bytes | None:

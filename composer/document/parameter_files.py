@@ -115,7 +115,7 @@ class ParameterFileBuilder(TreeBuilder):
 
     def _key(self, scalar: Scalar, event: yaml.ScalarEvent, _: object) -> Scalar | None:
         if not event.value:
-            self._report(rules.KEY_NOT_STRING, "a key is missing here", scalar.span, None)
+            self._report(rules.UNSUPPORTED_YAML, "a key is missing here", scalar.span, None)
             return None
         return Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
 
@@ -127,7 +127,7 @@ class ParameterFileBuilder(TreeBuilder):
         span = span_at(self._source, event.start_mark, len(event.anchor or "") + 1)
         message = f"'*{name}' is an alias, which ROS refuses in parameter files"
         hint = "write out the value, or quote the text"
-        raise Stopped(Diagnostic(rules.BAD_ALIAS, message, span, hint=hint))
+        raise Stopped(Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint=hint))
 
     def _on_second_document(self, event: yaml.DocumentStartEvent) -> None:
         pass

@@ -141,7 +141,7 @@ def _cycle(names: list[str], scope: Scope) -> Diagnostic:
         message += f": {written}"
     labels = tuple(Label(scope.declared[name].key.span, "through this") for name in others)
     span = scope.declared[first].key.span
-    return Diagnostic(rules.CYCLIC_VARIABLES, message, span, labels)
+    return Diagnostic(rules.CYCLE, message, span, labels)
 
 
 def _unused(scope: Scope) -> Iterator[Diagnostic]:
@@ -152,4 +152,4 @@ def _unused(scope: Scope) -> Iterator[Diagnostic]:
         if name not in scope.used:
             message = f"variable '{shown(name)}' is never used"
             hint = f"use it as '${{{shown(name)}}}', or remove it"
-            yield Diagnostic(rules.UNUSED_VARIABLE, message, variable.key.span, hint=hint)
+            yield Diagnostic(rules.UNUSED_DECLARATION, message, variable.key.span, hint=hint)

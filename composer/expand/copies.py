@@ -112,7 +112,7 @@ def _distinct(choices: tuple[Tree, ...], diagnostics: list[Diagnostic]) -> tuple
             continue
         message = f"'for_each' has the value '{shown(str(value))}' twice"
         label = Label(earlier.span, "the other one")
-        problem = Diagnostic(rules.DUPLICATE_NODE_NAME, message, choice.span, (label,), _DIFFERENT)
+        problem = Diagnostic(rules.DUPLICATE_NAME, message, choice.span, (label,), _DIFFERENT)
         if all(str(item.primary) != str(problem.primary) for item in diagnostics):
             diagnostics.append(problem)
     return tuple(found.values())
@@ -147,7 +147,7 @@ def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
         if unused:
             hint = f"make the names unique: '{'_'.join((shown(entry.name), *unused))}'"
         message = f"copies of this node have the same name, '{shown(name)}'"
-        return Diagnostic(rules.DUPLICATE_NODE_NAME, message, span, hint=hint)
+        return Diagnostic(rules.DUPLICATE_NAME, message, span, hint=hint)
     label = Label(earlier.key.span, "the other one")
     message = f"two nodes are called '{shown(name)}'"
-    return Diagnostic(rules.DUPLICATE_NODE_NAME, message, span, (label,), "rename one of them")
+    return Diagnostic(rules.DUPLICATE_NAME, message, span, (label,), "rename one of them")

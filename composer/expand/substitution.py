@@ -6,7 +6,7 @@ from dataclasses import field
 
 from composer.diagnostics import Diagnostic, Label, Rule, shown
 from composer.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
-from composer.document.rules import DUPLICATE_KEY
+from composer.document.rules import DUPLICATE_KEY, TOO_LARGE
 from composer.expand import rules
 from composer.expand.references import Reference, has_reference, pieces
 from composer.expand.scope import Scope, Sized
@@ -104,7 +104,7 @@ class Substitution:
         name = self.add(key, _KEY_DEPTH).tree
         if not isinstance(name, Scalar):
             message = f"'{shown(key.value)}' is {describe(name)}, which cannot be a name"
-            self.diagnostics.append(Diagnostic(rules.NOT_A_TEXT, message, key.span))
+            self.diagnostics.append(Diagnostic(rules.MALFORMED_VARIABLE, message, key.span))
             return key
         text = name.value if isinstance(name.value, str) else shown(name.value)
         return Scalar(text, key.span, verbatim=False)
@@ -155,7 +155,7 @@ class Substitution:
         if not isinstance(found.tree, Scalar):
             kind = "map" if isinstance(found.tree, Mapping) else "list"
             message = f"'{part.written}' is a {kind}, which cannot be inserted into a string"
-            self._report(rules.NOT_A_TEXT, message, part, scalar)
+            self._report(rules.MALFORMED_VARIABLE, message, part, scalar)
             return part.written
         text = found.tree.value if isinstance(found.tree.value, str) else shown(found.tree.value)
         self.growth.characters += len(text)
@@ -183,7 +183,7 @@ class Substitution:
     def _too_large(
         self, tree: Tree, message: str, hint: str = "use shorter values, or fewer variables"
     ) -> TooLarge:
-        return TooLarge(Diagnostic(rules.TOO_LARGE, message, tree.span, hint=hint))
+        return TooLarge(Diagnostic(TOO_LARGE, message, tree.span, hint=hint))
 
     def _report(
         self,

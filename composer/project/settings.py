@@ -9,7 +9,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, Severity, shown
 from composer.document import read_document
-from composer.document.rules import NOT_A_MAP, UNREADABLE_FILE
+from composer.document.rules import UNREADABLE_FILE, YAML_SYNTAX
 from composer.fast_dataclass import dataclass
 from composer.project.rules import BAD_SETTING
 from composer.schema import check_schema
@@ -104,7 +104,7 @@ def _read_file(folder: str, _time_ns: int, _size: int) -> SettingsSource:
         problem = Diagnostic(UNREADABLE_FILE, message, Span(source, 1, 1))
         return SettingsSource(root, source, None, (problem,))
     tree, source, diagnostics = read_document(path, name)
-    if [diagnostic.rule for diagnostic in diagnostics] == [NOT_A_MAP] and _is_empty(source):
+    if [diagnostic.rule for diagnostic in diagnostics] == [YAML_SYNTAX] and _is_empty(source):
         return SettingsSource(root, source, Mapping((), Span(source, 1, 1)), ())
     return SettingsSource(root, source, tree, tuple(diagnostics))
 

@@ -13,8 +13,7 @@ from composer.fast_dataclass import dataclass
 from composer.model import Chain, Node, Port, PortKind, Timer
 from composer.source import Span
 
-LATENCY_BUDGET = error("RC415", "latency-budget")
-BROKEN_CHAIN = error("RC416", "broken-chain")
+IMPOSSIBLE_CHAIN = error("RC415", "impossible-chain")
 UNMEASURED_CHAIN = warning("RC477", "unmeasured-chain")
 
 
@@ -90,7 +89,7 @@ def check_broken_chain(context: Context) -> Iterator[Diagnostic]:
                 continue
             if not any(input_ports(node, port.full_name)):
                 yield Diagnostic(
-                    BROKEN_CHAIN,
+                    IMPOSSIBLE_CHAIN,
                     f"node '{node.name}' does not subscribe to '{port.full_name}', "
                     f"which '{before.text}' publishes",
                     after.text.span,
@@ -107,7 +106,7 @@ def check_latency_budget(context: Context) -> Iterator[Diagnostic]:
         total_ms = sum(delay.milliseconds for delay in found)
         if total_ms > chain.latency_ms.value:
             yield Diagnostic(
-                LATENCY_BUDGET,
+                IMPOSSIBLE_CHAIN,
                 f"chain '{chain.name}' may take {number(total_ms)} ms, "
                 f"more than its latency of {number(chain.latency_ms.value)} ms",
                 chain.latency_ms.span,

@@ -17,9 +17,7 @@ from composer.model.discovery import (
 )
 from composer.source import Located
 
-DISCOVERY_SETTING = error("RC496", "discovery-setting")
-DISCOVERY_ADDRESS = error("RC497", "discovery-address")
-LOCAL_DISCOVERY = error("RC498", "local-discovery")
+INVALID_DISCOVERY = error("RC496", "invalid-discovery")
 
 _NEEDED = {DiscoveryKind.SERVER: "address", DiscoveryKind.PEERS: "peers"}
 _KIND_OF_KEY = {
@@ -46,7 +44,7 @@ def check_discovery_setting(context: Context) -> Iterator[Diagnostic]:
         return
     for key in others:
         yield Diagnostic(
-            DISCOVERY_SETTING,
+            INVALID_DISCOVERY,
             f"'{key}' has no effect with discovery of kind '{kind}'",
             key.span,
             hint=f"remove it, or set 'kind: {_KIND_OF_KEY[key.value]}'",
@@ -64,7 +62,7 @@ def _missing_setting(
         hint = f"{hint}, or set 'kind: {_KIND_OF_KEY[others[0].value]}'"
     labels = tuple(Label(key.span, "this has no effect") for key in others)
     message = f"discovery of kind '{kind}' needs '{needed}'"
-    return Diagnostic(DISCOVERY_SETTING, message, kind.span, labels, hint)
+    return Diagnostic(INVALID_DISCOVERY, message, kind.span, labels, hint)
 
 
 def check_discovery_address(context: Context) -> Iterator[Diagnostic]:
@@ -86,10 +84,10 @@ def _check_all(
         problem = find_problem(text.value)
         earlier = first.setdefault(text.value, text)
         if problem is not None:
-            yield Diagnostic(DISCOVERY_ADDRESS, f"{what} '{text}' {problem}", text.span)
+            yield Diagnostic(INVALID_DISCOVERY, f"{what} '{text}' {problem}", text.span)
         elif earlier is not text:
             label = Label(earlier.span, "the first one")
-            yield Diagnostic(DISCOVERY_ADDRESS, f"{what} '{text}' is repeated", text.span, (label,))
+            yield Diagnostic(INVALID_DISCOVERY, f"{what} '{text}' is repeated", text.span, (label,))
 
 
 def check_local_discovery(context: Context) -> Iterator[Diagnostic]:
@@ -104,7 +102,7 @@ def check_local_discovery(context: Context) -> Iterator[Diagnostic]:
     for text in (*discovery.addresses, *discovery.peers):
         if is_loopback(host_of(text.value)):
             yield Diagnostic(
-                LOCAL_DISCOVERY,
+                INVALID_DISCOVERY,
                 f"'{text}' is not the same computer for all processes",
                 text.span,
                 (Label(host.span, "a process on another computer"),),

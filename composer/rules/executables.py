@@ -21,8 +21,7 @@ from composer.source import Located, Span
 
 UNKNOWN_EXECUTABLE = error("RC471", "unknown-executable")
 EXECUTABLE_NOT_INSTALLED = info("RC472", "executable-not-installed")
-INCOMPLETE_EXECUTABLE = error("RC473", "incomplete-executable")
-MANAGED_TASK = error("RC475", "managed-task")
+INVALID_EXECUTABLE = error("RC473", "invalid-executable")
 
 #: Arguments with these suffixes are files, and are looked for.
 _SCRIPTS = (".py", ".sh")
@@ -124,7 +123,7 @@ def _programs(context: Context, executable: Executable) -> Iterator[Diagnostic]:
         for name in ("package", "name"):
             if name in spans:
                 yield Diagnostic(
-                    INCOMPLETE_EXECUTABLE,
+                    INVALID_EXECUTABLE,
                     f"the executable has a 'command' and a '{name}'",
                     spans[name],
                     hint="keep either 'command', or 'package' and 'name'",
@@ -140,7 +139,7 @@ def _programs(context: Context, executable: Executable) -> Iterator[Diagnostic]:
     if missing:
         what = "'package' and 'name'" if len(missing) == 2 else f"'{missing[0]}'"
         yield Diagnostic(
-            INCOMPLETE_EXECUTABLE,
+            INVALID_EXECUTABLE,
             f"the executable has no {what}",
             executable.span,
             hint="write 'executable: {package: ..., name: ...}' or 'executable: {command: [...]}'",
@@ -165,7 +164,7 @@ def check_managed_task(context: Context) -> Iterator[Diagnostic]:
         if executable.lifecycle is LifecycleKind.MANAGED:
             spans = {key.value: key.span for key in executable.given}
             yield Diagnostic(
-                MANAGED_TASK,
+                INVALID_EXECUTABLE,
                 f"task '{node.name}' cannot be managed: it exits when it is done",
                 spans.get("lifecycle", executable.span),
                 hint="remove 'lifecycle: managed', or 'kind: task'",

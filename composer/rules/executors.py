@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import number
 from composer.analysis.rates import Cause, Rates, rates
-from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.diagnostics import Diagnostic, Label, Severity, error, info, suggestion, warning
+from composer.expand.rules import UNUSED_DECLARATION
 from composer.fast_dataclass import dataclass
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
+from composer.rules.references import UNDECLARED_NAME
 from composer.source import Located, Span
 
-UNKNOWN_EXECUTOR = error("RC207", "unknown-executor")
-UNUSED_EXECUTOR = info("RC245", "unused-executor")
 EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")
-EXECUTOR_BUSY = warning("RC414", "executor-busy")
 SINGLE_THREAD = warning("RC417", "single-thread")
 SPLIT_EXECUTOR = info("RC480", "split-executor")
 EXECUTOR_OUTSIDE_PROCESS = warning("RC481", "executor-outside-process")
+
+_EXECUTOR_BUSY = replace(EXECUTOR_OVERLOADED, severity=Severity.WARNING)
+#: From this load on, an executor is busy.
+_BUSY = 0.7
 
 
 def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
@@ -30,10 +34,11 @@ def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
         if name is None or name.value in known or is_unresolved(name.value):
             continue
         yield Diagnostic(
-            UNKNOWN_EXECUTOR,
+            UNDECLARED_NAME,
             f"node '{node.name}' runs on '{name}', which is not an executor of this system",
             name.span,
             hint=suggestion(name.value, known),
+            subjects=(("executor", name.value),),
         )
 
 
@@ -48,7 +53,7 @@ def check_unused_executor(context: Context) -> Iterator[Diagnostic]:
     for executor in context.system.executors:
         if executor.name.value not in used:
             yield Diagnostic(
-                UNUSED_EXECUTOR, f"no node runs on '{executor.name}'", executor.name.span
+                UNUSED_DECLARATION, f"no node runs on '{executor.name}'", executor.name.span
             )
 
 
@@ -248,7 +253,7 @@ def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
             )
 
 
-def check_executor_overloaded(context: Context) -> Iterator[Diagnostic]:
+def check_executor_load(context: Context) -> Iterator[Diagnostic]:
     """Add up the budgets of every executor."""
     for load in context.once(executor_loads):
         if load.ratio > 1.0:
@@ -259,17 +264,9 @@ def check_executor_overloaded(context: Context) -> Iterator[Diagnostic]:
                 load.labels,
                 "lower a rate or a budget, or move nodes to another executor",
             )
-
-
-_BUSY = 0.7
-
-
-def check_executor_busy(context: Context) -> Iterator[Diagnostic]:
-    """Add up the budgets of every executor that is not overloaded."""
-    for load in context.once(executor_loads):
-        if _BUSY < load.ratio <= 1.0:
+        elif load.ratio > _BUSY:
             yield Diagnostic(
-                EXECUTOR_BUSY,
+                _EXECUTOR_BUSY,
                 f"callbacks of {load.what} may use most of its time: {load.formula}",
                 load.span,
                 load.labels,

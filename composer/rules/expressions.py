@@ -14,7 +14,6 @@ from composer.model import Node
 from composer.source import Span
 
 UNKNOWN_NAME = error("RC209", "unknown-name")
-UNKNOWN_STATE = error("RC210", "unknown-state")
 INDEX_OUT_OF_RANGE = warning("RC308", "index-out-of-range")
 
 
@@ -67,7 +66,7 @@ def check_unknown_state(context: Context) -> Iterator[Diagnostic]:
         hint = suggestion(name, names) or f"declare it: 'state: {{{name}: 0}}'"
         labels = tuple(Label(span, "also here") for span in others[:_SHOWN_USES])
         yield Diagnostic(
-            UNKNOWN_STATE, f"the node does not declare state '{name}'", first, labels, hint
+            UNKNOWN_NAME, f"the node does not declare state '{name}'", first, labels, hint
         )
 
 

@@ -21,9 +21,7 @@ from composer.diagnostics import Diagnostic, Label, error, nearest, warning
 from composer.spelling import is_typo
 
 CONFLICTING_TRANSFORMS = error("RC510", "conflicting-transforms")
-FRAME_CYCLE = error("RC511", "frame-cycle")
-UNKNOWN_FRAME = error("RC512", "unknown-frame")
-UNCONNECTED_FRAMES = error("RC513", "unconnected-frames")
+UNCONNECTED_FRAMES = error("RC512", "unconnected-frames")
 SEVERAL_FRAME_TREES = warning("RC514", "several-frame-trees")
 
 
@@ -47,7 +45,7 @@ def check_unknown_frame(context: Context) -> Iterator[Diagnostic]:
                 if close is not None:
                     hint = f"did you mean '{close}'?"
                 message = f"no node broadcasts the frame '{frame}' on {tree.topic}"
-                yield Diagnostic(UNKNOWN_FRAME, message, span, labels, hint)
+                yield Diagnostic(UNCONNECTED_FRAMES, message, span, labels, hint)
 
 
 def check_conflicting_transforms(context: Context) -> Iterator[Diagnostic]:
@@ -96,7 +94,11 @@ def check_frame_cycle(context: Context) -> Iterator[Diagnostic]:
                 Label(item.declared.parent.span, f"the parent of '{item.child}'") for item in others
             )
             yield Diagnostic(
-                FRAME_CYCLE, message, span, (*labels, *steps), "change one of the parents"
+                CONFLICTING_TRANSFORMS,
+                message,
+                span,
+                (*labels, *steps),
+                "change one of the parents",
             )
 
 

@@ -6,7 +6,8 @@ import re
 from collections.abc import Callable, Iterator
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, error, suggestion, warning
+from composer.diagnostics import Diagnostic, error, suggestion
+from composer.expand.rules import UNUSED_DECLARATION
 from composer.model import Host
 from composer.model.hosts import (
     address_problem,
@@ -16,10 +17,9 @@ from composer.model.hosts import (
     user_problem,
     workspace_problem,
 )
+from composer.rules.references import UNDECLARED_NAME
 from composer.source import Located
 
-UNKNOWN_HOST = error("RC490", "unknown-host")
-UNUSED_HOST = warning("RC491", "unused-host")
 INVALID_HOST = error("RC492", "invalid-host")
 ENVIRONMENT_VARIABLE = error("RC494", "environment-variable")
 
@@ -35,10 +35,11 @@ def check_unknown_host(context: Context) -> Iterator[Diagnostic]:
         if name is None or name.value in hosts or is_unresolved(name.value):
             continue
         yield Diagnostic(
-            UNKNOWN_HOST,
+            UNDECLARED_NAME,
             f"process '{process.name}' runs on '{name}', which is not a host of this system",
             name.span,
             hint=suggestion(name.value, hosts) or "declare it under 'hosts:'",
+            subjects=(("host", name.value),),
         )
 
 
@@ -53,7 +54,7 @@ def check_unused_host(context: Context) -> Iterator[Diagnostic]:
     for host in system.hosts:
         if host.name.value not in used:
             yield Diagnostic(
-                UNUSED_HOST,
+                UNUSED_DECLARATION,
                 f"host '{host.name}' has no process",
                 host.name.span,
                 hint=f"set 'host: {host.name}' of a process",

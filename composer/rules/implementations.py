@@ -14,9 +14,8 @@ from composer.python_code.nodes import handlers
 from composer.source import Span
 
 IDLE_PORT = warning("RC438", "idle-port")
-CLASS_SETTING = error("RC468", "class-setting")
 SEVERAL_IMPLEMENTATIONS = error("RC470", "several-implementations")
-IN_PROCESS_SETTING = error("RC474", "in-process-setting")
+SETTING_WITHOUT_EFFECT = error("RC474", "setting-without-effect")
 
 
 def check_several_implementations(context: Context) -> Iterator[Diagnostic]:
@@ -62,7 +61,9 @@ def check_class_setting(context: Context) -> Iterator[Diagnostic]:
     for item in hosted_classes(context):
         for what, span in callback_settings(item.node):
             message = f"{what} has no effect: node '{item.node.name}' has a class"
-            yield Diagnostic(CLASS_SETTING, message, span, hint="remove it, or write a behavior")
+            yield Diagnostic(
+                SETTING_WITHOUT_EFFECT, message, span, hint="remove it, or write a behavior"
+            )
 
 
 #: Keys of a node's entry that need its process, or its code.
@@ -83,7 +84,7 @@ def check_in_process_setting(context: Context) -> Iterator[Diagnostic]:
             )
         for what, span in settings:
             yield Diagnostic(
-                IN_PROCESS_SETTING,
+                SETTING_WITHOUT_EFFECT,
                 f"{what} has no effect: node '{node.name}' is an {kind} node"
                 if kind == "external"
                 else f"{what} has no effect: node '{node.name}' is an executable",

@@ -15,7 +15,6 @@ from composer.model import ChannelKind, Port
 from composer.source import shown_path
 
 UNKNOWN_INTERFACE = error("RC301", "unknown-interface")
-WRONG_INTERFACE_KIND = error("RC302", "wrong-interface-kind")
 OUTDATED_INTERFACE = error("RC307", "outdated-interface")
 
 
@@ -111,7 +110,7 @@ def check_wrong_interface_kind(context: Context) -> Iterator[Diagnostic]:
             if found is None or _KINDS[type(found)] is port.kind.channel:
                 continue
             yield Diagnostic(
-                WRONG_INTERFACE_KIND,
+                UNKNOWN_INTERFACE,
                 f"'{port.interface}' is {_EXPECTED[_KINDS[type(found)]]}, "
                 f"but {a(port.kind)} needs {_EXPECTED[port.kind.channel]}",
                 port.interface.span,

@@ -9,15 +9,13 @@ from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.analysis.formatting import number
 from composer.analysis.rates import timed_publishers
 from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.expand.rules import CYCLE
 from composer.model import Dependency, Node, PortKind, PortOfNode, PrimaryState, System
 from composer.model.dependencies import dependency_cycles
 from composer.source import Located
 
-UNKNOWN_WATCHED_PUBLISHER = error("RC213", "unknown-watched-publisher")
-DEPENDENCY_CYCLE = error("RC401", "dependency-cycle")
-DEPENDENCY_NOT_REACHED = warning("RC402", "dependency-not-reached")
-NOTHING_TO_WATCH = error("RC404", "nothing-to-watch")
-SILENCE_TOO_SHORT = error("RC405", "silence-too-short")
+START_ORDER = warning("RC402", "start-order")
+IMPOSSIBLE_WATCH = error("RC404", "impossible-watch")
 
 
 def check_dependency_cycle(context: Context) -> Iterator[Diagnostic]:
@@ -32,7 +30,7 @@ def check_dependency_cycle(context: Context) -> Iterator[Diagnostic]:
             else f"nodes depend on each other in a cycle: {path}"
         )
         yield Diagnostic(
-            DEPENDENCY_CYCLE,
+            CYCLE,
             message,
             steps[0][0].node.span,
             tuple(
@@ -66,7 +64,7 @@ def check_dependency_not_reached(context: Context) -> Iterator[Diagnostic]:
                 continue
             if other.autostart is not None and _start_rank(system, other) < _RANK[dependency.state]:
                 yield Diagnostic(
-                    DEPENDENCY_NOT_REACHED,
+                    START_ORDER,
                     f"node '{node.name}' needs '{other.name}' to be {dependency.state}, "
                     f"but '{other.name}' autostarts only to {other.autostart}",
                     dependency.node.span,
@@ -97,7 +95,7 @@ def check_unknown_watched_publisher(context: Context) -> Iterator[Diagnostic]:
         for name, _ in node.supervision.watch.topics:
             if name.value not in known and not is_unresolved(name.value):
                 yield Diagnostic(
-                    UNKNOWN_WATCHED_PUBLISHER,
+                    IMPOSSIBLE_WATCH,
                     f"node '{node.name}' has no publisher '{name}' to watch",
                     name.span,
                     hint=suggestion(name.value, known),
@@ -114,7 +112,7 @@ def check_nothing_to_watch(context: Context) -> Iterator[Diagnostic]:
         if errors.may_declare(node.name.value, *PORT_SECTIONS):
             continue
         yield Diagnostic(
-            NOTHING_TO_WATCH,
+            IMPOSSIBLE_WATCH,
             f"node '{node.name}' is watched for silence, but has no publishers",
             limit.span,
             hint="watch the nodes that publish its input, or set 'callback_ms'",
@@ -150,7 +148,7 @@ def _compare_silence(
     if limit.value > period_ms or (deadline_ms is not None and deadline_ms < period_ms):
         return  # a deadline shorter than the period is reported instead
     yield Diagnostic(
-        SILENCE_TOO_SHORT,
+        IMPOSSIBLE_WATCH,
         f"node '{endpoint.node.name}' counts as silent after {number(limit.value)} ms, "
         f"but publishes '{endpoint.port.name}' every {number(period_ms)} ms",
         limit.span,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import a, free_name, safe_name
 from composer.diagnostics import Diagnostic, Label, error, info, warning
+from composer.expand.rules import DUPLICATE_NAME
 from composer.model import Node, Port, System
 from composer.names import (
     is_hidden,
@@ -19,15 +20,10 @@ from composer.names import (
 )
 from composer.source import Located, Span
 
-INVALID_NODE_NAME = error("RC221", "invalid-node-name")
+INVALID_NAME = error("RC221", "invalid-name")
 INVALID_NAMESPACE = error("RC222", "invalid-namespace")
-INVALID_ROS_NAME = error("RC223", "invalid-ros-name")
-INVALID_PARAMETER_NAME = error("RC224", "invalid-parameter-name")
-DUPLICATE_PORT_NAME = error("RC225", "duplicate-port-name")
-DUPLICATE_FULL_NAME = error("RC227", "duplicate-full-name")
 DEEP_NAMESPACE = warning("RC231", "deep-namespace")
 HIDDEN_NAME = info("RC232", "hidden-name")
-PRIVATE_CONNECTION_NAME = error("RC233", "private-connection-name")
 
 
 def check_invalid_node_name(context: Context) -> Iterator[Diagnostic]:
@@ -47,7 +43,7 @@ def _check_node_name(name: Located[str], names: set[str]) -> Iterator[Diagnostic
     problem = node_name_problem(name.value)
     if problem is not None and not is_unresolved(name.value):
         yield Diagnostic(
-            INVALID_NODE_NAME,
+            INVALID_NAME,
             f"node name '{name}' {problem}",
             name.span,
             hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
@@ -99,7 +95,7 @@ def check_invalid_ros_name(context: Context) -> Iterator[Diagnostic]:
     for kind, name in _ros_names(context):
         problem = topic_name_problem(name.value)
         if problem is not None and not is_unresolved(name.value):
-            yield Diagnostic(INVALID_ROS_NAME, f"{kind} name '{name}' {problem}", name.span)
+            yield Diagnostic(INVALID_NAME, f"{kind} name '{name}' {problem}", name.span)
 
 
 def _ros_names(context: Context) -> Iterator[tuple[str, Located[str]]]:
@@ -127,7 +123,7 @@ def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
             if problem is not None and not is_unresolved(name.value):
                 better = ".".join(safe_name(part) for part in name.value.split(".") if part)
                 yield Diagnostic(
-                    INVALID_PARAMETER_NAME,
+                    INVALID_NAME,
                     f"parameter name '{name}' {problem}",
                     name.span,
                     hint=f"rename it to '{free_name(better, names)}'",
@@ -140,7 +136,7 @@ def check_private_connection_name(context: Context) -> Iterator[Diagnostic]:
         name = connection.name
         if name.value.startswith("~"):
             yield Diagnostic(
-                PRIVATE_CONNECTION_NAME,
+                INVALID_NAME,
                 f"{connection.kind} '{name}' is private, but a connection is not part of a node",
                 name.span,
                 hint="use an absolute name, such as '/node/topic'",
@@ -155,7 +151,7 @@ def check_duplicate_full_name(context: Context) -> Iterator[Diagnostic]:
             other, place = first.setdefault(name, (node, span))
             if other is not node and not is_unresolved(name):
                 yield Diagnostic(
-                    DUPLICATE_FULL_NAME,
+                    DUPLICATE_NAME,
                     f"nodes '{node.name}' and '{other.name}' both have the full name '{name}'",
                     span,
                     (Label(place, "the other node"),),
@@ -177,7 +173,7 @@ def check_duplicate_port_name(context: Context) -> Iterator[Diagnostic]:
             earlier = first.setdefault(port.name.value, port)
             if earlier is not port and not is_unresolved(port.name.value):
                 yield Diagnostic(
-                    DUPLICATE_PORT_NAME,
+                    DUPLICATE_NAME,
                     f"'{port.name}' names both {a(port.kind)} and {a(earlier.kind)} of one node",
                     port.name.span,
                     (Label(earlier.name.span, f"the {earlier.kind}"),),

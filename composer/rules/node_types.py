@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePath
 
 from composer.analysis.context import Context, is_unresolved, location
-from composer.diagnostics import Diagnostic, error, info, suggestion, warning
+from composer.diagnostics import Diagnostic, error, suggestion, warning
+from composer.expand.rules import UNUSED_DECLARATION
 from composer.model import System
 from composer.node_types import replaced_built_in_type
 from composer.project import SETTINGS_FILE, Project
@@ -16,7 +17,6 @@ from composer.source import Located, shown_path
 UNKNOWN_NODE_TYPE = error("RC201", "unknown-node-type")
 REPLACED_NODE_TYPE = warning("RC214", "replaced-node-type")
 NODE_TYPE_NAME = warning("RC215", "node-type-name")
-UNUSED_NODE_TYPE = info("RC244", "unused-node-type")
 
 
 def check_unknown_node_type(context: Context) -> Iterator[Diagnostic]:
@@ -100,4 +100,4 @@ def unused_node_types(loaded: Iterable[System]) -> Iterator[Diagnostic]:
         is_unused = Path(node_type.source.path).resolve() not in used
         if is_unused and not is_opaque(node_type.name.value):
             message = f"no system here uses node type '{node_type.name}'"
-            yield Diagnostic(UNUSED_NODE_TYPE, message, node_type.name.span)
+            yield Diagnostic(UNUSED_DECLARATION, message, node_type.name.span)

@@ -20,11 +20,8 @@ from composer.analysis.parameters import (
 from composer.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import USE_SIM_TIME, Parameter, ParameterType
 
-PARAMETER_TYPE = error("RC421", "parameter-type")
-PARAMETER_RANGE = error("RC422", "parameter-range")
-PARAMETER_CHOICE = error("RC423", "parameter-choice")
+PARAMETER_VALUE = error("RC421", "parameter-value")
 PARAMETER_DECLARATION = error("RC425", "parameter-declaration")
-PARAMETER_WITHOUT_TYPE = error("RC426", "parameter-without-type")
 
 
 def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
@@ -40,7 +37,7 @@ def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
         if value is not parameter.default:
             labels = (Label(parameter.name.span, f"declared as {parameter.type}"),)
         yield Diagnostic(
-            PARAMETER_TYPE,
+            PARAMETER_VALUE,
             f"parameter '{parameter.name}' must be of type {parameter.type}, not {problem}",
             value.span,
             labels,
@@ -56,7 +53,7 @@ def check_parameter_range(context: Context) -> Iterator[Diagnostic]:
         problem = range_problem(parameter, value.value)
         if problem is not None and reported.add(parameter, value):
             yield Diagnostic(
-                PARAMETER_RANGE,
+                PARAMETER_VALUE,
                 f"parameter '{parameter.name}': {problem.message}",
                 value.span,
                 (Label(problem.limit.span, "the limit"),),
@@ -80,7 +77,7 @@ def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
         if invalid is None or not reported.add(parameter, value):
             continue
         yield Diagnostic(
-            PARAMETER_CHOICE,
+            PARAMETER_VALUE,
             f"parameter '{parameter.name}' cannot be {describe(invalid)}",
             value.span,
             (Label(choices.span, "the valid choices"),),
@@ -156,7 +153,7 @@ def check_parameter_without_type(context: Context) -> Iterator[Diagnostic]:
             if parameter.default is not None and not parameter.type.value:
                 name = parameter.name
                 yield Diagnostic(
-                    PARAMETER_WITHOUT_TYPE,
+                    PARAMETER_DECLARATION,
                     f"cannot infer the type of parameter '{name}' from "
                     f"{describe(parameter.default.value)}",
                     parameter.default.span,

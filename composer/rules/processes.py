@@ -9,9 +9,9 @@ from composer.analysis.earlier_errors import earlier_errors
 from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.model import Channel
 from composer.names import topic_name_problem
+from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE
 from composer.source import Located
 
-UNKNOWN_PROCESS = error("RC478", "unknown-process")
 CONFLICTING_PROCESS = error("RC479", "conflicting-process")
 SEPARATE_PROCESS = error("RC482", "separate-process")
 MANY_SERVICES = warning("RC488", "many-services")
@@ -29,10 +29,11 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
         if name is None or name.value in processes or is_unresolved(name.value):
             continue
         yield Diagnostic(
-            UNKNOWN_PROCESS,
+            UNDECLARED_NAME,
             f"node '{node.name}' runs in '{name}', which is not a process of this system",
             name.span,
             hint=suggestion(name.value, processes),
+            subjects=(("process", name.value),),
         )
     nodes = [node.name.value for node in system.nodes]
     known = frozenset(nodes)
@@ -41,10 +42,11 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
             if node_name.value in known or is_unresolved(node_name.value):
                 continue
             yield Diagnostic(
-                UNKNOWN_PROCESS,
+                UNKNOWN_NODE,
                 f"process '{process.name}' names '{node_name}', which is not a node of this system",
                 node_name.span,
                 hint=suggestion(node_name.value, nodes),
+                subjects=(("node", node_name.value), ("process", process.name.value)),
             )
 
 
@@ -76,7 +78,7 @@ def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
             )
     used = {process.value for process in named.values()}
     known_names = {process.name.value for process in system.processes}
-    has_others = not used <= known_names  # unknown-process reports them
+    has_others = not used <= known_names  # undeclared-name reports them
     for process in system.processes:
         problem = topic_name_problem(process.name.value)
         if problem is not None or "/" in process.name.value:

@@ -12,14 +12,11 @@ from composer.diagnostics import Diagnostic, Label, info, warning
 from composer.model import ChannelKind, Port, PortKind, PortOfNode
 from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
 
-DEADLINE_TOO_SHORT = warning("RC312", "deadline-too-short")
-LIFESPAN_TOO_SHORT = warning("RC313", "lifespan-too-short")
+QOS_DURATION_TOO_SHORT = warning("RC312", "qos-duration-too-short")
 KEEP_ALL = info("RC314", "keep-all")
 SHALLOW_QUEUE = info("RC315", "shallow-queue")
-UNRELIABLE_COMMAND = info("RC316", "unreliable-command")
+UNRELIABLE_DELIVERY = info("RC316", "unreliable-delivery")
 RELIABLE_SENSOR_STREAM = info("RC317", "reliable-sensor-stream")
-LEASE_TOO_SHORT = warning("RC319", "lease-too-short")
-UNRELIABLE_STATE = info("RC532", "unreliable-state")
 
 
 def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
@@ -31,7 +28,7 @@ def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
         deadline_ms, lifespan_ms = qos.profile.deadline_ms, qos.profile.lifespan_ms
         if deadline_ms is not None and deadline_ms < period_ms:
             yield Diagnostic(
-                DEADLINE_TOO_SHORT,
+                QOS_DURATION_TOO_SHORT,
                 f"publisher '{name}' offers a deadline of {number(deadline_ms)} ms, "
                 f"but publishes every {number(period_ms)} ms",
                 qos.policy_span("deadline_ms"),
@@ -39,7 +36,7 @@ def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
             )
         if lifespan_ms is not None and lifespan_ms < period_ms:
             yield Diagnostic(
-                LIFESPAN_TOO_SHORT,
+                QOS_DURATION_TOO_SHORT,
                 f"messages of '{name}' expire after {number(lifespan_ms)} ms, "
                 f"but are published every {number(period_ms)} ms",
                 qos.policy_span("lifespan_ms"),
@@ -55,7 +52,7 @@ def check_lease_too_short(context: Context) -> Iterator[Diagnostic]:
         is_manual = qos.profile.liveliness is Liveliness.MANUAL_BY_TOPIC
         if qos.known and is_manual and lease_ms is not None and lease_ms < period_s * 1000.0:
             yield Diagnostic(
-                LEASE_TOO_SHORT,
+                QOS_DURATION_TOO_SHORT,
                 f"the lease of publisher '{endpoint.port.name}' ends after {number(lease_ms)} ms, "
                 f"but it publishes every {number(period_s * 1000.0)} ms",
                 qos.policy_span("liveliness_lease_duration_ms"),
@@ -168,7 +165,7 @@ def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:
                 continue
             if _COMMAND.search(port.full_name):
                 yield Diagnostic(
-                    UNRELIABLE_COMMAND,
+                    UNRELIABLE_DELIVERY,
                     f"'{port.full_name}' carries commands, but is best effort and may lose them",
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: command'",
@@ -184,7 +181,7 @@ def check_unreliable_state(context: Context) -> Iterator[Diagnostic]:
             qos = port.qos
             if port.kind.channel is ChannelKind.TOPIC and qos.known and _is_lost(qos.profile):
                 yield Diagnostic(
-                    UNRELIABLE_STATE,
+                    UNRELIABLE_DELIVERY,
                     "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
                     qos.policy_span("reliability"),
                     hint="use 'reliable' or 'volatile', unless an external node requires both",

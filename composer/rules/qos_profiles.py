@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Label, error, info, suggestion
+from composer.diagnostics import Diagnostic, Label, info, suggestion
+from composer.expand.rules import CYCLE, UNUSED_DECLARATION
 from composer.model import ChannelKind, NamedQos
 from composer.qos import PRESETS
+from composer.rules.references import UNDECLARED_NAME
 from composer.source import Located
 
-UNKNOWN_QOS_PROFILE = error("RC205", "unknown-qos-profile")
-UNUSED_QOS_PROFILE = info("RC242", "unused-qos-profile")
-QOS_PROFILE_CYCLE = error("RC318", "qos-profile-cycle")
 QOS_IMPLICIT = info("RC501", "qos-implicit")
 
 
@@ -49,7 +48,11 @@ def check_unknown_qos_profile(context: Context) -> Iterator[Diagnostic]:
             else suggestion(name.value, known_profiles(context))
         )
         yield Diagnostic(
-            UNKNOWN_QOS_PROFILE, f"there is no QoS profile '{name}'", name.span, hint=hint
+            UNDECLARED_NAME,
+            f"there is no QoS profile '{name}'",
+            name.span,
+            hint=hint,
+            subjects=(("QoS profile", name.value),),
         )
 
 
@@ -65,7 +68,7 @@ def check_unused_qos_profile(context: Context) -> Iterator[Diagnostic]:
     for profile in context.system.qos_profiles:
         if profile.name.value not in used:
             yield Diagnostic(
-                UNUSED_QOS_PROFILE, f"QoS profile '{profile.name}' is never used", profile.name.span
+                UNUSED_DECLARATION, f"QoS profile '{profile.name}' is never used", profile.name.span
             )
 
 
@@ -100,7 +103,7 @@ def _profile_cycle(cycle: list[NamedQos]) -> Diagnostic:
         for place, name in zip(places[1:], names[1:], strict=True)
     )
     hint = "extend a preset" if len(cycle) == 1 else "extend a preset in one of them"
-    return Diagnostic(QOS_PROFILE_CYCLE, message, places[0].span, tuple(labels), hint)
+    return Diagnostic(CYCLE, message, places[0].span, tuple(labels), hint)
 
 
 def check_qos_implicit(context: Context) -> Iterator[Diagnostic]:

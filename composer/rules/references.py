@@ -15,6 +15,7 @@ from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port,
 
 UNKNOWN_NODE = error("RC202", "unknown-node")
 UNKNOWN_PORT = error("RC203", "unknown-port")
+UNDECLARED_NAME = error("RC205", "undeclared-name")
 WRONG_PORT_KIND = error("RC211", "wrong-port-kind")
 PORT_CONNECTED_TWICE = error("RC212", "port-connected-twice")
 
@@ -42,6 +43,7 @@ def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
             f"'{unknown.name}' is not a node of this system",
             unknown.name.span,
             hint=suggestion(unknown.name.value, unknown.known),
+            subjects=(("node", unknown.name.value),),
         )
 
 
@@ -58,6 +60,7 @@ def _node_of_endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnost
         f"'{endpoint.text}' names node '{name}', which is not a node of this system",
         part_of(endpoint.text, 0, len(name)),
         hint=suggestion(name, context.once(_node_names)),
+        subjects=(("node", name),),
     )
 
 
@@ -71,6 +74,7 @@ def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
             f"node '{node.name}' depends on '{name}', which is not a node of this system",
             name.span,
             hint=suggestion(name.value, context.once(_node_names)),
+            subjects=(("node", name.value),),
         )
 
 

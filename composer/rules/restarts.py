@@ -10,10 +10,8 @@ from composer.diagnostics import Diagnostic, warning
 from composer.model import Node, OnFailure, RestartBudget, Supervision
 from composer.source import Span
 
-ENDLESS_RESTART = warning("RC406", "endless-restart")
-UNUSED_RESTART = warning("RC407", "unused-restart")
+RESTART_SETTINGS = warning("RC406", "restart-settings")
 IMPOSSIBLE_POLICY = warning("RC476", "impossible-policy")
-RESTART_DELAY = warning("RC530", "restart-delay")
 
 
 def check_endless_restart(context: Context) -> Iterator[Diagnostic]:
@@ -28,7 +26,7 @@ def check_endless_restart(context: Context) -> Iterator[Diagnostic]:
             continue
         seen.add(budget.span)
         yield Diagnostic(
-            ENDLESS_RESTART,
+            RESTART_SETTINGS,
             f"{budget.max_attempts} restarts take at least {number(total_ms)} ms, "
             f"but only restarts within {number(budget.window_ms)} ms are counted",
             budget.span,
@@ -61,7 +59,7 @@ def check_restart_delay(context: Context) -> Iterator[Diagnostic]:
             continue
         seen.add(span)
         yield Diagnostic(
-            RESTART_DELAY,
+            RESTART_SETTINGS,
             f"restarts start with a delay of {number(restart.backoff_ms)} ms, longer than the "
             f"maximum of {number(restart.backoff_max_ms)} ms",
             span,
@@ -85,7 +83,7 @@ def check_unused_restart(context: Context) -> Iterator[Diagnostic]:
     for span in declared:
         if span not in used:
             yield Diagnostic(
-                UNUSED_RESTART,
+                RESTART_SETTINGS,
                 "the restart settings have no effect",
                 span,
                 hint="add 'on_failure: restart'",

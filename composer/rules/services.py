@@ -7,15 +7,14 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import number, port_name
-from composer.diagnostics import Diagnostic, Label, error, info, warning
+from composer.diagnostics import Diagnostic, Label, error, info
 from composer.model import Channel, ChannelKind, ImplementationKind, PortKind, PortOfNode
 from composer.model.dependencies import dependency_cycles, dependency_edges, in_dependency_order
+from composer.rules.lifecycle import START_ORDER
 from composer.source import Span
 
 DUPLICATE_SERVER = error("RC321", "duplicate-server")
-POLLED_SERVICE = info("RC331", "polled-service")
-ACTION_AS_SERVICE = info("RC332", "action-as-service")
-CLIENT_BEFORE_SERVER = warning("RC403", "client-before-server")
+UNSUITED_PATTERN = info("RC331", "unsuited-pattern")
 
 
 def check_duplicate_server(context: Context) -> Iterator[Diagnostic]:
@@ -68,7 +67,7 @@ def _started_too_early(channel: Channel, client: PortOfNode, server: PortOfNode)
     cause = next(iter(server.node.depends_on), None)
     place = cause.node.span if cause is not None else server.port.name.span
     return Diagnostic(
-        CLIENT_BEFORE_SERVER,
+        START_ORDER,
         f"'{port_name(client)}' starts before '{port_name(server)}', "
         f"the server of '{channel.name}'",
         client.port.name.span,
@@ -92,7 +91,7 @@ def check_polled_service(context: Context) -> Iterator[Diagnostic]:
                 if port is None or port.kind is not PortKind.CLIENT or period_s >= _LONGEST_POLL_S:
                     continue
                 yield Diagnostic(
-                    POLLED_SERVICE,
+                    UNSUITED_PATTERN,
                     f"timer '{timer.name}' calls service '{port.full_name}' "
                     f"{number(1 / period_s)} times a second",
                     send.port.span,
@@ -112,7 +111,7 @@ def check_action_as_service(context: Context) -> Iterator[Diagnostic]:
         for port in node.ports_of(PortKind.ACTION_SERVER):
             if port.result is not None and port.feedback is None:
                 yield Diagnostic(
-                    ACTION_AS_SERVICE,
+                    UNSUITED_PATTERN,
                     f"action server '{port.name}' returns its result immediately, like a service",
                     port.name.span,
                     hint="use a service, or add feedback",

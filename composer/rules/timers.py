@@ -11,8 +11,8 @@ from composer.analysis.formatting import number
 from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.expressions import Expression
 from composer.model import Node, Parameter, PeriodError, PeriodUnit, Timer
+from composer.rules.references import UNDECLARED_NAME
 
-UNKNOWN_TIMER = error("RC204", "unknown-timer")
 TIMER_PERIOD = error("RC411", "timer-period")
 UNUSUAL_RATE = info("RC412", "unusual-rate")
 PERIOD_UNIT = warning("RC535", "period-unit")
@@ -24,10 +24,11 @@ def check_unknown_timer(context: Context) -> Iterator[Diagnostic]:
         for unknown in node.unknown:
             if unknown.section == "timers":
                 yield Diagnostic(
-                    UNKNOWN_TIMER,
+                    UNDECLARED_NAME,
                     f"node type '{node.type_name}' has no timer '{unknown.name}'",
                     unknown.name.span,
                     hint=suggestion(unknown.name.value, unknown.known),
+                    subjects=(("timer", f"{node.name}.{unknown.name}"),),
                 )
 
 

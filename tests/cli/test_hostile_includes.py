@@ -31,34 +31,34 @@ PADDING = f"# {'x' * 1000}\n" * 900
 BOMBS: dict[str, tuple[dict[str, str], str, str]] = {
     "two of two of two, and so on": (
         {f"s{number}": twice(f"s{number}", f"s{number + 1}") for number in range(20)},
-        "too-much-included", "s16.yaml:2:18"),
+        "too-large", "s16.yaml:2:18"),
     "a few of very many": (
         {"s0": often("s0", "s1", 40), "s1": often("s1", "many", 40), "many": MANY},
-        "too-much-included", "s1.yaml:3:31"),
+        "too-large", "s1.yaml:3:31"),
     "very many of few": (
         {"s0": often("s0", "s1", 99), "s1": often("s1", "s2", 99), "s2": FEW},
-        "too-much-included", "s0.yaml:3:31"),
+        "too-large", "s0.yaml:3:31"),
     "large files": (
         {"s0": "system: s\ninclude: [s1.yaml, s2.yaml, s3.yaml]\n",
          **{f"s{number}": FEW.replace("n:", f"n{number}:") + PADDING for number in (1, 2, 3)}},
-        "too-much-included", "s0.yaml:2:29"),
+        "too-large", "s0.yaml:2:29"),
     "a cycle": ({"s0": twice("s0", "s1"), "s1": "system: s\ninclude: [s0.yaml]\n"},
-                 "include-cycle", "s0.yaml:2:18"),
-    "itself": ({"s0": "system: s\ninclude: [s0.yaml]\n"}, "include-cycle", "s0.yaml:2:11"),
+                 "cycle", "s0.yaml:2:18"),
+    "itself": ({"s0": "system: s\ninclude: [s0.yaml]\n"}, "cycle", "s0.yaml:2:11"),
     "a billion copies": ({"s0": MANY.replace("2000", "1000000000")},
-                         "variables-too-large", "s0.yaml:3:22"),
+                         "too-large", "s0.yaml:3:22"),
     "copies of copies": ({"s0": MANY.replace("2000", "1000, j: 1000, k: 1000")},
-                         "variables-too-large", "s0.yaml:3:22"),
+                         "too-large", "s0.yaml:3:22"),
     "patterns": (
         {"s0": f"{MANY}connections:\n  - topic: /t\n    from: [{PATTERNS}]\n"},
-        "too-much-included", "s0.yaml:6:2152"),
+        "too-large", "s0.yaml:6:2152"),
     "a long pattern": (
         {"s0": f"{MANY}connections:\n  - {{topic: /t, from: 'n{'*_' * 100_000}.p'}}\n"},
-        "too-much-included", "s0.yaml:5:23"),
+        "too-large", "s0.yaml:5:23"),
     "patterns for all": (
         {"s0": MANY.replace("2000", "1900")
          + "connections:\n  - {for_each: {i: 100}, topic: '/t${i}', from: '*.p'}\n"},
-        "too-much-included", "s0.yaml:5:49"),
+        "too-large", "s0.yaml:5:49"),
 }  # fmt: skip
 
 

@@ -85,4 +85,4 @@ def test_expanding_a_complete_tree_again_changes_nothing(tree: Mapping) -> None:
     if "${" not in json.dumps(plain(once)):
         twice, _ = expand(once, {})
         assert repr(plain(twice)) == repr(plain(once))
-        assert not any(diagnostic.rule.name == "cyclic-variables" for diagnostic in diagnostics)
+        assert not any(diagnostic.rule.name == "cycle" for diagnostic in diagnostics)

@@ -83,7 +83,7 @@ def test_errors_in_included_and_extended_files(project: Path, part: bytes, base:
     collected = collect_diagnostics(loadings)
     check_diagnostics(collected)
     assert {diagnostic.rule for loading in loadings for diagnostic in loading.diagnostics} == {
-        diagnostic.rule for diagnostic in collected if diagnostic.rule.name != "unused-node-type"
+        diagnostic.rule for diagnostic in collected if diagnostic.rule.name != "unused-declaration"
     }
 
 

@@ -86,8 +86,8 @@ nodes:
     found = errors(loading)
     for line, rule in (
         ("robot.yaml:2", "duplicate-key"),
-        ("robot.yaml:7", "variable-not-string"),
-        ("robot.yaml:8", "unknown-executor"),
+        ("robot.yaml:7", "malformed-variable"),
+        ("robot.yaml:8", "undeclared-name"),
         ("robot.yaml:9", "unknown-key"),
         ("robot.yaml:10", "invalid-expression"),
     ):
@@ -108,7 +108,7 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
         interfaces=interfaces,
     )
     found = errors(loading)
-    assert "--set:1 parameter-range" in found
+    assert "--set:1 parameter-value" in found
     assert "--set:2 unknown-parameter" in found
     assert "--set:3 unknown-node" in found
     assert "--set:4 invalid-override" in found
@@ -137,7 +137,7 @@ def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None
     [
         ("services: {web: {}}\n", "wrong-kind-of-file"),
         ("{}", "wrong-kind-of-file"),
-        ("", "not-a-map"),
+        ("", "yaml-syntax"),
         ("[", None),
         ("\x00", None),
     ],

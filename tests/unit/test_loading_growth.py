@@ -44,7 +44,7 @@ SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
             ("qos_profiles:\n", "  profile_#: {depth: 1}\n"),
             ("nodes:\n", f"  node_#: {{publishers: {{p: {{{STRING}, qos: profil_#}}}}}}\n"),
         ],
-        "unknown-qos-profile",
+        "undeclared-name",
     ),
     "unknown keys": ([("nodes: {one: {}}\n", "key_#: [1, 2, 3]\n")], "unknown-key"),
     "one node with many ports": (
@@ -53,7 +53,7 @@ SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
     ),
     "one that all wait for": (
         [("nodes:\n  first: {}\n", "  node_#: {lifecycle: {depends_on: [first]}}\n")],
-        "unused-executor",
+        "unused-declaration",
     ),
 }
 

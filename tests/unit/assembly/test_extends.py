@@ -110,7 +110,7 @@ def test_a_mistake_is_reported_where_it_is_written(project: Path) -> None:
 def test_a_cycle_is_one_diagnostic(project: Path) -> None:
     write(project, "nodes/sensor.yaml", "node: sensor\nextends: camera\n")
     assert found("s.yaml", "nodes/sensor.yaml", "nodes/camera.yaml") == [
-        "nodes/camera.yaml:2:10 extends-cycle"
+        "nodes/camera.yaml:2:10 cycle"
     ]
 
 
@@ -126,5 +126,5 @@ def test_a_long_line_of_types(project: Path) -> None:
     for number in range(20):
         write(project, f"nodes/t{number}.yaml", f"node: t{number}\nextends: t{number + 1}\n")
     write(project, "nodes/t20.yaml", "node: t20\n")
-    assert found("nodes/t0.yaml") == ["nodes/t16.yaml:2:10 too-much-included"]
+    assert found("nodes/t0.yaml") == ["nodes/t16.yaml:2:10 too-large"]
     assert found("nodes/t10.yaml") == []

@@ -93,7 +93,7 @@ def test_large_file_is_not_read(tmp_path: Path) -> None:
     with path.open("wb") as file:
         file.truncate(100_000_000_000)  # holes: takes no room
     diagnostic = diagnostic_for(path)
-    assert (diagnostic.rule.name, str(diagnostic.primary)) == ("file-too-large", "robot.yaml:1:1")
+    assert (diagnostic.rule.name, str(diagnostic.primary)) == ("too-large", "robot.yaml:1:1")
 
 
 def test_largest_file(tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_largest_file(tmp_path: Path) -> None:
     path.write_bytes(b"a: 1 #".ljust(MAX_BYTES, b"x"))
     assert read_document(path)[2] == []
     path.write_bytes(b"a: 1 #".ljust(MAX_BYTES + 1, b"x"))
-    assert diagnostic_for(path).rule.name == "file-too-large"
+    assert diagnostic_for(path).rule.name == "too-large"
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="there is no /proc")
@@ -127,7 +127,7 @@ def test_not_utf8(data: bytes, place: str, message: str) -> None:
     tree, _, (diagnostic,) = parse_bytes(data, "f")
     assert tree is None
     assert (diagnostic.rule.name, str(diagnostic.primary), diagnostic.message) == (
-        "not-utf8",
+        "unreadable-file",
         place,
         message,
     )

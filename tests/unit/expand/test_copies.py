@@ -24,7 +24,7 @@ def expanded(text: str) -> tuple[Mapping, list[Diagnostic]]:
 
 def nodes(written: str, variables: str = "{}") -> Plain:
     tree, diagnostics = expanded(f"system: s\nvariables: {variables}\nnodes: {written}")
-    assert [item.message for item in diagnostics if item.rule.name != "unused-variable"] == []
+    assert [item.message for item in diagnostics if item.rule.name != "unused-declaration"] == []
     found = tree.get("nodes")
     assert found is not None
     return plain(found)
@@ -75,9 +75,9 @@ def test_connections_and_includes() -> None:
         ("{i: [{}]}", "wrong-type", "4:20"),
         ("{i: [null]}", "wrong-type", "4:20"),
         ("{i: '${j}'}", "unknown-variable", "4:20"),
-        (f"{{i: {MAX_COPIES + 1}}}", "variables-too-large", "4:15"),
-        ("{i: 1000000000000}", "variables-too-large", "4:15"),
-        ("{i: 2000, j: 2000, k: 2000}", "variables-too-large", "4:15"),
+        (f"{{i: {MAX_COPIES + 1}}}", "too-large", "4:15"),
+        ("{i: 1000000000000}", "too-large", "4:15"),
+        ("{i: 2000, j: 2000, k: 2000}", "too-large", "4:15"),
     ],
 )
 def test_what_is_wrong_with_it(tmp_path: Path, loops: str, rule: str, place: str) -> None:
@@ -141,7 +141,7 @@ nodes:
 """
     [diagnostic] = diagnostics_in(text, tmp_path)
     assert (diagnostic.rule.name, str(diagnostic.primary)) == (
-        "variable-not-string",
+        "malformed-variable",
         "system.yaml:4:3",
     )
     assert diagnostic.message == f"'${{a}}' is {kind}, which cannot be a name"

@@ -72,7 +72,7 @@ def at_x(tree: Mapping) -> Tree:
 )
 def test_value(variables: str, value: str, result: Plain) -> None:
     tree, diagnostics = expanded(system(variables, value))
-    assert [item.message for item in diagnostics if item.rule.name != "unused-variable"] == []
+    assert [item.message for item in diagnostics if item.rule.name != "unused-declaration"] == []
     assert repr(plain(at_x(tree))) == repr(result)
 
 
@@ -94,7 +94,7 @@ TYPE = "node: t\nvariables: {a: {description: d}, b: {default: '${c}'}, c: {defa
 )
 def test_node_type(value: str, given: str, result: Plain) -> None:
     tree, diagnostics = expanded(TYPE + value, given)
-    assert [item.message for item in diagnostics if item.rule.name != "unused-variable"] == []
+    assert [item.message for item in diagnostics if item.rule.name != "unused-declaration"] == []
     assert plain(at_x(tree)) == result
 
 
@@ -159,23 +159,23 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
         ),
         (
             system("{a: {b: 1}}", "at ${a}"),
-            "variable-not-string", "f:3:7", "'${a}' is a map", "",
+            "malformed-variable", "f:3:7", "'${a}' is a map", "",
         ),
         (
             system("{a: [1]}", "at ${a}"),
-            "variable-not-string", "f:3:7", "'${a}' is a list", "",
+            "malformed-variable", "f:3:7", "'${a}' is a list", "",
         ),
         (
             system("{a: '${a}'}", "1"),
-            "cyclic-variables", "f:2:13", "variable 'a' is defined by itself", "",
+            "cycle", "f:2:13", "variable 'a' is defined by itself", "",
         ),
         (
             system("{a: 'x${b}', b: ['${c}'], c: '${a}', d: '${a}'}", "${d}"),
-            "cyclic-variables", "f:2:13", "variable 'a' is defined by itself: a -> b -> c -> a", "",
+            "cycle", "f:2:13", "variable 'a' is defined by itself: a -> b -> c -> a", "",
         ),
         (
             system("{a: 1, b: 2}", "${b}"),
-            "unused-variable", "f:2:13", "variable 'a' is never used", "'${a}'",
+            "unused-declaration", "f:2:13", "variable 'a' is never used", "'${a}'",
         ),
     ],
 )  # fmt: skip
@@ -229,12 +229,12 @@ def doubling(value: str, last: str) -> str:
 @pytest.mark.parametrize(
     ("text", "rule", "place"),
     [
-        (doubling("'${NEXT}${NEXT}'", "laugh"), "variables-too-large", "f:"),
-        (doubling("['${NEXT}', '${NEXT}']", "laugh"), "variables-too-large", "f:"),
-        (doubling("{a: '${NEXT}'}", "1"), "variables-too-large", "f:"),
+        (doubling("'${NEXT}${NEXT}'", "laugh"), "too-large", "f:"),
+        (doubling("['${NEXT}', '${NEXT}']", "laugh"), "too-large", "f:"),
+        (doubling("{a: '${NEXT}'}", "1"), "too-large", "f:"),
         (
             system("{a: [1, 2, 3, 4, 5, 6, 7, 8]}", "[" + "'${a}', " * 30_000 + "]"),
-            "variables-too-large", "f:3:",
+            "too-large", "f:3:",
         ),
     ],
     ids=["texts", "lists", "levels", "uses"],
@@ -254,7 +254,7 @@ def test_depth(around: int, fits: bool) -> None:
     value = "[" * 10 + "]" * 10
     uses = "[" * around + "'${a}'" + "]" * around  # within the map that the file is
     _, diagnostics = expanded(system(f"{{a: {value}}}", uses))
-    assert [item.rule.name for item in diagnostics] == ([] if fits else ["variables-too-large"])
+    assert [item.rule.name for item in diagnostics] == ([] if fits else ["too-large"])
 
 
 MANY = 20_000

@@ -21,7 +21,7 @@ TEXT = "system: demo\nnodes: {talker: {type: relai}}\n"
 def example() -> list[Diagnostic]:
     first = diagnostic(TEXT, "relai", "there is no 'relai'", line=2, hint="did you mean 'relay'?")
     label = Label(first.primary.part(0, 2), "this one")
-    second = replace(first, rule=rule(Severity.INFO, "RC244", "hint"), related=(label,), hint=None)
+    second = replace(first, rule=rule(Severity.INFO, "RC242", "hint"), related=(label,), hint=None)
     return [first, replace(first, message="again"), second]
 
 
@@ -144,7 +144,7 @@ def test_fingerprints_are_unique() -> None:
     same = diagnostic(TEXT, "relai", line=2)
     others = [
         replace(same, message="another"),
-        replace(same, rule=rule(code="RC244")),
+        replace(same, rule=rule(code="RC242")),
         diagnostic(TEXT.replace("relai", "rely"), "rely", line=2),
         diagnostic(TEXT, "relai", line=2, path="another.yaml"),
     ]

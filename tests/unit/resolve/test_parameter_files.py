@@ -190,7 +190,7 @@ def test_a_variable_is_text_and_must_be_of_the_type(tmp_path: Path) -> None:
     (tmp_path / "second.yaml").touch()
     (tmp_path / "system.yaml").write_text(SYSTEM, encoding="utf-8")
     found = {item.rule.name: item.message for item in load(tmp_path / "system.yaml").diagnostics}
-    assert found["parameter-type"].endswith("must be of type double, not the string '${speed}'")
+    assert found["parameter-value"].endswith("must be of type double, not the string '${speed}'")
     assert found["parameter-substitution"] == "'${speed}' is not replaced in parameter files"
 
 
@@ -210,5 +210,5 @@ def test_a_value_that_the_system_replaces_must_be_valid_too(tmp_path: Path) -> N
         encoding="utf-8",
     )
     found = load(system)
-    assert [item.rule.name for item in found.diagnostics] == ["parameter-range"]
+    assert [item.rule.name for item in found.diagnostics] == ["parameter-value"]
     assert found.diagnostics[0].primary.line == 1

@@ -112,7 +112,7 @@ MISTAKES = {
             "motor: {parameters: {speed: {type: double, default: fast, maximum: 5.0, "
             "choices: [1.0, 2.0]}}}"
         ),
-        ["parameter-type"],
+        ["parameter-value"],
     ),
     "a range that no value can satisfy is one mistake": (
         system(
@@ -137,7 +137,7 @@ MISTAKES = {
             "b: {services: {ask: {type: std_srvs/srv/Trigger, respond: {success: true}}}, "
             "lifecycle: {depends_on: [a]}}",
         ),
-        ["dependency-cycle"],
+        ["cycle"],
     ),
     "a remapping of an unknown name may be meant for an unconnected port": (
         system(
@@ -152,14 +152,14 @@ MISTAKES = {
             "motor: {executor: contrl, on_activate: {log: started}}",
             above="executors: {control: {kind: single_threaded}}",
         ),
-        ["unknown-executor"],
+        ["undeclared-name"],
     ),
     "an unknown profile may be the unused one": (
         system(
             "talker: {publishers: {chatter: {type: std_msgs/msg/Empty, qos: fst, external: true}}}",
             above="qos_profiles: {fast: {depth: 1}}",
         ),
-        ["unknown-qos-profile"],
+        ["undeclared-name"],
     ),
     "an invalid period is not also reported as impractical": (
         system("motor: {timers: {tick: {period_ms: -5, log: tick}}}"),
@@ -170,14 +170,14 @@ MISTAKES = {
             "motor: {parameters: {gains: {type: double, default: [1.0, 2.0]}}, "
             'timers: {tick: {period_ms: 100, log: "{parameters.gains[0]}"}}}'
         ),
-        ["parameter-type"],
+        ["parameter-value"],
     ),
     "a value of many copies is one value": (
         system(
             "motor_${i}: {for_each: {i: 5}, "
             'parameters: {index: {type: integer, default: "${i}", maximum: 2}}}'
         ),
-        ["parameter-range"],
+        ["parameter-value"],
     ),
     "a publisher of another type does not fill its messages wrongly": (
         system(
@@ -206,21 +206,21 @@ MISTAKES = {
             "publishers: {out: {type: std_msgs/msg/String, qos: command, external: true}}}",
             above="chains: {all: {through: [b.out, a.out, c.out], latency_ms: 100}}",
         ),
-        ["broken-chain"],
+        ["impossible-chain"],
     ),
     "a node in an unknown process leaves another process without nodes": (
         system(
             "motor: {process: remotes, on_activate: {log: started}}",
             above="processes: {remote: {memory_mb: 100}}",
         ),
-        ["unknown-process"],
+        ["undeclared-name"],
     ),
     "discovery of another kind makes several keys useless": (
         system(
             "motor: {on_activate: {log: started}}",
             above="discovery: {kind: peers, address: 10.0.0.5, start: true}",
         ),
-        ["discovery-setting"],
+        ["invalid-discovery"],
     ),
     "a misspelled key of discovery is not also missing": (
         system(
@@ -249,7 +249,7 @@ MISTAKES = {
                 "{service: /ask, clients: user.ask}",
             ),
         ),
-        ["invalid-ros-name"],
+        ["invalid-name"],
     ),
     "a topic with the endpoints of a service is one mistake": (
         system(
@@ -318,7 +318,7 @@ MISTAKES = {
             "mounts: {transforms: {static: {odom: {parent: odom, translation_m: {x: 1.0}}}}}",
             "viewer: {external: true, transforms: {lookup: [map, odom]}}",
         ),
-        ["frame-cycle"],
+        ["conflicting-transforms"],
     ),
     "a frame whose parent is now in a cycle is not also unknown": (
         system(
@@ -326,7 +326,7 @@ MISTAKES = {
             " arm: {parent: base, translation_m: {x: 1.0}}}}}",
             "viewer: {external: true, transforms: {lookup: [site]}}",
         ),
-        ["frame-cycle"],
+        ["conflicting-transforms"],
     ),
     "a variable without a value is not checked": (
         system('motor: {namespace: "${where}", timers: {tick: {rate_hz: "${rate}", log: tick}}}'),

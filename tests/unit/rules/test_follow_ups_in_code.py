@@ -65,7 +65,7 @@ MISTAKES = {
         {"type": f"{TWIST}Stamped", "annotation": ": Twist"},
         ["type-mismatch"],
     ),
-    "a choice that the code compares with": ({"choices": "slow, quick"}, ["parameter-choice"]),
+    "a choice that the code compares with": ({"choices": "slow, quick"}, ["parameter-value"]),
     "a service that is missing": ({"services": ""}, ["unknown-port"]),
     "the rate of the timer that publishes": ({"period": "rate_hz: fast"}, ["wrong-type"]),
 }

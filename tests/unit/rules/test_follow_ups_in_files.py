@@ -70,7 +70,7 @@ def test_two_includes_with_one_prefix_are_reported_at_the_second_prefix(tmp_path
         "  - file: part.yaml\n    prefix: a_\n"
     )
     [found] = diagnostics_in(text, tmp_path)
-    assert (found.rule.name, found.primary.line) == ("duplicate-node-name", 5)
+    assert (found.rule.name, found.primary.line) == ("duplicate-name", 5)
 
 
 def test_a_renamed_field_is_reported_once_with_all_its_uses(tmp_path: Path) -> None:
@@ -143,8 +143,8 @@ connections:
 @pytest.mark.parametrize(
     ("old", "new", "rule", "text"),
     [
-        ("{unit: [a, b]}, prefix", "{unit: [a, b, a]}, prefix", "duplicate-node-name", "a"),
-        ("{unit: [a, b]}, from", "{unit: [a, b, b]}, from", "duplicate-node-name", "b"),
+        ("{unit: [a, b]}, prefix", "{unit: [a, b, a]}, prefix", "duplicate-name", "a"),
+        ("{unit: [a, b]}, from", "{unit: [a, b, b]}, from", "duplicate-name", "b"),
         ("[a, b]}, prefix", "[a, b, 3c]}, prefix", "invalid-include", "3c"),
         ("[a, b]}, from", "[a, b, c]}, from", "unknown-node", "${unit}_driver.odom"),
         ('namespace: "${unit}"', 'namespace: "${unti}"', "unknown-variable", "${unti}"),

@@ -19,7 +19,7 @@ REMOVED = {
                 for i in range(4)
             )
         ),
-        ["unknown-qos-profile"],
+        ["undeclared-name"],
     ),
     "an include with several nodes": (
         system("a: {lifecycle: {depends_on: [camera, lidar, gps]}, on_activate: {log: started}}"),
@@ -30,7 +30,7 @@ REMOVED = {
             "a: {lifecycle: {depends_on: [lidar]}, on_activate: {log: started}}",
             above="processes: {p: {nodes: [lidar, a]}}",
         ),
-        ["unknown-process"],
+        ["unknown-node"],
     ),
     "a port that was renamed": (
         system(
@@ -65,7 +65,7 @@ REMOVED = {
             "a: {type: timer_source, variables: {message_type: std_msgs/msg/Empty},"
             " parameters: {rate_hz: 0.0}, publishers: {output: {external: true}}}"
         ),
-        ["parameter-range"],
+        ["parameter-value"],
     ),
 }
 
@@ -105,7 +105,7 @@ chains:
 """
 
 
-@pytest.mark.parametrize(("nodes", "rules"), [("*_lidars", ["unknown-process"]), ("lida*", [])])
+@pytest.mark.parametrize(("nodes", "rules"), [("*_lidars", ["unknown-node"]), ("lida*", [])])
 def test_a_chain_of_a_process_without_one_of_its_nodes(
     nodes: str, rules: list[str], tmp_path: Path
 ) -> None:

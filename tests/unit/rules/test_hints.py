@@ -32,23 +32,23 @@ chains: {all: {through: [camera.image, viewer.out], latency_ms: 5}}
 HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     "node names that would become equal": (
         "system: demo\nnodes: {a-b: {}, a b: {}, a_b: {}}\n",
-        "invalid-node-name",
+        "invalid-name",
         ["rename it to 'a_b_2'", "rename it to 'a_b_3'"],
     ),
     "parameter names that would become equal": (
         "system: demo\nnodes: {n: {parameters: {a-b: {type: bool}, a_b: {type: bool}}}}\n",
-        "invalid-parameter-name",
+        "invalid-name",
         ["rename it to 'a_b_2'"],
     ),
     "copies whose names have all variables": (
         "system: demo\nnodes: {'n_${i}': {for_each: {i: [1, 1]}, on_activate: {log: hello}}}\n",
-        "duplicate-node-name",
+        "duplicate-name",
         ["give 'for_each' values that make the names different"],
     ),
     "copies whose names have some variables": (
         "system: demo\n"
         "nodes: {'n_${i}': {for_each: {i: [1, 2], j: [1, 2]}, on_activate: {log: '${j}'}}}\n",
-        "duplicate-node-name",
+        "duplicate-name",
         ["make the names unique: 'n_${i}_${j}'"],
     ),
     "a server with the private name already": (
@@ -75,12 +75,12 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     ),
     "a chain without timers": (
         CHAIN % (", budget_ms: 20, publish: {out: '{message}'}", ""),
-        "latency-budget",
+        "impossible-chain",
         ["use shorter budgets, or allow a higher latency"],
     ),
     "a chain with a timer": (
         CHAIN % (", log: x", "\n    timers: {t: {period_ms: 50, publish: {out: {data: x}}}}"),
-        "latency-budget",
+        "impossible-chain",
         ["publish from the subscription, or use shorter timer periods"],
     ),
     "sensor data with a reliable subscription": (

@@ -86,7 +86,7 @@ def test_a_type_with_timers_may_be_external_elsewhere(tmp_path: Path) -> None:
     )
     text = "system: robot\nnodes: {clock: {type: clock, external: true%s}}\n"
     assert rules_broken(text % "", tmp_path) == []
-    assert rules_broken(text % ", log_level: debug", tmp_path) == ["in-process-setting"]
+    assert rules_broken(text % ", log_level: debug", tmp_path) == ["setting-without-effect"]
 
 
 def test_missing_packages_are_reported_where_ros_is_installed(

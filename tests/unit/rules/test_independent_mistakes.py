@@ -35,7 +35,7 @@ INDEPENDENT = {
             "arm: {transforms: {static: {hand: {parent: wrist, translation_m: {x: 1.0}}}}}",
             "viewer: {external: true, transforms: {lookup: [gripper, wrist]}}",
         ),
-        ["frame-cycle", "unknown-frame"],
+        ["conflicting-transforms", "unconnected-frames"],
     ),
     "a port that has nothing to do with the misspelled reference": (
         system(
@@ -64,7 +64,7 @@ INDEPENDENT = {
             "external: true}}}",
             connections=("{topic: /a, from: program.out, to: reader.in, qos: command}",),
         ),
-        ["outside-qos", "unreliable-command"],
+        ["outside-qos", "unreliable-delivery"],
     ),
     "an executor that other processes share": (
         system(
@@ -74,7 +74,7 @@ INDEPENDENT = {
             above="processes: {remote: {memory_mb: 100}, other: {memory_mb: 100}}\n"
             "executors: {fast: {kind: single_threaded}}",
         ),
-        ["split-executor", "unknown-process"],
+        ["split-executor", "undeclared-name"],
     ),
 }
 

@@ -91,12 +91,12 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
     "a topic on which others publish and subscribe too": ({"system.yaml": SHARED}, []),
     "errors are counted in the window only": (
         {"system.yaml": RESTART % "max_attempts: 3"},
-        [("unused-restart", "system.yaml", 6)],
+        [("restart-settings", "system.yaml", 6)],
     ),
     "a window for errors": ({"system.yaml": RESTART % "window_ms: 300"}, []),
     "two nodes with one name, and parameters of one of them": (
         {"system.yaml": NAMED, "values.yaml": VALUES % "far: 3.0"},
-        [("duplicate-full-name", "system.yaml", 5)],
+        [("duplicate-name", "system.yaml", 5)],
     ),
     "a section of parameters for another node": (
         {
@@ -148,7 +148,7 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
     ),
     "a process whose name is wrong": (
         {"system.yaml": PROCESSES},
-        [("unknown-process", "system.yaml", 4)],
+        [("undeclared-name", "system.yaml", 4)],
     ),
     "a misspelled key of a section": (
         {

@@ -149,7 +149,7 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
             "nodes/drive.yaml": DRIVE,
             "nodes/drive.py": DRIVE_CODE,
         },
-        [("frame-cycle", "system.yaml", 4)],
+        [("conflicting-transforms", "system.yaml", 4)],
     ),
     "a handle for a message": (
         {

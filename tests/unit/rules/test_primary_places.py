@@ -39,17 +39,17 @@ PLACES = {
     "a frame of a type whose other frame is known": (
         VIEWER % "gripper",
         f"{MOUNTS}  a: {{type: t}}\n  b: {{type: t}}\n",
-        [("unknown-frame", "t.yaml", 4)],
+        [("unconnected-frames", "t.yaml", 4)],
     ),
     "a frame of a type that is misspelled": (
         VIEWER.replace("map, ", "") % "base_lnik",
         f"{MOUNTS}  a: {{type: t}}\n",
-        [("unknown-frame", "t.yaml", 4)],
+        [("unconnected-frames", "t.yaml", 4)],
     ),
     "a type whose frames the system does not have": (
         VIEWER.replace("map", "wrist") % "gripper",
         f"{MOUNTS}  a: {{type: t}}\n",
-        [("unknown-frame", "system.yaml", 4), ("unknown-frame", "system.yaml", 4)],
+        [("unconnected-frames", "system.yaml", 4), ("unconnected-frames", "system.yaml", 4)],
     ),
     "a rate that is a word": (
         DRIVER % "mode",

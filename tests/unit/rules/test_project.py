@@ -32,7 +32,7 @@ def together(*names: str) -> list[Diagnostic]:
 
 def test_an_unused_node_type_is_reported(project: Path) -> None:
     [diagnostic] = together(*FILES)
-    assert diagnostic.rule.name == "unused-node-type"
+    assert diagnostic.rule.name == "unused-declaration"
     assert str(diagnostic.primary) == "nodes/old_planner.yaml:1:7"
 
 
@@ -55,6 +55,6 @@ def test_a_type_of_the_same_name_elsewhere_does_not_count(project: Path) -> None
 
 def test_it_can_be_ignored(project: Path) -> None:
     path = project / "nodes" / "old_planner.yaml"
-    comment = "# compose: ignore[unused-node-type] for other projects\n"
+    comment = "# compose: ignore[unused-declaration] for other projects\n"
     path.write_text(comment + FILES["nodes/old_planner.yaml"], encoding="utf-8")
     assert together(*FILES) == []

@@ -59,7 +59,7 @@ def test_remappings(node: str, expected: list[tuple[str, str]], tmp_path: Path) 
         (
             f"{PROGRAM}, {WHEEL}",
             "arm: {ros__parameters: {wheel_radius: fast}}",
-            [("error", "parameter-type")],
+            [("error", "parameter-value")],
         ),
         (
             f"{PROGRAM}, {WHEEL}, only_declared: true",
@@ -115,12 +115,12 @@ def test_parameter_files(
         (f"{PROGRAM}, parameters: {{'qos_overrides./words.publisher.depth': 3, 'a b': 1}}", []),
         (
             f"{WORDS}, parameters: {{'qos_overrides./words.publisher.depth': 3}}",
-            [("error", "invalid-parameter-name")],
+            [("error", "invalid-name")],
         ),
         ("executable: {command: [python3, -V], nodes: [base, base]}", []),
         (
             "executable: {command: [python3, -V], nodes: [base, front-left/wheel]}",
-            [("error", "invalid-node-name")],
+            [("error", "invalid-name")],
         ),
         (
             f"{PROGRAM}, behavior: 'arm:Arm', timers: {{t: {{rate_hz: 1}}}}, remappings: {{a: b}}",
@@ -128,7 +128,7 @@ def test_parameter_files(
         ),
         # PX4's QoS: described for a program, chosen for a node of the system.
         (f"{PROGRAM}, {WORDS.replace('command', PX4)}", []),
-        (WORDS.replace("command", PX4), [("info", "unreliable-state")]),
+        (WORDS.replace("command", PX4), [("info", "unreliable-delivery")]),
     ],
 )
 def test_names_and_qos(node: str, expected: list[tuple[str, str]], tmp_path: Path) -> None:

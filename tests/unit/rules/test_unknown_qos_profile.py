@@ -20,4 +20,4 @@ def test_a_node_type_may_name_profiles_of_the_systems_that_use_it(tmp_path: Path
     assert load(tmp_path / "demo.yaml").diagnostics == []
     (tmp_path / "demo.yaml").write_text(system)
     [diagnostic] = load(tmp_path / "demo.yaml").diagnostics
-    assert diagnostic.rule.name == "unknown-qos-profile"
+    assert diagnostic.rule.name == "undeclared-name"

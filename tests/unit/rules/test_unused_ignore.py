@@ -77,8 +77,8 @@ def test_a_comment_at_a_related_location_applies_too(tmp_path: Path) -> None:
         "  planner: {lifecycle: {autostart: inactive}}  # MARK\n"
         "  motor_controller: {lifecycle: {depends_on: [planner]}}\n"
     )
-    assert rules_broken(nodes, tmp_path) == ["dependency-not-reached"]
-    silenced = nodes.replace("MARK", "compose: ignore[dependency-not-reached] moved by hand")
+    assert rules_broken(nodes, tmp_path) == ["start-order"]
+    silenced = nodes.replace("MARK", "compose: ignore[start-order] moved by hand")
     assert rules_broken(silenced, tmp_path) == []
 
 
