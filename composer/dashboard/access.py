@@ -12,10 +12,11 @@ import ipaddress
 import secrets
 import socket
 from collections.abc import Mapping
-from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
+
+from composer.fast_dataclass import dataclass
 
 _TOKEN_BYTES = 32
 #: A token of a user's own must not be guessable.

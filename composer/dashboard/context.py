@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from composer.dashboard.access import Access
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.ros_side import RosSide
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from composer.dashboard.protocol.errors import RequestError
 from composer.diagnostics import Diagnostic
+from composer.fast_dataclass import dataclass
 from composer.graph.facts import node_facts
 from composer.graph.publishing_rates import publishing_rates_hz
 from composer.model import Node, Parameter, PrimaryState, System

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from composer import version
@@ -16,6 +15,7 @@ from composer.dashboard.forms import Forms
 from composer.dashboard.ros_side import RosSide
 from composer.dashboard.web.app import make_app
 from composer.dashboard.web.server import listen, serve
+from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.node_types import interface_folders
 from composer.project import Project

@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import wraps
 from typing import Any
 
@@ -17,6 +16,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
+from composer.fast_dataclass import dataclass
 from composer.qos import QosProfile
 from composer.remote.messages.values import class_of
 from composer.remote.session import Deadline, Session

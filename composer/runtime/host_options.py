@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.model import LogLevel, Process
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import pickle
 from collections.abc import Callable
 from copy import deepcopy
@@ -59,6 +60,34 @@ def test_objects_can_be_copied_and_changed(point: Any) -> None:
     assert deepcopy(point(1, 2)) == dataclasses.replace(point(1, 0), y=2) == point(1, 2)
     assert dataclasses.asdict(point(1)) == {"x": 1, "y": 0, "note": "", "secret": ""}
     assert not hasattr(point(1), "__dict__")
+
+
+@pytest.mark.parametrize("decorator", [dataclass, dataclasses.dataclass])
+def test_init_takes_the_parameters_of_the_fields_and_completes_the_object(
+    decorator: Decorator,
+) -> None:
+    @decorator(slots=True)
+    class Base:
+        x: int
+        items: list[int] = dataclasses.field(default_factory=list)
+        unit: str = dataclasses.field(default="m", kw_only=True)
+        total: int = dataclasses.field(init=False)
+
+        def __post_init__(self) -> None:
+            self.total = self.x + sum(self.items)
+
+    @decorator(slots=True)
+    class Derived(Base):
+        scale: float = 1.0
+
+    made: Any = Derived
+    one = made(1, [2], 3.0, unit="s")
+    assert (one.x, one.items, one.scale, one.unit, one.total) == (1, [2], 3.0, "s", 3)
+    assert made(1).items == []
+    assert made(1).items is not made(1).items
+    assert list(inspect.signature(made).parameters) == ["x", "items", "scale", "unit"]
+    with pytest.raises(TypeError, match=r"Derived\.__init__\(\) missing 1 required .*'x'"):
+        made()
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.frames import CDR, SCHEMA_ENCODING
 from composer.dashboard.foxglove.schemas import Schemas
 from composer.dashboard.protocol.outbox import Update
+from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from starlette.websockets import WebSocket
 
@@ -35,6 +35,7 @@ from composer.dashboard.protocol.errors import BadRequestError, RequestError
 from composer.dashboard.protocol.messages import Values
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
 from composer.diagnostics import nearest
+from composer.fast_dataclass import dataclass
 
 #: Messages of a topic that wait for a client.
 _MAX_WAITING = 256

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass
 from typing import Any
 
 from composer.dashboard.protocol.errors import BadRequestError
 from composer.dashboard.protocol.messages import Values
+from composer.fast_dataclass import dataclass
 
 #: The names of the protocol, the one that is preferred first.
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.dashboard.client import MAX_PENDING, POLICY_VIOLATION, Client
@@ -14,6 +13,7 @@ from composer.dashboard.foxglove.frames import WARNING, status
 from composer.dashboard.protocol.errors import RequestError
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Outbox, Update
+from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

@@ -5,13 +5,13 @@ from __future__ import annotations
 import base64
 import binascii
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.errors import BadRequestError
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
+from composer.fast_dataclass import dataclass
 from composer.qos import QosProfile
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter, deque
-from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from composer.fast_dataclass import dataclass
 from composer.model import SEVERITIES
 from composer.names import PROGRAM_LOGGER
 from composer.qos import Durability, QosProfile, Reliability

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.dashboard.observing.large_messages import LARGE_BYTES, LARGE_TYPES, large_profile
+from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.qos import Durability, QosProfile, Reliability
 from composer.remote.messages.rates import TopicRate

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
+from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.names import is_hidden
 

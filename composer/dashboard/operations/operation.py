@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.context import Dashboard
 from composer.dashboard.protocol.messages import Values
+from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide

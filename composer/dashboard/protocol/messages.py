@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from composer.dashboard.protocol.errors import BadRequestError
 from composer.diagnostics import nearest
 from composer.document.scalars import text_of_not_finite
+from composer.fast_dataclass import dataclass
 
 T = TypeVar("T")
 

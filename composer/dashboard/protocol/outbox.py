@@ -10,8 +10,10 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
+
+from composer.fast_dataclass import dataclass
 
 #: Batches of messages that wait for each subscription, and bytes that wait for one browser.
 MAX_BATCHES = 8

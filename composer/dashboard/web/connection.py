@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Coroutine
-from dataclasses import dataclass
 from typing import Any
 
 from starlette.websockets import WebSocket
@@ -23,6 +22,7 @@ from composer.dashboard.protocol.errors import BadRequestError, RequestError
 from composer.dashboard.protocol.messages import ClientRequest, Values, parse_request, to_json
 from composer.dashboard.protocol.outbox import Outbox
 from composer.diagnostics import nearest
+from composer.fast_dataclass import dataclass
 
 _MAX_SUBSCRIPTIONS = 64
 #: Operations of the connection itself.

@@ -10,11 +10,11 @@ lost and the topic has no other publisher.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from itertools import pairwise
 from time import monotonic
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.model import Node, Port, System
 from composer.runtime.metrics.statistics import ChainStatistics
 

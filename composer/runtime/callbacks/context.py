@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
 
 from rclpy.callback_groups import (
@@ -14,6 +14,7 @@ from rclpy.callback_groups import (
 from rclpy.node import Node
 
 from composer.behavior import CallCancelled
+from composer.fast_dataclass import dataclass
 from composer.model import Port
 from composer.runtime.callbacks.chains import NodeChains
 from composer.runtime.callbacks.log import ErrorLog, Log

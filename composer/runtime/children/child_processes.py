@@ -15,11 +15,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.children import launcher
 from composer.runtime.children.output import OutputLines
 from composer.runtime.executors.futures import Future

@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rclpy.callback_groups import CallbackGroup
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.strand import as_a_whole
 from composer.runtime.hosting.user_code import UserFunction

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import count
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.model import Isolation, Node, Port, PortKind, Qos
 from composer.qos import PRESETS, QosProfile
 from composer.runtime.callbacks.context import NodeContext

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from rclpy.callback_groups import (
@@ -16,6 +16,7 @@ from rclpy.executors import Executor
 from rclpy.parameter import Parameter
 from rclpy.service import Service
 
+from composer.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Awaited, Future

@@ -7,12 +7,12 @@ their feedback and may cancel them. Only what the client itself receives bypasse
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
 from unique_identifier_msgs.msg import UUID
 
+from composer.fast_dataclass import dataclass
 from composer.model import Isolation, Port
 from composer.runtime.executors.entities import actions
 from composer.runtime.executors.entities.goal_server import GoalServer

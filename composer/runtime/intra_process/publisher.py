@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 

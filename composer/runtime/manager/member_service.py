@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import zip_longest
 from time import monotonic
 from typing import Any
@@ -13,6 +12,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop

@@ -16,7 +16,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -32,6 +31,7 @@ from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
+from composer.fast_dataclass import dataclass
 from composer.model import LogLevel
 from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.clock.clock import NodeTime

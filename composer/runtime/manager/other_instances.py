@@ -13,7 +13,7 @@ import math
 import re
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 from uuid import uuid4
 
@@ -21,6 +21,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.loop import Loop
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE

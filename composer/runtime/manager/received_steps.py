@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.members.report import REPORTS_WITHIN_S
 
 T = TypeVar("T")

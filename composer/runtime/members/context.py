@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from typing import Protocol
 
 from rclpy.node import Node as RosNode
 
+from composer.fast_dataclass import dataclass
 from composer.model import LogLevel, Process
 from composer.model.processes import own_enclave
 from composer.runtime.children.child_processes import ChildProcesses, Command

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.children.child_processes import Child
 from composer.runtime.members.report import MemberReport, MemberState
 

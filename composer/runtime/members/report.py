@@ -13,9 +13,10 @@ from __future__ import annotations
 import hmac
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.metrics.numbers import finite, optional
 from composer.runtime.ros.diagnostic_arrays import Status, read_array, write_array
 

@@ -9,9 +9,10 @@ runs it twice: see :mod:`composer.runtime.manager.received_steps`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.executors.futures import Future
 
 if TYPE_CHECKING:  # this module and its tests need no ROS

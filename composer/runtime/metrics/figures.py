@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.metrics.statistics import CallbackStatistics, ChainStatistics
 
 _MS = 1e3

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+
+from composer.fast_dataclass import dataclass
 
 _MAX_SUBJECTS = 1000
 #: The subject of everything new while the limit knows too many subjects.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.metrics.histogram import Histogram
 
 

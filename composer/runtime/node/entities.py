@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from composer.fast_dataclass import dataclass
 from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from composer.fast_dataclass import dataclass
 
 #: The label of the state that a node cannot leave.
 FINALIZED = "finalized"

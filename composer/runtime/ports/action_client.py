@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -11,6 +10,7 @@ from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient
 
 from composer.behavior import CallError, GoalRejected
+from composer.fast_dataclass import dataclass
 from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for

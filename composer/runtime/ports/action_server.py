@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.serialization import serialize_message
 
 from composer.behavior import CallCancelled
+from composer.fast_dataclass import dataclass
 from composer.model import FeedbackSteps, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for

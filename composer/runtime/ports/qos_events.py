@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
 from math import inf
@@ -22,6 +21,7 @@ from rclpy.event_handler import (
     UnsupportedEventTypeError,
 )
 
+from composer.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import RepeatedWarning

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -28,6 +27,8 @@ from rcl_interfaces.srv import (
 )
 from rclpy.type_support import check_is_valid_srv_type
 from type_description_interfaces.srv import GetTypeDescription
+
+from composer.fast_dataclass import dataclass
 
 #: Names in one request; a response with so many values takes a few milliseconds.
 MAX_NAMES = 10_000

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from composer.fast_dataclass import dataclass
 from composer.names import split_node_name
 from composer.runtime.ros_graph.graph import RosGraph
 

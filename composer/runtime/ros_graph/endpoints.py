@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from composer.fast_dataclass import dataclass
 from composer.names import join_node_name
 from composer.qos import QosProfile
 from composer.runtime.ros.qos_profiles import discovered_profile

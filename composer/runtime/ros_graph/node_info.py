@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.names import split_node_name
 from composer.runtime.process.query_socket import NameAndTypes, visible
 from composer.runtime.ros_graph.graph import RosGraph

@@ -12,10 +12,10 @@ Failures are handled by the policies of the nodes, unless a command is all or no
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+from composer.fast_dataclass import dataclass
 from composer.model import PrimaryState, System
 from composer.plan import (
     blocked_nodes,

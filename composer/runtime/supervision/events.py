@@ -8,9 +8,9 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeAlias
 
+from composer.fast_dataclass import dataclass
 from composer.model import LogLevel
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 

@@ -6,9 +6,9 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import FrameType
 
+from composer.fast_dataclass import dataclass
 from composer.model import PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.node.managed_node import ManagedNode

@@ -9,11 +9,11 @@ from __future__ import annotations
 import ctypes
 import inspect
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import sleep
 from types import FrameType
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.loop import Loop

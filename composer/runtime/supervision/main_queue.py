@@ -8,9 +8,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Generic, TypeAlias, TypeVar
 
+from composer.fast_dataclass import dataclass
 from composer.plan import Fault
 from composer.runtime.process.wakeup_pipe import WakeupPipe
 

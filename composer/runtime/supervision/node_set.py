@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from composer.behavior import CallCancelled
+from composer.fast_dataclass import dataclass
 from composer.model import (
     DEFAULT_EXECUTOR,
     Executor,

@@ -6,10 +6,11 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from composer.fast_dataclass import dataclass
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.outcome import TransitionOutcome

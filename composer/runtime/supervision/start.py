@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from composer.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState, System
 from composer.names import PROGRAM_LOGGER
 from composer.plan import Plan, SystemGoals, optional_nodes

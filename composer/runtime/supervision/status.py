@@ -7,9 +7,10 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple
 
+from composer.fast_dataclass import dataclass
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import needed_states
 from composer.plan import STARTING, Condition, optional_nodes, parse_goals, start_goals

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import dataclass
 from typing import NamedTuple
 
+from composer.fast_dataclass import dataclass
 from composer.geometry import Transform, interpolate
 
 #: As in tf2.

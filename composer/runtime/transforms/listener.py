@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.time import Time
 
+from composer.fast_dataclass import dataclass
 from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
 from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.entities.sources import Taken

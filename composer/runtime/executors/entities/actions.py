@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -25,6 +24,7 @@ from rclpy.action.server import (
 from rclpy.task import Future as RclpyFuture
 from unique_identifier_msgs.msg import UUID
 
+from composer.fast_dataclass import dataclass
 from composer.runtime.executors.entities import readiness
 from composer.runtime.executors.entities.readiness import Handle, SetCallback, Signal
 from composer.runtime.executors.exceptions import is_closing

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
 from typing import Any
@@ -17,6 +16,7 @@ from rclpy.event_handler import (
     UnsupportedEventTypeError,
 )
 
+from composer.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.user_code import call_in_group
