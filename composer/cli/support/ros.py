@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -31,6 +32,8 @@ def require_ros(command: str, system: System | None = None) -> None:
             hint='pip install "ros2-composer[ros]"   or: source /opt/ros/jazzy/setup.bash',
         )
     keep_stdout_for_data()
+    gc.freeze()  # what is there now is not garbage
+    gc.enable()
     from composer.runtime.middleware.discovery import adopt_discovery
     from composer.runtime.middleware.environment import prepare_environment
     from composer.runtime.process import StartRefused
