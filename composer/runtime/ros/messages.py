@@ -16,7 +16,6 @@ from typing import Any, TypeAlias
 
 from rclpy.exceptions import NoTypeSupportImportedException
 from rclpy.type_support import check_for_type_support
-from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 from rosidl_parser.definition import (
     AbstractNestedType,
     AbstractString,
@@ -32,6 +31,7 @@ from rosidl_parser.definition import (
 from composer.diagnostics import suggestion
 from composer.interfaces.parser import split_name
 from composer.interfaces.sources import installed_prefixes
+from composer.runtime.ros.type_support import UnsupportedTypeSupport
 from composer.templates import Computed, Constant, Items, Record, Template, Text, evaluate
 
 Scope: TypeAlias = Mapping[str, Any]
