@@ -46,7 +46,8 @@ def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> Non
     if not folder.is_dir():
         return
     ports = ports_of_domain(domain_id)
-    names = sorted(path.name for path in folder.iterdir())
+    with os.scandir(folder) as entries:
+        names = sorted(entry.name for entry in entries)
     for port in filter(None, map(_PORT.fullmatch, names)):
         path = folder / port[0]
         status = _status(path)

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +39,7 @@ from composer.cli.support.ros import (
 )
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.typings import update_typings
+from composer.runtime.process.library_loading import loading_libraries
 
 if TYPE_CHECKING:
     from composer.model import Process, System
@@ -176,18 +177,21 @@ def run(
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
     warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
-    runnable = runnable_system(
-        system,
-        settings=settings or (),
-        namespace=namespace,
-        use_sim_time=use_sim_time,
-        # The coordinating process prints the warnings.
-        warnings=warnings if process is None else ShowWarnings.NONE,
-        exit_code=CONFIG,
-    )
+    # A process of a system may have environment variables of its own, which have to be set first.
+    is_loading_ros = process is None and not dry_run and not wait
+    with loading_libraries() if is_loading_ros else nullcontext():
+        runnable = runnable_system(
+            system,
+            settings=settings or (),
+            namespace=namespace,
+            use_sim_time=use_sim_time,
+            # The coordinating process prints the warnings.
+            warnings=warnings if process is None else ShowWarnings.NONE,
+            exit_code=CONFIG,
+        )
+        if process is None:
+            update_typings(runnable.result.project)
     declared = runnable.system
-    if process is None:
-        update_typings(runnable.result.project)
     member = None if process is None else _member(declared, process)
     if member is not None:
         os.environ.update({name.value: value for name, value in member.environment})
