@@ -228,8 +228,9 @@ class ExecutableNode(OutsideNode):
             self._listener.write_log(
                 LogLevel.WARN,
                 self._logger,
-                f"its program creates {count} nodes, and all of them are named {self.full_name};"
-                " list the names that they have in the program under 'nodes' of the executable",
+                f"its program creates {count} nodes, and all of them are named"
+                f" '{self.model.ros_name.value}'; list the names that they have in the program"
+                " under 'nodes' of the executable",
             )
 
     async def _end_process(self) -> None:

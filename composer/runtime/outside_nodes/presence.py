@@ -53,10 +53,11 @@ class NodePresence:
         return not earlier and not self._names.isdisjoint(RosGraph(self._manager).nodes())
 
     def namesakes(self, earlier: frozenset[bytes]) -> int:
-        """Return how many nodes one process has created with the name of the node."""
+        """Return how many nodes its process has created with its name, in any namespace."""
         events = self._manager.get_publishers_info_by_topic(_PARAMETER_EVENTS)
-        found = Counter(map(participant, self._own(events)))
-        return max((found[item] for item in found.keys() - earlier), default=0)
+        name = self._model.ros_name.value
+        counts = Counter(participant(event) for event in events if event.node_name == name)
+        return max((counts[item] for item in self.participants() - earlier), default=0)
 
     def missing(self, earlier: frozenset[bytes] = frozenset()) -> tuple[Port, ...]:
         """Return the declared ports that the node does not have yet."""

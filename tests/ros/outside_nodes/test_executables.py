@@ -434,4 +434,4 @@ def test_several_nodes_with_the_name_of_the_entry_are_reported(tmp_path: Path) -
     (tmp_path / "robot.yaml").write_text(PARAMETERS, encoding="utf-8")
     with running(TWO_NODES, tmp_path) as system:
         system.wait_for_log('"port": "/dev/ttyACM0", "renamed": true, "use_sim_time": true}')
-        system.wait_for_log("its program creates 2 nodes, and all of them are named /robot")
+        system.wait_for_log("its program creates 2 nodes, and all of them are named 'robot'")
