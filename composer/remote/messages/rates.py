@@ -42,32 +42,6 @@ class DelayStatistics:
     window: int
 
 
-class RateWindow:
-    """The arrival times of the last ``size`` messages."""
-
-    def __init__(self, size: int) -> None:
-        self._times_s: deque[float] = deque(maxlen=size + 1)
-
-    def add(self, at_s: float) -> None:
-        """Add the arrival time of a message, in seconds."""
-        self._times_s.append(at_s)
-
-    def statistics(self) -> RateStatistics | None:
-        """Return the rate, None before the second message."""
-        times = list(self._times_s)
-        periods = [later - earlier for earlier, later in pairwise(times)]
-        total_s = sum(periods)
-        if total_s <= 0.0:
-            return None
-        return RateStatistics(
-            average_hz=len(periods) / total_s,
-            shortest_s=min(periods),
-            longest_s=max(periods),
-            deviation_s=statistics.pstdev(periods),
-            window=len(periods),
-        )
-
-
 class DelayWindow:
     """The delays of the last ``size`` messages."""
 
@@ -160,6 +134,12 @@ class TopicRate:
         while len(self._bursts) > 2 and self._bursts[0].start_s < time_s:
             self._bursts.popleft()
 
+    def forget_beyond(self, messages: int) -> None:
+        """Forget the first bursts, except those with the last ``messages`` before the last one."""
+        kept = sum(item.messages for item in list(self._bursts)[:-1])
+        while len(self._bursts) > 2 and kept - self._bursts[0].messages >= messages:
+            kept -= self._bursts.popleft().messages
+
     @property
     def span_s(self) -> float:
         """The time from the first burst to the last one."""
@@ -180,3 +160,32 @@ class TopicRate:
         """The mean size of the messages, None before the first one."""
         received = sum(item.received for item in self._bursts)
         return sum(item.size_bytes for item in self._bursts) / received if received else None
+
+
+class RateWindow:
+    """The arrival times of the last ``size`` messages, and the rate of as many in whole bursts."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._times_s: deque[float] = deque(maxlen=size + 1)
+        self._rate = TopicRate()
+
+    def add(self, at_s: float) -> None:
+        """Add the arrival time of a message, in seconds."""
+        self._times_s.append(at_s)
+        self._rate.add(at_s)
+
+    def statistics(self) -> RateStatistics | None:
+        """Return the rate, None before the second burst of messages."""
+        self._rate.forget_beyond(self._size)
+        average_hz = self._rate.hertz
+        if average_hz is None:
+            return None
+        periods = [later - earlier for earlier, later in pairwise(self._times_s)]
+        return RateStatistics(
+            average_hz=average_hz,
+            shortest_s=min(periods),
+            longest_s=max(periods),
+            deviation_s=statistics.pstdev(periods),
+            window=len(periods),
+        )

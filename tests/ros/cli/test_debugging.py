@@ -212,6 +212,9 @@ def plain_subscription() -> Iterator[list[tuple[float, int]]]:
 def test_hz_prints_text() -> None:
     rate = "average rate: "
     assert rate in listed((rate,), "topic", "hz", "/lab/count", "--count", "10")
+    too_few = "too few messages on '/lab/count' to measure them yet"
+    two = ("topic", "hz", "/lab/count", "--count", "2")
+    assert too_few in repeated(lambda done: too_few in done.stderr, *two).stderr
 
 
 def test_bw_counts_serialized_bytes() -> None:

@@ -34,6 +34,26 @@ def test_a_window_keeps_the_last_messages() -> None:
     assert (rate.average_hz, rate.window) == (2.0, 2)
 
 
+@pytest.mark.parametrize("size", [1, 4, 7, 100])
+def test_bursts_have_the_rate_of_their_messages(size: int) -> None:
+    window = RateWindow(size)
+    for second in range(12):
+        for at_s in (second, second + 0.0004):
+            window.add(at_s)
+            rate = window.statistics()
+            assert (rate is None) == (second == 0)
+            assert rate is None or rate.average_hz == pytest.approx(2.0)
+
+
+def test_a_fast_topic_has_its_rate_with_a_small_window() -> None:
+    window = RateWindow(3)
+    for number in range(1000):
+        window.add(number / 1000)
+    rate = window.statistics()
+    assert rate is not None
+    assert (rate.average_hz, rate.window) == (pytest.approx(1000.0, rel=0.02), 3)
+
+
 def test_bandwidth_is_that_of_a_steady_topic_from_the_second_message_on() -> None:
     window = BandwidthWindow(100)
     for number in range(21):

@@ -210,16 +210,19 @@ def _measure(topic: str, measurement: _Measurement, qos: QosOptions, limits: _Li
                         f"no message received on '{name}' for {limits.message_timeout_s:g} s"
                     )
                 if next_report.passed:
-                    has_new = received > reported
-                    _print_report(measurement.report(time.monotonic()) if has_new else None, name)
+                    if received > reported:
+                        _print_report(measurement, name)
+                    else:
+                        say(f"no new messages on '{name}'")
                     reported, next_report = received, Deadline(_REPORT_EVERY_S)
         if received > reported:
-            _print_report(measurement.report(time.monotonic()), name)
+            _print_report(measurement, name)
 
 
-def _print_report(text: str | None, topic: str) -> None:
+def _print_report(measurement: _Measurement, topic: str) -> None:
+    text = measurement.report(time.monotonic())
     if text is None:
-        say(f"no new messages on '{topic}'")
+        say(f"too few messages on '{topic}' to measure them yet")
     else:
         write(text)
 
