@@ -1,8 +1,7 @@
 """Order the boxes on the ranks with the barycenter method.
 
 Sweeps over the ranks in both directions move every box to the mean position of its neighbors;
-groups move as a whole. The order with the fewest crossings is kept and improved by transposing
-neighbors.
+groups move as a whole. The order with the fewest crossings, of sweeps from several starts, is kept.
 """
 
 from __future__ import annotations
@@ -15,12 +14,9 @@ from composer.graph.layout.boxes import Box, Group, Item, Link, space_between
 
 _SWEEPS = 12
 _MAX_SWEEPS_WITHOUT_GAIN = 4
-_ROUNDS = 8
 
 #: The cost of an order: crossings, then the total length of edges across in pixels.
 _Cost = tuple[int, float]
-#: The segments that leave an item: rank, target rank, and the positions of both ends.
-_Pieces = dict[tuple[int, int], list[tuple[float, float]]]
 #: The children of every group.
 _Order = list[tuple[Group, list[Item]]]
 
@@ -28,10 +24,9 @@ _Order = list[tuple[Group, list[Item]]]
 def order_boxes(root: Group) -> None:
     """Sort the children of all groups for few crossings, and give every box a position."""
     by_rank = _by_rank(root)
-    found = [_swept(root, by_rank, start) for start in (_as_declared, _as_reached)]
-    best = min(found, key=lambda one: one[0])
-    _restore(best[1])
-    _transpose(root, best)
+    swept = [_swept(root, by_rank, start) for start in (_as_declared, _reversed, _as_reached)]
+    _, order = min(swept, key=lambda one: one[0])
+    _restore(order)
     _pack(root)
 
 
@@ -59,18 +54,6 @@ def _swept(
     return best
 
 
-def _transpose(root: Group, best: tuple[_Cost, _Order]) -> None:
-    for _ in range(_ROUNDS):
-        _pack(root)
-        if not _transpose_once(root):
-            break
-        _pack(root)
-        reached = _cost(root)
-        if reached < best[0]:
-            best = (reached, _children(root))
-    _restore(best[1])
-
-
 def _by_rank(root: Group) -> list[list[Box]]:
     ranks: list[list[Box]] = [[] for _ in range(root.last_rank + 1)]
     for box in root.boxes():
@@ -92,6 +75,11 @@ def _restore(order: _Order) -> None:
 
 def _as_declared(root: Group) -> None:
     """Keep the declared order."""
+
+
+def _reversed(root: Group) -> None:
+    for group in (root, *root.groups()):
+        group.children.reverse()
 
 
 def _as_reached(root: Group) -> None:
@@ -196,81 +184,3 @@ def _inversions(lines: Sequence[tuple[float, float]]) -> int:
         count += len(seen) - bisect_right(seen, end)
         insort(seen, end)
     return count
-
-
-def _transpose_once(root: Group) -> bool:
-    """Transpose neighbors in all groups once where that helps; return whether any were.
-
-    Positions are read to know the order on each rank. Only the order of the children is to be
-    used after: positions are those of the new order as far as it goes without packing.
-    """
-    changed = [_pass_over(group) for group in [root, *root.groups()]]
-    return any(changed)
-
-
-def _pass_over(group: Group) -> bool:
-    changed = False
-    index = 0
-    while index < len(group.children) - 1:
-        other = _next_in_the_way(group.children, index)
-        if other is not None and _gain(group.children[index], group.children[other]) > 0:
-            _exchange(group.children, index, other)
-            changed = True
-        index += 1
-    return changed
-
-
-def _next_in_the_way(children: list[Item], index: int) -> int | None:
-    """Return the next child that shares a rank with the child at ``index``."""
-    item = children[index]
-    for other in range(index + 1, len(children)):
-        following = children[other]
-        if item.first_rank <= following.last_rank and following.first_rank <= item.last_rank:
-            return other
-    return None
-
-
-def _exchange(children: list[Item], index: int, other: int) -> None:
-    """Move the child at ``index`` after the one at ``other``; none in between shares a rank."""
-    first, second = children[index], children[other]
-    forward, backward = second.high - first.high, first.low - second.low
-    first.shift(forward)
-    second.shift(backward)
-    children.insert(other, children.pop(index))
-
-
-def _gain(first: Item, second: Item) -> int:
-    """Return the number of crossings saved by putting the second before the first."""
-    theirs = _pieces(second)
-    gain = 0
-    for key, lines in _pieces(first).items():
-        for begin, end in lines:
-            for other_begin, other_end in theirs.get(key, ()):
-                gain += _sign((begin - other_begin) * (end - other_end))
-    return -gain
-
-
-def _sign(value: float) -> int:
-    return (value > 0.0) - (value < 0.0)
-
-
-def _pieces(item: Item) -> _Pieces:
-    own = set(map(id, item.boxes()))
-    found: _Pieces = {}
-    for box in item.boxes():
-        for begin, other, end in _around(box):
-            if id(other) not in own:
-                found.setdefault((box.rank, other.rank), []).append((begin, end))
-    return found
-
-
-def _around(box: Box) -> list[tuple[float, Box, float]]:
-    leaving = [
-        (box.position + piece.low_offset, piece.high, piece.high.position + piece.high_offset)
-        for piece in box.after
-    ]
-    arriving = [
-        (box.position + piece.high_offset, piece.low, piece.low.position + piece.low_offset)
-        for piece in box.before
-    ]
-    return leaving + arriving
