@@ -9,8 +9,10 @@ from __future__ import annotations
 import gc
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Map
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import field
+from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import TypeAlias
 
@@ -261,13 +263,29 @@ def _check(files: Sequence[_Resolved]) -> list[LoadResult]:
         for item in files:
             if item.context is not None:
                 item.diagnostics += run_checks(item.context)
-        return [_finish(item, types) for item in files]
+        checked = {_location(item) for item in files}
+        return [_finish(item, types, checked) for item in files]
     finally:
         types.close()
 
 
-def _finish(file: _Resolved, types: TypeCheck) -> LoadResult:
-    """Return what is reported of a file in the end."""
+def _location(file: _Resolved) -> Path:
+    return file.definitions.folder / Path(file.source.path).name
+
+
+def _may_be_included(path: Path, project: Project, checked: Collection[Path]) -> bool:
+    """Return whether a file beside or above this one, which is not checked now, names it."""
+    folders = takewhile(project.holds, path.parents)
+    for other in (item for folder in folders for item in folder.glob("*.y*ml")):
+        with suppress(OSError, UnicodeDecodeError):
+            is_other = other not in checked and other.is_file()
+            if is_other and path.name in other.read_text(encoding="utf-8"):
+                return True
+    return False
+
+
+def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> LoadResult:
+    """Return what is reported of a file in the end; ``checked`` are all files of this run."""
     source, context = file.source, file.context
     project = file.definitions.project
     diagnostics = file.diagnostics
@@ -283,7 +301,12 @@ def _finish(file: _Resolved, types: TypeCheck) -> LoadResult:
     diagnostics = add_include_labels(diagnostics, file.merged.included)
     # Comments in a node type may be about rules that only apply to the systems that use it.
     is_complete = context is not None and not context.system.node_type
-    kept, used = without_ignored(diagnostics, source, complete=is_complete)
+    kept, used = without_ignored(
+        diagnostics,
+        source,
+        complete=is_complete,
+        may_be_needed=partial(_may_be_included, _location(file), project, checked),
+    )
     follow_ups |= {(UNUSED_IGNORE.code, str(comment)) for comment in used}
     all_checks()  # import every rule, so that all names in the settings are known
     selected = [

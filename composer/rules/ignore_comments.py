@@ -11,7 +11,7 @@ Errors cannot be ignored: a system with errors does not run, and a comment must 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from composer.diagnostics import (
     Diagnostic,
@@ -53,11 +53,16 @@ class Ignore:
 
 
 def without_ignored(
-    diagnostics: Iterable[Diagnostic], source: SourceFile, *, complete: bool
+    diagnostics: Iterable[Diagnostic],
+    source: SourceFile,
+    *,
+    complete: bool,
+    may_be_needed: Callable[[], bool] = lambda: False,
 ) -> tuple[list[Diagnostic], set[Span]]:
     """Return the diagnostics that no comment ignores, and the places of the comments that do.
 
     Unused comments are reported for ``source`` only, and only if ``complete``: if every rule ran.
+    With ``may_be_needed()``, a system that is not checked now may need them.
     """
     table = _Table()
     used: set[Span] = set()
@@ -78,7 +83,9 @@ def without_ignored(
             kept.append(diagnostic)
     if complete:
         names = tuple(name for rule in registered_rules() for name in (rule.code, rule.name))
-        unused = (ignore for ignore in ignores_in(source) if ignore.span not in used)
+        unused = [ignore for ignore in ignores_in(source) if ignore.span not in used]
+        if any(ignore.rule in names for ignore in unused) and may_be_needed():
+            unused = [item for item in unused if item.span in errors or item.rule not in names]
         kept += [_unused(ignore, names, is_error=ignore.span in errors) for ignore in unused]
     return kept, used
 
@@ -140,8 +147,7 @@ def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagno
         )
     if ignore.rule in names:
         message = f"there is no '{ignore.rule}' to ignore here"
-        hint = "remove it, unless a system that includes this file needs it"
-        return Diagnostic(UNUSED_IGNORE, message, ignore.span, hint=hint)
+        return Diagnostic(UNUSED_IGNORE, message, ignore.span, hint="remove it")
     close = nearest(ignore.rule, names)
     hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
     return Diagnostic(
