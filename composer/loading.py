@@ -33,7 +33,7 @@ from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
 from composer.rules.node_types import unused_node_types
-from composer.rules.python.type_check import TypeCheck
+from composer.rules.type_check import TypeCheck
 from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile, Span

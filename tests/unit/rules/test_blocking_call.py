@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from composer.python_code.trees import Function
-from composer.rules.behaviors.blocking import endless_loops
+from composer.rules.behaviors import endless_loops
 from tests.unit.support.checking import diagnostics_in
 
 SYSTEM = "system: demo\nnodes:\n  a: {behavior: code:Code, timers: {tick: {period_ms: 1000}}}\n"

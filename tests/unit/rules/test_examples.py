@@ -44,7 +44,8 @@ def test_good_example_breaks_none(
 
 def test_all_checks_have_tested_examples() -> None:
     run = {rule.code for rule in RULES}
-    # RC307 needs an installed package: test_outdated_interface.py.
+    # RC307 needs an installed package (test_outdated_interface.py), RC437 an old Python
+    # (test_checker_limits.py).
     modules = [check.__globals__.values() for check in all_checks()]
     known = {item.code for names in modules for item in names if isinstance(item, Rule)}
-    assert known - run == {"RC307"}
+    assert known - run == {"RC307", "RC437"}

@@ -20,7 +20,7 @@ from composer.python_code.checker import RunningCheck, start
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import use_of
 from composer.python_code.problems import Family, Problem
-from composer.rules.python.families import diagnostic, sources
+from composer.rules.python import diagnostic, sources
 from composer.source import Span
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.

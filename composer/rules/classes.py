@@ -1,4 +1,4 @@
-"""Classes that do what a hosted node cannot: spin, create nodes, block, bring their own context."""
+"""Classes of nodes that are missing, or do what a hosted node cannot: spin, block, create nodes."""
 
 from __future__ import annotations
 
@@ -7,64 +7,77 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
-from composer.diagnostics import Diagnostic, error, warning
+from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.model import ExecutorKind, Node, System
 from composer.model.dependencies import dependency_edges
 from composer.python_code.nodes import ClassOfNode
 from composer.python_code.scopes import Call
+from composer.python_code.syntax import Method
 from composer.python_code.trees import SCOPES, is_none, span_of, walk
-from composer.rules.python.definitions import as_warning, rclpy_class
+from composer.rules.python import as_warning, missing, unnamed
 
-_IMPORT = "import rclpy\n"
-_ASKING = '\n    def ask(self):\n        return input("name: ")\n'
+CLASS_MISSING = error("RC460", "class-missing")
+CLASS_NOT_INSTALLED = info("RC461", "class-not-installed")
+CLASS_NOT_A_NODE = error("RC462", "class-not-a-node")
+CLASS_ARGUMENTS = error("RC463", "class-arguments")
+CLASS_SPINS = error("RC464", "class-spins")
+CLASS_SECOND_NODE = error("RC465", "class-second-node")
+CLASS_CONTEXT = error("RC466", "class-context")
+CLASS_BLOCKS = warning("RC467", "class-blocks")
 
-CLASS_SPINS = error(
-    code="RC464",
-    name="class-spins",
-    summary="The constructor of a class spins its node.",
-    why=(
-        "rclpy.spin returns when the process ends, so the node would never be configured. "
-        "The composer calls the callbacks of the class."
-    ),
-    bad=rclpy_class("rclpy.spin(self)", head=_IMPORT),
-    good=rclpy_class(head=_IMPORT, methods="\n\ndef main():\n    rclpy.spin(Talker())\n"),
-)
-CLASS_SECOND_NODE = error(
-    code="RC465",
-    name="class-second-node",
-    summary="A class creates a second ROS node.",
-    why=(
-        "Nothing would spin the second node, and it would not follow the lifecycle. Every "
-        "node of a system is declared."
-    ),
-    bad=rclpy_class('self.helper = rclpy.create_node("helper")', head=_IMPORT),
-    good=rclpy_class(),
-)
-CLASS_CONTEXT = error(
-    code="RC466",
-    name="class-context",
-    summary="A class gives its node a context or command-line arguments of its own.",
-    why=(
-        "A hosted node joins the ROS graph with the context of the system, and its names and "
-        "parameters come from YAML."
-    ),
-    bad=rclpy_class().replace('("talker")', '("talker", cli_args=["--ros-args"])'),
-    good=rclpy_class(),
-)
-CLASS_BLOCKS = warning(
-    code="RC467",
-    name="class-blocks",
-    summary="A class blocks a thread that others need, or waits in its constructor.",
-    why=(
-        "While a callback sleeps or waits for a response, a single-threaded executor runs no "
-        "other callback. By default each class has an event loop of its own, which another thread "
-        "serves meanwhile. A constructor that waits for messages or a response needs the nodes "
-        "that send them to be active before: only those that it depends on are. Input from the "
-        "terminal would keep its node waiting, and so the whole bring-up."
-    ),
-    bad=rclpy_class(methods=_ASKING),
-    good=rclpy_class(methods=_ASKING.replace("input", "str")),
-)
+
+def check_classes(context: Context) -> Iterator[Diagnostic]:
+    """Check that every class can be read, is a node, and takes the arguments that it is given.
+
+    A node type alone does not need arguments; systems may add them.
+    """
+    for node in context.system.nodes:
+        if node.hosted_class is not None:
+            yield from unnamed(node.hosted_class.reference, "class", CLASS_MISSING)
+    for item in hosted_classes(context):
+        source = item.source
+        yield from missing(source, CLASS_MISSING, CLASS_MISSING, CLASS_NOT_INSTALLED)
+        if source.complete and source.class_span is not None and not source.is_rclpy_node:
+            message = f"class '{source.reference.class_name}' is not derived from rclpy's Node"
+            hint = "for a class without ROS, write 'behavior' instead of 'class'"
+            yield item.diagnostic(CLASS_NOT_A_NODE, message, source.class_span, hint)
+        constructor = item.constructor
+        if constructor is not None and constructor.known and constructor.node is not None:
+            unknown = list(_unknown_arguments(item, constructor))
+            if not context.system.node_type:
+                yield from _missing_arguments(item, constructor, len(unknown))
+            yield from unknown
+
+
+def _unknown_arguments(item: ClassOfNode, constructor: Method) -> Iterator[Diagnostic]:
+    parameters = constructor.node.args if constructor.node is not None else None
+    if parameters is None or parameters.kwarg is not None:
+        return
+    names = (*constructor.arguments, *(argument.arg for argument in parameters.kwonlyargs))
+    class_name = item.source.reference.class_name
+    for name, _ in item.hosted.arguments:
+        if name.value not in names:
+            message = f"the constructor of '{class_name}' has no argument '{name}'"
+            label = Label(constructor.span, "the constructor")
+            hint = suggestion(name.value, names)
+            yield Diagnostic(CLASS_ARGUMENTS, message, name.span, (label,), hint)
+
+
+def _missing_arguments(
+    item: ClassOfNode, constructor: Method, misspelled: int
+) -> Iterator[Diagnostic]:
+    """Yield the arguments that are missing, unless as many are given under another name."""
+    given = {name.value for name, _ in item.hosted.arguments}
+    missing = [name for names in constructor.required for name in names if name not in given]
+    if len(missing) > misspelled:
+        listed = ", ".join(f"'{name}'" for name in missing)
+        message = f"the constructor of '{item.source.reference.class_name}' needs {listed}"
+        hint = (
+            f"add 'arguments: {{{missing[0]}: ...}}'; for an object that YAML cannot write, derive"
+            " a class that creates it"
+        )
+        yield item.diagnostic(CLASS_ARGUMENTS, message, constructor.span, hint)
+
 
 _ALONE = "leave out 'executor': each class then has an event loop of its own"
 _DEPENDS = "declare what it waits for: 'lifecycle: {depends_on: [...]}'"
@@ -85,7 +98,7 @@ _REFUSED = {
 }
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check_hosting(context: Context) -> Iterator[Diagnostic]:
     """Check the calls of all methods of every class."""
     for item in hosted_classes(context):
         yield from _constructor(item)

@@ -11,76 +11,15 @@ from composer.diagnostics import Diagnostic, Label, error, info, nearest, warnin
 from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
 from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
 from composer.qos import incompatibilities
-from composer.rules.python.definitions import as_warning, rclpy_class
+from composer.rules.python import as_warning
 from composer.spelling import is_typo
 
+CLASS_PORT_MISSING = warning("RC499", "class-port-missing")
+CLASS_PORT_TYPE = error("RC487", "class-port-type")
+CLASS_PORT_QOS = info("RC493", "class-port-qos")
+CLASS_PARAMETER = warning("RC485", "class-parameter")
+CLASS_PARAMETER_TYPE = error("RC486", "class-parameter-type")
 
-def _publishing(name: str, type_: str, qos: str) -> str:
-    """Return an example with a declared publisher; the class creates ``range``, a Float32."""
-    return rclpy_class(
-        'self.range = self.create_publisher(Float32, "range", 10)',
-        keys=f"    publishers: {{{name}: {{type: {type_}, qos: {qos}, external: true}}}}\n",
-        head="from std_msgs.msg import Float32\n",
-    )
-
-
-def _declaring(key: str) -> str:
-    """Return an example with a declared parameter; the class declares ``rate_hz``, a double."""
-    return rclpy_class(
-        'self.declare_parameter("rate_hz", 10.0)', keys=f"    parameters: {{{key}}}\n"
-    )
-
-
-_FLOAT = "std_msgs/msg/Float32"
-_RIGHT_PORT = _publishing("range", _FLOAT, "command")
-_RIGHT_PARAMETER = _declaring("rate_hz: {type: double, default: 5.0}")
-
-CLASS_PORT_MISSING = warning(
-    code="RC499",
-    name="class-port-missing",
-    summary="A node declares a port that its class creates under another name.",
-    why=(
-        "Nothing is sent or received on the port, although connections and other checks rely "
-        "on it. The name is the one that the class uses; 'topic' or 'service' gives it."
-    ),
-    bad=_publishing("rang", _FLOAT, "command"),
-    good=_RIGHT_PORT,
-)
-CLASS_PORT_TYPE = error(
-    code="RC487",
-    name="class-port-type",
-    summary="A port of a node has another type than in its class.",
-    why="The class decides; endpoints of different types on one name never communicate.",
-    bad=_publishing("range", "std_msgs/msg/Float64", "command"),
-    good=_RIGHT_PORT,
-)
-CLASS_PORT_QOS = info(
-    code="RC493",
-    name="class-port-qos",
-    summary="A port of a node has another QoS than in its class.",
-    why=(
-        "The class decides, so checks of the declared QoS miss what happens on the topic. It is a "
-        "warning if the QoS of the class does not match that of another node."
-    ),
-    bad=_publishing("range", _FLOAT, "sensor_data"),
-    good=_RIGHT_PORT,
-)
-CLASS_PARAMETER = warning(
-    code="RC485",
-    name="class-parameter",
-    summary="A node sets a parameter that its class does not declare.",
-    why="rclpy ignores it, so that the class uses its default.",
-    bad=_declaring("rate: {type: double, default: 5.0}"),
-    good=_RIGHT_PARAMETER,
-)
-CLASS_PARAMETER_TYPE = error(
-    code="RC486",
-    name="class-parameter-type",
-    summary="A parameter of a node has another type than in its class.",
-    why="rclpy refuses to declare it, with InvalidParameterTypeException.",
-    bad=_declaring("rate_hz: {type: integer, default: 5}"),
-    good=_RIGHT_PARAMETER,
-)
 _KINDS = frozenset({PortKind.PUBLISHER, PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.CLIENT})
 #: The policies that decide whether endpoints match.
 _POLICIES = ("reliability", "durability", "deadline_ms", "liveliness")
@@ -88,7 +27,7 @@ _OF_EVERY_NODE = (USE_SIM_TIME, "start_type_description_service")
 _TYPES = frozenset(item.value for item in ParameterType)
 
 
-def check(context: Context) -> Iterator[Diagnostic]:
+def check_interfaces(context: Context) -> Iterator[Diagnostic]:
     """Compare the ports and parameters of nodes with their classes."""
     for item in hosted_classes(context):
         if item.node.ports:

@@ -1,1 +1,0 @@
-"""Python behaviors: their classes, handlers and callbacks."""

@@ -1,0 +1,169 @@
+"""The Python code of behaviors and classes: imports, names, types and uses of the node."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from composer.analysis.context import Context, is_unresolved
+from composer.analysis.python_nodes import distinct_behaviors, distinct_classes
+from composer.analysis.spans import class_name_hint, part_of
+from composer.diagnostics import (
+    Diagnostic,
+    Label,
+    Rule,
+    Severity,
+    error,
+    info,
+    registered_rules,
+    suggestion,
+    warning,
+)
+from composer.model import BehaviorReference, Node
+from composer.project import Project
+from composer.python_code.checks import code_problems
+from composer.python_code.checks.imports import import_problems
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.modules import nearby_modules
+from composer.python_code.problems import Family, Problem
+from composer.python_code.syntax import Module
+from composer.python_code.trees import start_span, walk
+from composer.source import Span
+
+UNKNOWN_IMPORT = error("RC444", "unknown-import")
+MODULE_NOT_INSTALLED = info("RC445", "module-not-installed")
+INTERNAL_IMPORT = warning("RC446", "internal-import")
+UNDEFINED_NAME = warning("RC447", "undefined-name")
+MISSING_ATTRIBUTE = warning("RC458", "missing-attribute")
+CALL_ARGUMENTS = warning("RC452", "call-arguments")
+TYPE_ERROR = warning("RC455", "type-error")
+MISSING_SELF = error("RC449", "missing-self")
+UNUSED_RESULT = warning("RC453", "unused-result")
+NOT_CHECKED = info("RC437", "not-checked")
+PYTHON_SYNTAX = error("RC441", "python-syntax")
+UNKNOWN_ATTRIBUTE = error("RC442", "unknown-attribute")
+WRONG_MESSAGE_TYPE = error("RC457", "wrong-message-type")
+MISSING_RETURN = error("RC448", "missing-return")
+MISSING_AWAIT = error("RC443", "missing-await")
+ASYNCIO_CALL = error("RC454", "asyncio-call")
+UNCHECKED_NONE = warning("RC456", "unchecked-none")
+TOO_EARLY = warning("RC459", "too-early")
+UNDECLARED_PARAMETER = error("RC483", "undeclared-parameter")
+MISSING_CONSTRUCTOR = error("RC484", "missing-constructor")
+
+#: What a Python file is for: a behavior, or an rclpy class.
+What: TypeAlias = Literal["behavior", "class"]
+
+
+def as_warning(rule: Rule, *, unless: bool = False) -> Rule:
+    """Return a rule as a warning, unless its problem certainly keeps a system from running."""
+    return rule if unless else replace(rule, severity=Severity.WARNING)
+
+
+def diagnostic(problem: Problem, place: Span, what: What) -> Diagnostic:
+    """Return the diagnostic of a problem; ``place`` is where the YAML file names the code.
+
+    In a class nothing but its syntax is an error: it may run as it does today.
+    """
+    rule = _rules()[problem.family.value]
+    is_error = (what == "behavior" and problem.is_certain) or problem.family is Family.SYNTAX
+    if rule.severity is Severity.ERROR and not is_error:
+        rule = as_warning(rule)
+    label = Label(place, f"the {what} of this node")
+    return Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
+
+
+@cache
+def _rules() -> Mapping[str, Rule]:
+    """Return all rules by name."""
+    return {rule.name: rule for rule in registered_rules()}
+
+
+def check_python(context: Context) -> Iterator[Diagnostic]:
+    """Report the problems of the files of behaviors and classes, each once."""
+    for source, what, problem in _import_problems(context):
+        yield diagnostic(problem, source.reference.text.span, what)
+    for node, source, what in sources(context):
+        for problem in code_problems(node, source, context.interfaces):
+            yield diagnostic(problem, source.reference.text.span, what)
+
+
+def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
+    """Yield the behaviors and classes of a system, each once for each way to use it."""
+    for node, source in distinct_behaviors(context):
+        yield node, source, "behavior"
+    for item in distinct_classes(context):
+        yield item.node, item.source, "class"
+
+
+def _import_problems(context: Context) -> Iterator[tuple[BehaviorSource, What, Problem]]:
+    """Yield the problems of the imports in all files."""
+    checked: set[Path] = set()
+    for _, source, what in sources(context):
+        for module in source.own_modules:
+            if module.path not in checked:
+                checked.add(module.path)
+                folder = source.reference.folder
+                for problem in import_problems(module, folder, context.interfaces):
+                    yield source, what, problem
+                for problem in _alternatives(module, context):
+                    yield source, what, problem
+
+
+def _alternatives(module: Module, context: Context) -> Iterator[Problem]:
+    """Yield the messages and other interfaces that a condition chooses at run time."""
+    packages = context.interfaces.packages()
+    chosen = {
+        name
+        for name, origins in module.alternatives.items()
+        if any(origin.module.partition(".")[0] in packages for origin in origins)
+    }
+    for node in walk(module.tree.body) if chosen else ():
+        if isinstance(node, ast.alias) and (node.asname or node.name) in chosen:
+            chosen.remove(node.asname or node.name)
+            message = f"'{node.asname or node.name}' is imported from several modules, so its uses"
+            span = start_span(node, len(node.name), module.source)
+            yield Problem(Family.NOT_CHECKED, f"{message} are not checked", span)
+
+
+def unnamed(reference: BehaviorReference, what: str, rule: Rule) -> Iterator[Diagnostic]:
+    """Report a name that is not one of a class."""
+    text = reference.text
+    if not ((reference.module and reference.class_name) or is_unresolved(text.value)):
+        message = f"{what} '{text}' is not 'module:Class'"
+        yield Diagnostic(rule, message, text.span, hint=class_name_hint(text.value))
+
+
+def missing(
+    source: BehaviorSource, module_rule: Rule, class_rule: Rule, not_installed: Rule
+) -> Iterator[Diagnostic]:
+    """Report what is missing; ``not_installed`` is for modules that may exist elsewhere."""
+    reference = source.reference
+    module, name = reference.module, reference.class_name
+    span = part_of(reference.text, 0, len(module))
+    if source.problem is not None:
+        if not source.broken:  # or else it is reported in the module
+            yield Diagnostic(module_rule, f"module '{module}' {source.problem}", span)
+    elif not source.module_found:
+        nearby = nearby_modules(module, reference.folder, Project.at(reference.folder))
+        message = f"no Python module named '{module}'"
+        hint = nearby.hint or (
+            f"expected {module.replace('.', '/')}.py next to the YAML file, among the node types,"
+            " or on Python's module search path"
+        )
+        if nearby.package:
+            message = f"package '{nearby.package}' has no module '{nearby.missing}'"
+        rule = module_rule if nearby.is_misspelled else not_installed
+        if rule is not module_rule:
+            message = (
+                f"module '{module}' is not found on this computer, so its class is not checked"
+            )
+        yield Diagnostic(rule, message, span, hint=hint)
+    elif not source.class_found:
+        message = f"module '{module}' has no class '{name}'"
+        span = part_of(reference.text, len(module) + 1, len(name))
+        yield Diagnostic(class_rule, message, span, hint=suggestion(name, source.class_names))

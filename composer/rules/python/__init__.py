@@ -1,1 +1,0 @@
-"""The Python code of behaviors and classes: syntax, imports, names and types."""
