@@ -6,9 +6,8 @@ from dataclasses import field
 from pathlib import Path
 
 from composer.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
-from composer.assembly.joining import INCLUDE, Part, join_parts
 from composer.assembly.limits import IncludeLimits, LimitExceeded
-from composer.assembly.merging import apply_overrides
+from composer.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
 from composer.assembly.namespacing import add_namespace
 from composer.assembly.wildcards import Wildcards
 from composer.diagnostics import Diagnostic, Label, shown
@@ -18,8 +17,7 @@ from composer.expand.rules import CYCLE
 from composer.expand.scope import measure
 from composer.fast_dataclass import dataclass
 from composer.schema import check_schema
-from composer.schema.kinds import SYSTEM
-from composer.schema.sections import with_intended_sections
+from composer.schema.kinds import SYSTEM, with_intended_sections
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Sequence, Tree
 

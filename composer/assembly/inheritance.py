@@ -17,8 +17,7 @@ from composer.expand.scope import measure
 from composer.fast_dataclass import dataclass
 from composer.node_types import NodeTypes
 from composer.project import Project
-from composer.schema.kinds import NODE, check_kind
-from composer.schema.sections import with_intended_sections
+from composer.schema.kinds import NODE, check_kind, with_intended_sections
 from composer.source import Located, SourceFile
 from composer.tree import Mapping, Scalar
 

@@ -15,13 +15,12 @@ import yaml
 
 from composer.diagnostics import Diagnostic
 from composer.document.builder import Stopped, TreeBuilder, too_many_values
-from composer.document.characters import check_text
 from composer.document.events import first_excess_value, parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.parameter_files import ParameterFileBuilder
 from composer.document.rules import KEY_WITHOUT_VALUE, YAML_SYNTAX
-from composer.document.scalars import resolve_plain
+from composer.document.scalars import check_text, resolve_plain
 from composer.source import SourceFile, Span, shown_path
 from composer.tree import Mapping, Scalar, ScalarValue, Tree, describe
 

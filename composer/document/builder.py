@@ -9,10 +9,9 @@ import yaml
 
 from composer.diagnostics import Diagnostic, Label, Rule, shown
 from composer.document import rules
-from composer.document.characters import check_value
+from composer.document.events import Mark, collection_span, scalar_span, span_at
 from composer.document.limits import MAX_DEPTH, MAX_VALUES
-from composer.document.scalars import NumberRefused, resolve_plain
-from composer.document.spans import Mark, collection_span, scalar_span, span_at
+from composer.document.scalars import NumberRefused, check_value, resolve_plain
 from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe

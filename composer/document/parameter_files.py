@@ -15,10 +15,9 @@ import yaml
 from composer.diagnostics import Diagnostic, shown
 from composer.document import rules
 from composer.document.builder import Stopped, TreeBuilder
-from composer.document.characters import check_value
+from composer.document.events import scalar_span, span_at
 from composer.document.limits import MAX_NUMBER_LENGTH
-from composer.document.scalars import NumberRefused
-from composer.document.spans import scalar_span, span_at
+from composer.document.scalars import NumberRefused, check_value
 from composer.source import SourceFile
 from composer.tree import Mapping, Scalar, ScalarValue, Tree
 

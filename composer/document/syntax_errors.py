@@ -11,8 +11,8 @@ from collections.abc import Callable
 import yaml
 
 from composer.diagnostics import Diagnostic, Label, shown
+from composer.document.events import Mark, span_at
 from composer.document.rules import YAML_SYNTAX
-from composer.document.spans import Mark, span_at
 from composer.fast_dataclass import dataclass
 from composer.source import SourceFile, Span
 

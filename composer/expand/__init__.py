@@ -13,10 +13,8 @@ from collections.abc import Mapping as Map
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.expand import rules
 from composer.expand.copies import COPYING
-from composer.expand.order import dependency_order
-from composer.expand.references import references
-from composer.expand.scope import Scope, measure, read_scope
-from composer.expand.substitution import Substitution, TooLarge
+from composer.expand.scope import Scope, dependency_order, measure, read_scope
+from composer.expand.substitution import Substitution, TooLarge, references
 from composer.schema import kind_of
 from composer.tree import Entry, Mapping, Scalar
 

@@ -17,9 +17,8 @@ from math import prod
 from composer.diagnostics import Diagnostic, Label, shown
 from composer.document.limits import MAX_COPIES
 from composer.expand import rules
-from composer.expand.references import has_reference, references
 from composer.expand.scope import Declared
-from composer.expand.substitution import Substitution
+from composer.expand.substitution import Substitution, has_reference, references
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 FOR_EACH = "for_each"

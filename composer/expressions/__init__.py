@@ -5,18 +5,16 @@ combines with ``and``, ``or``, ``not``, calculates with ``+ - * / // %`` on numb
 ``a if condition else b``, tests ``x in ('a', 'b')`` and calls the functions in
 ``operations.FUNCTIONS``. There is nothing else: what is not listed is refused when it is compiled.
 
-How safety is kept: ``tokens`` lets through ASCII names, numbers, texts and a few operators only;
-``compiler`` builds a *new* syntax tree that calls nothing but the functions of ``operations``;
+How safety is kept: ``syntax`` lets through ASCII names, numbers, texts and a few operators only;
+``builder`` builds a *new* syntax tree that calls nothing but the functions of ``operations``;
 those look at the type of a value before they touch it and bound every number.
 """
 
-from composer.expressions.builder import path_of
-from composer.expressions.compiler import compile_expression
-from composer.expressions.errors import EvaluationError, ExpressionError
+from composer.expressions.builder import compile_expression, path_of
 from composer.expressions.expression import Expression, FieldPath
 from composer.expressions.operations import CONSTANTS, FUNCTIONS
 from composer.expressions.syntax import MAXIMUM_LENGTH, MAXIMUM_NODES
-from composer.expressions.values import map_key
+from composer.expressions.values import EvaluationError, ExpressionError, map_key
 
 __all__ = [
     "CONSTANTS",

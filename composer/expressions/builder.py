@@ -1,15 +1,15 @@
-"""Build the syntax tree to compile from safe operations, and refuse anything else."""
+"""Compile expressions: build a syntax tree from safe operations, and refuse anything else."""
 
 from __future__ import annotations
 
 import ast
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from composer.diagnostics import suggestion
-from composer.expressions.errors import ExpressionError
-from composer.expressions.expression import FieldPath
+from composer.expressions.expression import Expression, FieldPath
 from composer.expressions.operations import (
     ARITHMETIC,
     CONSTANTS,
@@ -18,15 +18,13 @@ from composer.expressions.operations import (
     comparable,
     is_in,
 )
-from composer.expressions.syntax import extent
-from composer.expressions.values import read_fields, read_path
+from composer.expressions.syntax import extent, parse
+from composer.expressions.values import ExpressionError, read_fields, read_path
 
 _MAXIMUM_INDEX = 2**31 - 1
 _NOT_IN_LANGUAGE = "this is not part of the expression language"
-
 #: The name of the scope in compiled code.
 SCOPE = "scope"
-
 #: The only other names that compiled code can access.
 OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **ARITHMETIC,
@@ -36,7 +34,6 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "read_fields": read_fields,
     "read_path": read_path,
 }
-
 _BINARY: Mapping[type[ast.operator], str] = {
     ast.Add: "add",
     ast.Sub: "subtract",
@@ -47,8 +44,31 @@ _BINARY: Mapping[type[ast.operator], str] = {
 }
 _UNARY: Mapping[type[ast.unaryop], str] = {ast.USub: "negative", ast.UAdd: "positive"}
 _COMPARISONS = (ast.Eq, ast.NotEq, ast.Lt, ast.LtE, ast.Gt, ast.GtE)
-
 Built = TypeVar("Built", bound=ast.expr)
+
+
+@lru_cache(maxsize=4096)
+def compile_expression(source: str) -> Expression:
+    """Return the compiled expression. Raises ExpressionError if ``source`` is invalid.
+
+    Names are not checked here: ``Expression.paths`` lists those in use.
+    """
+    tree = parse(source)
+    body, paths = build(tree)
+    return Expression(source, paths, tree, _function(body))
+
+
+def _function(body: ast.expr) -> Callable[[Mapping[str, Any]], Any]:
+    arguments = ast.arguments(
+        posonlyargs=[], args=[ast.arg(SCOPE)], kwonlyargs=[], kw_defaults=[], defaults=[]
+    )
+    function = ast.copy_location(ast.Lambda(arguments, body), body)
+    code = compile(ast.fix_missing_locations(ast.Expression(function)), "<expression>", "eval")
+    # Safe: build() made this code from OPERATIONS and constants only.
+    compiled: Callable[[Mapping[str, Any]], Any] = eval(  # noqa: S307
+        code, {"__builtins__": {}, **OPERATIONS}
+    )
+    return compiled
 
 
 def build(tree: ast.expr) -> tuple[ast.expr, tuple[FieldPath, ...]]:

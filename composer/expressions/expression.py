@@ -10,8 +10,7 @@ from types import CodeType, TracebackType
 from typing import Any
 
 from composer.diagnostics import shown
-from composer.expressions.errors import EvaluationError, Refusal
-from composer.expressions.values import describe, map_key
+from composer.expressions.values import EvaluationError, Refusal, describe, map_key
 from composer.fast_dataclass import dataclass
 
 _REASONS: Mapping[type[Exception], str] = {

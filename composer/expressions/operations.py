@@ -7,8 +7,7 @@ import operator
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from composer.expressions.errors import Refusal
-from composer.expressions.values import Kind, describe, kind_of, plain
+from composer.expressions.values import Kind, Refusal, describe, kind_of, plain
 from composer.fast_dataclass import dataclass
 
 #: The range of integers: int64 and uint64.

@@ -1,4 +1,4 @@
-"""What values are to the language, and how messages, maps and lists are read.
+"""What values are to the language, how messages, maps and lists are read, and what may go wrong.
 
 A field is read only when the message's class declares it: methods and private attributes cannot be
 reached. A ``byte``, which rclpy keeps as ``bytes`` of one, is an integer here.
@@ -12,7 +12,28 @@ from enum import Enum
 from functools import lru_cache
 from typing import Any, cast
 
-from composer.expressions.errors import Refusal
+
+class ExpressionError(Exception):
+    """The text is not a valid expression.
+
+    ``offset`` and ``length`` are the invalid part in characters of the source; ``hint`` says how to
+    fix it, if that is clear.
+    """
+
+    def __init__(self, message: str, offset: int = 0, length: int = 1, hint: str | None = None):
+        super().__init__(message)
+        self.message = message
+        self.offset = offset
+        self.length = max(length, 1)
+        self.hint = hint
+
+
+class EvaluationError(Exception):
+    """The expression cannot be evaluated with the given values. The text names the part."""
+
+
+class Refusal(Exception):
+    """An operation does not support a value; becomes an EvaluationError."""
 
 
 class Kind(Enum):

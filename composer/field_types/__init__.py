@@ -17,8 +17,7 @@ unknown. Unknown types never cause a problem, and one mistake causes one problem
 """
 
 from composer.field_types.checker import FieldChecker
-from composer.field_types.constants import constant_problem
-from composer.field_types.enumerators import enumerator_problem, enumerators
+from composer.field_types.constants import constant_problem, enumerator_problem, enumerators
 from composer.field_types.types import (
     ANYTHING,
     BOOL,

@@ -8,7 +8,7 @@ from typing import Any
 
 from composer.document import parse_document
 from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
-from composer.resolve.parameter_files.patterns import is_pattern
+from composer.resolve.parameter_files.sections import is_pattern
 from composer.source import SourceFile
 from composer.tree import Plain, plain
 

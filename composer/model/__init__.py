@@ -16,12 +16,6 @@ from composer.model.implementation import (
     ImplementationKind,
     LifecycleKind,
 )
-from composer.model.introspection import (
-    DEFAULT_INTROSPECTION,
-    DRIVEN_BY_MANAGER,
-    Introspection,
-)
-from composer.model.periods import Period, PeriodError, PeriodUnit
 from composer.model.ports import (
     SEVERITIES,
     USE_SIM_TIME,
@@ -34,6 +28,9 @@ from composer.model.ports import (
     Parameter,
     ParameterSection,
     ParameterType,
+    Period,
+    PeriodError,
+    PeriodUnit,
     Port,
     PortKind,
     Qos,
@@ -44,7 +41,10 @@ from composer.model.ports import (
 )
 from composer.model.processes import Process, member_system
 from composer.model.supervision import (
+    DEFAULT_INTROSPECTION,
     DEFAULT_SUPERVISION,
+    DRIVEN_BY_MANAGER,
+    Introspection,
     OnFailure,
     RestartBudget,
     Supervision,

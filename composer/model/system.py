@@ -18,8 +18,6 @@ from composer.model.implementation import (
     HostedClass,
     ImplementationKind,
 )
-from composer.model.introspection import DEFAULT_INTROSPECTION, Introspection
-from composer.model.periods import PeriodError
 from composer.model.ports import (
     ChannelKind,
     Delivery,
@@ -28,6 +26,7 @@ from composer.model.ports import (
     LogLevel,
     Parameter,
     ParameterSection,
+    PeriodError,
     Port,
     PortKind,
     Qos,
@@ -35,7 +34,12 @@ from composer.model.ports import (
     Timer,
 )
 from composer.model.processes import Process
-from composer.model.supervision import DEFAULT_SUPERVISION, Supervision
+from composer.model.supervision import (
+    DEFAULT_INTROSPECTION,
+    DEFAULT_SUPERVISION,
+    Introspection,
+    Supervision,
+)
 from composer.model.transforms import Transforms
 from composer.names import join_node_name
 from composer.source import Located, SourceFile, Span

@@ -19,8 +19,8 @@ from pathlib import Path
 from composer.diagnostics import Diagnostic, shown
 from composer.fast_dataclass import dataclass
 from composer.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
-from composer.project.rules import FOREIGN_OWNER
 from composer.project.settings import (
+    FOREIGN_OWNER,
     SETTINGS_FILE,
     Settings,
     SettingsSource,

@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 from composer.diagnostics import Diagnostic, Rule, Severity, nearest, shown
-from composer.project.rules import BAD_SETTING
-from composer.project.settings import Settings
+from composer.project.settings import BAD_SETTING, Settings
 from composer.source import Located
 
 

@@ -7,14 +7,16 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic, Severity, shown
+from composer.diagnostics import Diagnostic, Severity, error, shown, warning
 from composer.document import read_document
 from composer.document.rules import UNREADABLE_FILE, YAML_SYNTAX
 from composer.fast_dataclass import dataclass
-from composer.project.rules import BAD_SETTING
 from composer.schema import check_schema
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Mapping, Scalar, Sequence
+
+BAD_SETTING = error("RC042", "bad-setting")
+FOREIGN_OWNER = warning("RC044", "foreign-owner")
 
 SETTINGS_FILE = "composer.yaml"
 

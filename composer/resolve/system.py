@@ -24,9 +24,12 @@ from composer.resolve.declarations.parameters import (
     with_use_sim_time,
     with_values,
 )
-from composer.resolve.deployment.discovery import read_discovery
-from composer.resolve.deployment.hosts import read_hosts
-from composer.resolve.deployment.processes import processes_of_nodes, read_processes
+from composer.resolve.deployment import (
+    processes_of_nodes,
+    read_discovery,
+    read_hosts,
+    read_processes,
+)
 from composer.resolve.nodes.node import (
     SystemContext,
     place_ports,
@@ -34,9 +37,8 @@ from composer.resolve.nodes.node import (
     resolve_node,
     state,
 )
-from composer.resolve.nodes.node_names import NodeNames
-from composer.resolve.nodes.node_options import read_introspection, read_supervision
 from composer.resolve.nodes.node_parameters import sections_of, without_sections_of_others
+from composer.resolve.nodes.node_settings import NodeNames, read_introspection, read_supervision
 from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides
 from composer.resolve.parameter_files import read_parameter_files

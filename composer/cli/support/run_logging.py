@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from composer.cli.support.output.output_queue import OutputQueue
+from composer.cli.support.output.console import OutputQueue
 from composer.cli.support.output.progress import logger_and_text, severity_of
 from composer.cli.support.output.terminal import say
 from composer.names import PROGRAM_LOGGER

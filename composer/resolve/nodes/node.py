@@ -33,11 +33,15 @@ from composer.resolve.declarations.declaration import (
     unknown_keys,
 )
 from composer.resolve.declarations.implementation import Implementation, read_external
-from composer.resolve.nodes.node_names import NodeNames, node_names
-from composer.resolve.nodes.node_options import read_introspection, read_supervision
 from composer.resolve.nodes.node_parameters import (
     GivenValues,
     node_parameters,
+)
+from composer.resolve.nodes.node_settings import (
+    NodeNames,
+    node_names,
+    read_introspection,
+    read_supervision,
 )
 from composer.resolve.nodes.node_type_loader import NodeTypeLoader
 from composer.resolve.overrides import Overrides

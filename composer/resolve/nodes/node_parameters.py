@@ -15,7 +15,7 @@ from composer.resolve.declarations.parameters import (
     with_use_sim_time,
     with_values,
 )
-from composer.resolve.nodes.node_names import NodeNames
+from composer.resolve.nodes.node_settings import NodeNames
 from composer.resolve.parameter_files import ParameterFiles
 from composer.tree import Entry
 

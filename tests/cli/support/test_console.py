@@ -12,7 +12,7 @@ import threading
 import time
 from pathlib import Path
 
-from composer.cli.support.output.output_queue import FileDescriptor, OutputQueue
+from composer.cli.support.output.console import FileDescriptor, OutputQueue
 
 LIMIT_S = 20.0
 

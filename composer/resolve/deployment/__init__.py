@@ -1,1 +1,0 @@
-"""Where the nodes of a system run, and how they discover each other."""
