@@ -23,7 +23,6 @@ from __future__ import annotations
 import gc
 import math
 import os
-import secrets
 import time
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -104,7 +103,7 @@ class Host:
         key = self._options.report_key
         self._status = Status(system, order, is_child=bool(key))
         is_member = self._options.process is not None
-        self._report_key = key or (secrets.token_hex(_KEY_BYTES) if is_member else "")
+        self._report_key = key or (os.urandom(_KEY_BYTES).hex() if is_member else "")
         self._node_set = NodeSet(
             system,
             self._make_listener,

@@ -13,7 +13,7 @@ child, or the answer of its service.
 
 from __future__ import annotations
 
-import secrets
+import os
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
@@ -262,7 +262,7 @@ class MemberProcess:
         return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
 
     async def _start_child(self) -> Child:
-        life = MemberLife(secrets.token_hex(_KEY_BYTES))
+        life = MemberLife(os.urandom(_KEY_BYTES).hex())
         command = self._context.command_of(self._process, life.report_key)
         self._is_ending = False
         try:

@@ -6,7 +6,6 @@ from collections.abc import MutableMapping, Sequence
 
 from composer.model import Discovery
 from composer.runtime.middleware.dds_profiles import is_own_profile, save_profile
-from composer.runtime.middleware.dds_xml import Profile, add, child
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import has_interface, interface_names
 
@@ -52,6 +51,8 @@ def use_interfaces(discovery: Discovery | None, environment: MutableMapping[str,
 
 def profile_for_interfaces(path: str, interfaces: Sequence[str]) -> str:
     """Return the profile in the file ``path`` with these network interfaces only, as XML."""
+    from composer.runtime.middleware.dds_xml import Profile, add, child  # noqa: PLC0415 - slow, rare
+
     profile = Profile(path)
     allowed = child(profile.udp, "interfaceWhiteList")
     for interface in interfaces:

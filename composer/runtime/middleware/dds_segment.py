@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
-from html import escape
 from tempfile import NamedTemporaryFile
 
 from composer.runtime.middleware.dds_profiles import is_own_profile
-from composer.runtime.middleware.dds_xml import Profile, child, extend
 from composer.runtime.middleware.shared_memory import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,
@@ -96,6 +94,10 @@ def profile_with_segment(path: str, peers: Sequence[str] | None) -> bytes:
 
     With ``peers``, it also implements the discovery range LOCALHOST with these static peers.
     """
+    from html import escape  # noqa: PLC0415 - slow, and few systems send large messages
+
+    from composer.runtime.middleware.dds_xml import Profile, child, extend  # noqa: PLC0415
+
     profile = Profile(path)
     child(profile.shared_memory, "segment_size").text = str(LARGE_SEGMENT_BYTES)
     child(profile.shared_memory, "maxMessageSize").text = str(_MESSAGE_BYTES)

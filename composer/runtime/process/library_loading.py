@@ -1,8 +1,8 @@
 """Loads the shared libraries of ROS while Python reads and checks the files of a system.
 
-rclpy's extension module needs 90 libraries, which take 35 ms to load and hold up nothing but their
-own thread: Python releases its lock while it calls a foreign function, though not while it imports
-an extension module. The import finds the libraries loaded.
+rclpy's extension module needs 90 libraries, which take 35 ms to load. Python releases its lock
+while it calls a foreign function, though not while it imports an extension module. That import then
+finds the libraries loaded.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ _CHECKED_WHILE_LOADING = ("RMW_IMPLEMENTATION", "RCL_ASSERT_RMW_ID_MATCHES")
 def loading_libraries() -> Iterator[None]:
     """Load the libraries of rclpy on another thread until the end of the ``with`` block.
 
-    Change no environment variable within the block: initializers of the libraries read them. What
-    cannot be loaded is not reported, because importing rclpy reports it.
+    Change no environment variable within the block: initializers of the libraries read them. An
+    import of an extension module would wait for the thread. What cannot be loaded is not reported,
+    because importing rclpy reports it.
     """
     path = None if any(map(os.environ.get, _CHECKED_WHILE_LOADING)) else _extension_module()
     if path is None:

@@ -177,6 +177,8 @@ def run(
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
     warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
+    import composer.loading  # noqa: F401 - importing its extension modules would wait for the thread
+
     # A process of a system may have environment variables of its own, which have to be set first.
     is_loading_ros = process is None and not dry_run and not wait
     with loading_libraries() if is_loading_ros else nullcontext():
