@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
-from itertools import groupby
 
 import composer.document
 import composer.expand
@@ -14,27 +13,6 @@ import composer.schema
 from composer.diagnostics import Diagnostic, Rule, nearest, registered_rules
 from composer.fast_dataclass import dataclass
 from composer.resources import rules_folder
-
-#: The topic of each code band, by the first digit.
-BANDS = {
-    "0": "Reading",
-    "1": "Schema",
-    "2": "Names and references",
-    "3": "Types, QoS and wiring",
-    "4": "Lifecycle, timers, parameters and behaviors",
-    "5": "Style and transforms",
-    "9": "Internal",
-}
-
-_INTRODUCTION = """\
-# Rules
-
-The rules of `compose validate`. A system with errors does not run; one with warnings or infos does.
-Each rule has a page with the reason, a wrong example and a right one. Every example is tested.
-
-To ignore a warning or an info, add a comment on the same line, or on a line of its own before it:
-`# compose: ignore[publisher-without-subscription]`. Errors cannot be ignored.
-"""
 
 
 def all_rules() -> tuple[Rule, ...]:
@@ -94,7 +72,7 @@ _BLOCK = re.compile(r"(?:`(?P<name>.+)`:\n\n)?```\w*\n(?P<text>(?:.*\n)*?)```\n"
 
 @dataclass(frozen=True, slots=True)
 class RulePage:
-    """What the page of a rule says. :func:`files_of` returns the files of an example."""
+    """What the page of a rule says."""
 
     summary: str
     why: str
@@ -142,54 +120,5 @@ def explain(rule: Rule) -> str:
     )
 
 
-def index(rules: Iterable[Rule]) -> str:
-    """Return docs/rules.md, the list of all rules, in Markdown."""
-    ordered = sorted(rules, key=lambda rule: rule.code)
-    parts = [_INTRODUCTION]
-    for band, group in groupby(ordered, key=lambda rule: rule.code[2]):
-        rows = [
-            f"| [{rule.code}](rules/{rule.code}.md) | {rule.name} | {rule.severity.value} "
-            f"| {page_of(rule).summary} |"
-            for rule in group
-        ]
-        table = ["| code | name | severity | summary |", "|---|---|---|---|", *rows, ""]
-        parts += [f"## {BANDS[band]}\n", *table]
-    return "\n".join(parts)
-
-
 def _indented(text: str) -> str:
     return "\n".join(f"    {line}".rstrip() for line in text.rstrip().splitlines())
-
-
-_HEADER = re.compile(r"# file: (?P<name>[A-Za-z0-9_./-]+)")
-_MARKER = re.compile(r"(?P<kind>system|node): *(?P<name>\w+)")
-
-
-def files_of(example: str) -> dict[str, str]:
-    """Return the files of an example by name, starting with the one to validate.
-
-    An example has one file, or several with a line ``# file: name`` before each. Returns an empty
-    dict if the example is not a YAML file, such as a directory listing.
-    """
-    files: dict[str, list[str]] = {}
-    current: list[str] | None = None
-    for line in example.splitlines(keepends=True):
-        header = _HEADER.fullmatch(line.strip())
-        if header is not None:
-            current = files.setdefault(header["name"], [])
-        elif current is None:
-            name = _name(line)
-            if name is None:
-                return {}
-            current = files.setdefault(name, [line])
-        else:
-            current.append(line)
-    return {name: "".join(lines) for name, lines in files.items()}
-
-
-def _name(first_line: str) -> str | None:
-    """Return a name for a file that starts with ``first_line``, or None."""
-    marker = _MARKER.match(first_line)
-    if marker is None:
-        return None
-    return f"{marker['name']}.yaml" if marker["kind"] == "node" else "system.yaml"

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from composer.diagnostics import Diagnostic, Rule
 from composer.loading import load
-from composer.report.rules import all_rules, files_of, page_of
+from composer.report.rules import all_rules, page_of
 from composer.rules import all_checks
+
+
+def files_of(example: str) -> dict[str, str]:
+    """Return the files of an example by name, starting with the one to validate.
+
+    Each of several files is under a line with its name. An example that is not a YAML file, such
+    as a command line, has none.
+    """
+    _, *named = re.split(r"^# file: (.+)\n", example, flags=re.MULTILINE)
+    if named:
+        return dict(zip(named[::2], named[1::2], strict=True))
+    marker = re.match(r"(system|node): *(\w+)", example)
+    if marker is None:
+        return {}
+    return {f"{marker[2]}.yaml" if marker[1] == "node" else "system.yaml": example}
+
 
 # Examples other than system files, such as command lines, are not tested here.
 PAGES = {rule: page_of(rule) for rule in all_rules()}
