@@ -55,22 +55,25 @@ def causes(context: Context) -> Causes:
     found: dict[tuple[str, str], tuple[Cause, ...]] = {}
     for node in context.system.nodes:
         source = sources.get(node.name.value)
-        if source is None and node.implementation is not ImplementationKind.DECLARATIVE:
-            continue
-        if source is not None and not (source.class_found and source.complete):
-            continue
-        by_method: Mapping[str, frozenset[str]] = {}
-        if source is not None:
-            if id(source) not in published:
-                published[id(source)] = _published_by_method(source)
-            by_method = published[id(source)]
-        found.update(_of_node(node, by_method))
+        if source is not None and id(source) not in published:
+            published[id(source)] = published_by_method(source)
+        by_method = {} if source is None else published[id(source)]
+        for port, callbacks in causes_in_node(node, source, by_method).items():
+            found[node.name.value, port] = callbacks
     return found
 
 
-def _of_node(
-    node: Node, by_method: Mapping[str, frozenset[str]]
-) -> Iterator[tuple[tuple[str, str], tuple[Cause, ...]]]:
+def causes_in_node(
+    node: Node, source: BehaviorSource | None, by_method: Mapping[str, frozenset[str]]
+) -> dict[str, tuple[Cause, ...]]:
+    """Return the causes of the publishers of a node, as far as they are known.
+
+    ``source`` is its behavior, and ``by_method`` the :func:`published_by_method` of it.
+    """
+    if source is None and node.implementation is not ImplementationKind.DECLARATIVE:
+        return {}
+    if source is not None and not (source.class_found and source.complete):
+        return {}
     known: dict[str, list[Cause]] = {
         port.name.value: [] for port in node.ports_of(PortKind.PUBLISHER)
     }
@@ -84,8 +87,7 @@ def _of_node(
         for port_name in ports:
             if port_name in known:
                 known[port_name].append(cause)
-    for port_name, found in known.items():
-        yield (node.name.value, port_name), tuple(found)
+    return {port_name: tuple(callbacks) for port_name, callbacks in known.items()}
 
 
 def _callbacks(
@@ -106,7 +108,7 @@ def _published(reactions: list[Reaction]) -> frozenset[str]:
     return frozenset(send.port.value for reaction in reactions for send in reaction.publish)
 
 
-def _published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
+def published_by_method(source: BehaviorSource) -> Mapping[str, frozenset[str]]:
     """Return the publishers that the methods of a behavior use.
 
     Methods called by handlers are not listed separately. Publishers used by nested functions,

@@ -9,8 +9,7 @@ from typing import Any
 from composer.dashboard.protocol.errors import RequestError
 from composer.diagnostics import Diagnostic
 from composer.fast_dataclass import dataclass
-from composer.graph.facts import node_facts
-from composer.graph.publishing_rates import publishing_rates_hz
+from composer.graph.facts import node_facts, publishing_rates_hz
 from composer.model import Node, Parameter, PrimaryState, System
 from composer.source import Span
 

@@ -10,8 +10,13 @@ from composer.diagnostics import Diagnostic, Severity
 from composer.drift.compare import states_after_bring_up
 from composer.fast_dataclass import dataclass
 from composer.graph.diagram import Mark, Problem, worst
-from composer.graph.facts import node_facts, port_facts, qos_label, transform_facts
-from composer.graph.publishing_rates import publishing_rates_hz
+from composer.graph.facts import (
+    node_facts,
+    port_facts,
+    publishing_rates_hz,
+    qos_label,
+    transform_facts,
+)
 from composer.graph.scene import (
     ExecutorGroup,
     Scene,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
+from composer.analysis.rates import causes_in_node, published_by_method
 from composer.graph.diagram import Details
 from composer.graph.scene import SceneChannel, SceneEndpoint
 from composer.model import (
@@ -16,6 +18,9 @@ from composer.model import (
     StaticTransform,
     Timer,
 )
+from composer.python_code.lookup import find_behavior
+from composer.python_code.nodes import published_port
+from composer.python_code.syntax import Method
 from composer.qos import PRESETS, History, QosProfile
 from composer.tree import Plain
 
@@ -29,6 +34,8 @@ _SINKS = {
     ChannelKind.SERVICE: "clients",
     ChannelKind.ACTION: "clients",
 }
+#: Statements that may leave a method early.
+_EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)
 
 
 def short_type(interface: str) -> str:
@@ -193,3 +200,44 @@ def _json(value: Plain) -> Plain:
             return [_json(item) for item in value]
         case _:
             return value
+
+
+def publishing_rates_hz(node: Node) -> dict[str, float]:
+    """Return, by port, the rate of the one timer that publishes to it each time it fires.
+
+    What a behavior does is read from its text. Ports are left out where it depends on a
+    condition, or where several timers or anything else publish to them.
+    """
+    source = None if node.behavior is None else find_behavior(node.behavior)
+    methods = () if source is None else source.methods
+    by_method = {} if source is None else published_by_method(source)
+    handlers = {method.name: method for method in methods}
+    rates: dict[str, float] = {}
+    for port, callbacks in causes_in_node(node, source, by_method).items():
+        timer = callbacks[0].timer if len(callbacks) == 1 else None
+        if timer is not None and _always_publishes(timer, port, handlers):
+            hertz = timer_rate_hz(node, timer)
+            if hertz is not None:
+                rates[port] = hertz
+    return rates
+
+
+def _always_publishes(timer: Timer, port: str, handlers: Mapping[str, Method]) -> bool:
+    if timer.reaction is not None:
+        return timer.reaction.when is None and any(
+            send.port.value == port for send in timer.reaction.publish
+        )
+    handler = handlers.get(f"on_{timer.name.value}")
+    return handler is not None and [*_unconditional(handler)].count(port) == 1
+
+
+def _unconditional(method: Method) -> Iterator[str]:
+    """Yield the ports that unconditional statements publish to, up to the first possible exit."""
+    names: dict[ast.expr, str] = {call.node: call.name for call in method.calls}
+    for statement in method.node.body if method.node is not None else ():
+        if isinstance(statement, ast.Expr):
+            port = published_port(names.get(statement.value, ""))
+            if port is not None:
+                yield port
+        elif any(isinstance(inner, _EXITS) for inner in ast.walk(statement)):
+            return
