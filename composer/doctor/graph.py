@@ -168,11 +168,11 @@ def check_types_built(used: Iterable[tuple[str, str, tuple[str, ...]]]) -> Itera
 def _check_pair(
     topic: str, publisher: EndpointInfo, subscription: EndpointInfo
 ) -> Iterator[CheckResult]:
-    for found in incompatibilities(publisher.qos, subscription.qos):
+    for mismatch in incompatibilities(publisher.qos, subscription.qos):
         yield error(
             "qos",
-            f"{topic}: {publisher.node} offers {found.policy} {found.offered},"
-            f" {subscription.node} requests {found.requested}: no messages are delivered",
-            f"make {subscription.node} request {found.offered}, or make {publisher.node} offer"
-            f" {found.requested}",
+            f"{topic}: {publisher.node} offers {mismatch.policy} {mismatch.offered},"
+            f" {subscription.node} requests {mismatch.requested}: no messages are delivered",
+            f"make {subscription.node} request {mismatch.offered}, or make {publisher.node} offer"
+            f" {mismatch.requested}",
         )

@@ -36,10 +36,10 @@ def check_hosts(
     async def run() -> list[CheckResult]:
         async with AsyncExitStack() as stack:
             connections = await connect_all(hosts, root, stack)
-            found = await asyncio.gather(
+            reports = await asyncio.gather(
                 *(_check(host, connections[host.name.value], system, timeout_s) for host in hosts)
             )
-        return [result for results in found for result in results]
+        return [result for results in reports for result in results]
 
     return asyncio.run(run())
 

@@ -64,11 +64,11 @@ def check_versions() -> Iterator[CheckResult]:
     """Check the versions of ros2-composer, Python and rclpy."""
     system = f"{platform.system()} {platform.machine()}"
     yield ok(_VERSIONS, f"ros2-composer {version()}, Python {platform.python_version()}, {system}")
-    yield check_rclpy(has_rclpy=find_spec("rclpy") is not None, found=_version_of("rclpy"))
+    yield check_rclpy(has_rclpy=find_spec("rclpy") is not None, installed=_version_of("rclpy"))
 
 
-def check_rclpy(*, has_rclpy: bool, found: str | None) -> CheckResult:
-    """Check rclpy in this Python; ``found`` is its version if known."""
+def check_rclpy(*, has_rclpy: bool, installed: str | None) -> CheckResult:
+    """Check rclpy in this Python; ``installed`` is its version if known."""
     if not has_rclpy:
         return error(
             _VERSIONS,
@@ -76,15 +76,15 @@ def check_rclpy(*, has_rclpy: bool, found: str | None) -> CheckResult:
             " and drawn, but not run",
             f"{_FROM_PYPI}   or: {_SOURCED}",
         )
-    if found is None:
+    if installed is None:
         return ok(_VERSIONS, "rclpy is installed; its version is unknown")
-    if found.split(".")[0] != _RCLPY_MAJOR:
+    if installed.split(".")[0] != _RCLPY_MAJOR:
         return warning(
             _VERSIONS,
-            f"rclpy is {found}; ros2-composer supports {_RCLPY_MAJOR}.x (Jazzy)",
+            f"rclpy is {installed}; ros2-composer supports {_RCLPY_MAJOR}.x (Jazzy)",
             f"{_FROM_PYPI}   or: {_SOURCED}",
         )
-    return ok(_VERSIONS, f"rclpy {found}")
+    return ok(_VERSIONS, f"rclpy {installed}")
 
 
 def _version_of(distribution: str) -> str | None:
@@ -198,8 +198,8 @@ def check_interfaces(
 
     ``sources`` has the definitions of the project, ``built`` the installed ones.
     """
-    found = sorted(packages)
-    missing = [package for package in found if find_spec(package) is None]
+    required = sorted(packages)
+    missing = [package for package in required if find_spec(package) is None]
     for package in missing:
         yield error(
             _INTERFACES,
@@ -208,7 +208,7 @@ def check_interfaces(
         )
     stale = {
         package: names
-        for package in found
+        for package in required
         if package not in missing and (names := _changed(package, sources, built))
     }
     for package, names in stale.items():
@@ -218,8 +218,8 @@ def check_interfaces(
             f" {', '.join(names)}",
             f"{how_to_build(package, sources.source_folder(package))}, then restart all processes",
         )
-    if found and not missing and not stale:
-        yield ok(_INTERFACES, f"built: {', '.join(found)}")
+    if required and not missing and not stale:
+        yield ok(_INTERFACES, f"built: {', '.join(required)}")
 
 
 def _changed(package: str, sources: Interfaces, built: Interfaces) -> list[str]:

@@ -178,8 +178,8 @@ def starts_server(discovery: Discovery, environment: Mapping[str, str]) -> bool:
     """Return whether 'compose run' would start a server on this computer now."""
     if not discovery.start or discovery_conflict(discovery, environment) is not None:
         return False
-    found = ((resolve(host), port) for host, port in discovery.servers)
-    return any(at and port_state(at, port) is PortState.FREE for at, port in found)
+    servers = ((resolve(host), port) for host, port in discovery.servers)
+    return any(at and port_state(at, port) is PortState.FREE for at, port in servers)
 
 
 def _check_server(host: str, port: int, *, starts: bool) -> CheckResult:

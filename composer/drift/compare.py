@@ -191,15 +191,15 @@ def _conflicting_endpoints(system: System, other: ObservedNode) -> Iterator[Drif
         for port in node.ports:
             types.setdefault((port.kind.channel, port.full_name), port)
     for endpoint in other.endpoints:
-        known = types.get((endpoint.kind.channel, endpoint.name))
-        if known is not None and endpoint.type != known.interface.value:
+        declared = types.get((endpoint.kind.channel, endpoint.name))
+        if declared is not None and endpoint.type != declared.interface.value:
             yield Drift(
                 DriftKind.WRONG_TYPE,
                 other.full_name,
                 f"type of its {endpoint.kind} {endpoint.name}",
-                known.interface.value,
+                declared.interface.value,
                 shown(endpoint.type),
-                span=known.interface.span,
+                span=declared.interface.span,
             )
 
 

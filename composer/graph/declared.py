@@ -69,8 +69,8 @@ def scene_of(systems: Sequence[System], diagnostics: Iterable[Diagnostic] = ()) 
         brought_up = _BroughtUp.of(system)
         for node in system.nodes:
             scene_node = _scene_node(node, system, brought_up, problems, several)
-            known = nodes.get(scene_node.full_name)
-            nodes[scene_node.full_name] = scene_node if known is None else _with_duplicate(known)
+            first = nodes.get(scene_node.full_name)
+            nodes[scene_node.full_name] = scene_node if first is None else _with_duplicate(first)
     return Scene(
         title=" + ".join(system.name.value for system in systems),
         nodes=tuple(nodes.values()),

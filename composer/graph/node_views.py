@@ -189,8 +189,10 @@ def _frame_vertices(transforms: tuple[SceneTransform, ...], *, several: bool) ->
         (item.topic, name) for item in transforms for name in (item.parent, item.child)
     )
     for topic, name in frames:
-        own = [item for item in transforms if (item.topic, item.child) == (topic, name)]
-        details: Details = (("broadcast by", [item.node for item in own]),) if own else ()
+        broadcasters = [
+            item.node for item in transforms if (item.topic, item.child) == (topic, name)
+        ]
+        details: Details = (("broadcast by", [*broadcasters]),) if broadcasters else ()
         yield Vertex(
             key=_frame_key(topic, name),
             kind=VertexKind.FRAME,

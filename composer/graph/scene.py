@@ -142,10 +142,10 @@ class SceneChannel:
 
 def channels(nodes: Iterable[SceneNode]) -> tuple[SceneChannel, ...]:
     """Return all topics, services and actions of the nodes, sorted by kind and name."""
-    found: dict[tuple[ChannelKind, str], list[SceneEndpoint]] = {}
+    by_channel: dict[tuple[ChannelKind, str], list[SceneEndpoint]] = {}
     for node in nodes:
         for port in node.ports:
-            found.setdefault((port.kind.channel, port.channel), []).append(
+            by_channel.setdefault((port.kind.channel, port.channel), []).append(
                 SceneEndpoint(node, port)
             )
     return tuple(
@@ -155,7 +155,7 @@ def channels(nodes: Iterable[SceneNode]) -> tuple[SceneChannel, ...]:
             tuple(endpoint for endpoint in endpoints if endpoint.port.kind in _SOURCES),
             tuple(endpoint for endpoint in endpoints if endpoint.port.kind not in _SOURCES),
         )
-        for (kind, name), endpoints in sorted(found.items())
+        for (kind, name), endpoints in sorted(by_channel.items())
     )
 
 
@@ -210,11 +210,11 @@ def parent_of(name: str) -> str:
 
 
 def _with_ancestors(names: Iterable[str]) -> set[str]:
-    found: set[str] = set()
+    names_above: set[str] = set()
     for name in names:
         levels = name.strip("/").split("/")
-        found.update("/" + "/".join(levels[:depth]) for depth in range(1, len(levels) + 1))
-    return found
+        names_above.update("/" + "/".join(levels[:depth]) for depth in range(1, len(levels) + 1))
+    return names_above
 
 
 def _forks(name: str, used: set[str]) -> bool:

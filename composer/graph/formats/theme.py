@@ -36,10 +36,10 @@ _KINDS = {
 def colors(*, dark: bool) -> dict[str, str]:
     """Return all colors by name: ``page``, ``text``, ..., ``node`` (fill), ``node-line``."""
     side = int(dark)
-    found = {name: both[side] for name, both in _PLAIN.items()}
+    named = {name: both[side] for name, both in _PLAIN.items()}
     for kind, both in _KINDS.items():
-        found[kind], found[f"{kind}-line"] = both[side]
-    return found
+        named[kind], named[f"{kind}-line"] = both[side]
+    return named
 
 
 #: For formats without style sheets.

@@ -187,20 +187,20 @@ class _Chains:
         arriving = self._arriving[directed.high, *directed.style]
         ranks = range(begin.rank + 1, end.rank)
         hub = ("leaving", directed.low) if leaving >= arriving else ("arriving", directed.high)
-        own = ranks[-1] if leaving >= arriving else ranks[0]
+        single = ranks[-1] if leaving >= arriving else ranks[0]
         if leaving == arriving == 1:
-            own = ranks[-1] if directed.backward else ranks[0]
+            single = ranks[-1] if directed.backward else ranks[0]
             hub = ("alone", directed.edge.key)
         bends = {
-            rank: self._bend(rank, inside, None if rank == own else (*hub, *directed.style))
+            rank: self._bend(rank, inside, None if rank == single else (*hub, *directed.style))
             for rank in ranks
         }
         if label is not None:
-            bends[own].along, bends[own].across = self._parts.axes.of_size(label)
+            bends[single].along, bends[single].across = self._parts.axes.of_size(label)
         return EdgeChain(
             edge=directed.edge,
             boxes=(begin, *bends.values(), end),
-            label=bends[own] if label is not None else None,
+            label=bends[single] if label is not None else None,
             backward=directed.backward,
             first_offset=self._sizes.rows.get(directed.low),
             last_offset=self._sizes.rows.get(directed.high),
@@ -209,8 +209,8 @@ class _Chains:
     def _bend(self, rank: int, inside: str, shared_by: tuple[object, ...] | None) -> Box:
         bend = Box(rank, 0.0, 0.0, gap=BEND_GAP)
         if shared_by is not None:
-            known = self._shared.setdefault((*shared_by, inside, rank), bend)
-            if known is not bend:
-                return known
+            shared = self._shared.setdefault((*shared_by, inside, rank), bend)
+            if shared is not bend:
+                return shared
         self._parts.groups[inside].children.append(bend)
         return bend

@@ -70,7 +70,7 @@ def _sweep(rooms: list[_Room], root: Group, pulls: Callable[[_Room], list[_Pull]
 
 
 def _rooms(group: Group, root: Group) -> list[_Room]:
-    found = {id(child): _Room(child, group, [], [], *_pulls(child)) for child in group.children}
+    by_item = {id(child): _Room(child, group, [], [], *_pulls(child)) for child in group.children}
     last: dict[int, Item] = {}
     neighbors: set[tuple[int, int]] = set()
     for child in group.children:
@@ -79,11 +79,11 @@ def _rooms(group: Group, root: Group) -> list[_Room]:
             if above is not None and (id(above), id(child)) not in neighbors:
                 neighbors.add((id(above), id(child)))
                 space = space_between(above, child)
-                found[id(child)].above.append((above, space))
-                found[id(above)].below.append((child, space))
+                by_item[id(child)].above.append((above, space))
+                by_item[id(above)].below.append((child, space))
             last[rank] = child
     rooms = []
-    for room in found.values():
+    for room in by_item.values():
         rooms.append(room)
         if isinstance(room.item, Group):
             rooms += _rooms(room.item, root)
@@ -92,18 +92,18 @@ def _rooms(group: Group, root: Group) -> list[_Room]:
 
 def _pulls(item: Item) -> tuple[list[_Pull], list[_Pull]]:
     boxes = list(item.boxes())
-    own = set(map(id, boxes))
+    inside = set(map(id, boxes))
     before = [
         (box, piece.low, piece.low_offset - piece.high_offset, _weight(box, piece.low))
         for box in boxes
         for piece in box.before
-        if id(piece.low) not in own
+        if id(piece.low) not in inside
     ]
     after = [
         (box, piece.high, piece.high_offset - piece.low_offset, _weight(box, piece.high))
         for box in boxes
         for piece in box.after
-        if id(piece.high) not in own
+        if id(piece.high) not in inside
     ]
     return before, after
 
@@ -133,24 +133,24 @@ def _move(room: _Room, root: Group, pulls: list[_Pull]) -> float:
 
 def _room_above(room: _Room, root: Group) -> float:
     item, group = room.item, room.group
-    found = math.inf
+    limit = math.inf
     low = item.low
     if group is not root:
-        found = low - group.low - group.padding - group.label
+        limit = low - group.low - group.padding - group.label
     for other, space in room.above:
-        found = min(found, low - other.high - space)
-    return found
+        limit = min(limit, low - other.high - space)
+    return limit
 
 
 def _room_below(room: _Room, root: Group) -> float:
     item, group = room.item, room.group
-    found = math.inf
+    limit = math.inf
     high = item.high
     if group is not root:
-        found = group.high - group.padding - high
+        limit = group.high - group.padding - high
     for other, space in room.below:
-        found = min(found, other.low - high - space)
-    return found
+        limit = min(limit, other.low - high - space)
+    return limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,10 +200,10 @@ def extent_of(item: Item, ranks: list[Extent]) -> Extent:
 def _space_for_frames(group: Group, rank: int, *, before: bool) -> float:
     """Return the space before or behind a rank for the group and the frames in it."""
     if before:
-        own = group.padding + group.label_along if group.first_rank == rank else 0.0
+        needed = group.padding + group.label_along if group.first_rank == rank else 0.0
     else:
-        own = group.padding if group.last_rank == rank else 0.0
+        needed = group.padding if group.last_rank == rank else 0.0
     nested = [child for child in group.inner() if child.first_rank <= rank <= child.last_rank]
-    return own + max(
+    return needed + max(
         (_space_for_frames(child, rank, before=before) for child in nested), default=0.0
     )

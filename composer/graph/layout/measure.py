@@ -121,9 +121,9 @@ def text_width(text: str, size: float) -> float:
 
 
 def _thousandths(character: str) -> int:
-    known = _WIDTHS.get(character)
-    if known is not None:
-        return known
+    width = _WIDTHS.get(character)
+    if width is not None:
+        return width
     if unicodedata.combining(character):
         return 0
     wide = unicodedata.east_asian_width(character) in {"W", "F"}

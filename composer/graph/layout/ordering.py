@@ -62,10 +62,10 @@ def _by_rank(root: Group) -> list[list[Box]]:
 
 
 def _children(group: Group) -> _Order:
-    found: _Order = [(group, list(group.children))]
+    order: _Order = [(group, list(group.children))]
     for child in group.inner():
-        found += _children(child)
-    return found
+        order += _children(child)
+    return order
 
 
 def _restore(order: _Order) -> None:

@@ -30,19 +30,19 @@ def assign_ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str
     outgoing = _neighbors(keys, pairs)
     incoming = _neighbors(keys, [pair[::-1] for pair in pairs])
     order = _topological(keys, outgoing, incoming)
-    found: dict[str, int] = {}
+    ranks: dict[str, int] = {}
     for key in order:
-        found[key] = max((found[other] + 1 for other in incoming[key]), default=0)
+        ranks[key] = max((ranks[other] + 1 for other in incoming[key]), default=0)
     for _ in range(4):  # move vertices to the rank with the shortest edges
         for key in reversed(order):
-            found[key] = _best_rank(key, found, incoming[key], outgoing[key])
+            ranks[key] = _best_rank(key, ranks, incoming[key], outgoing[key])
         for key in order:
-            found[key] = _best_rank(key, found, incoming[key], outgoing[key])
+            ranks[key] = _best_rank(key, ranks, incoming[key], outgoing[key])
     lonely = [key for key in order if not incoming[key] and not outgoing[key]]
     for cluster in dict.fromkeys(clusters[key] for key in lonely):
-        _spread(found, [key for key in lonely if clusters[key] == cluster])
-    lowest = min(found.values(), default=0)
-    return {key: rank - lowest for key, rank in found.items()}
+        _spread(ranks, [key for key in lonely if clusters[key] == cluster])
+    lowest = min(ranks.values(), default=0)
+    return {key: rank - lowest for key, rank in ranks.items()}
 
 
 def _neighbors(keys: Sequence[str], pairs: Sequence[Pair]) -> dict[str, list[str]]:
@@ -74,9 +74,9 @@ def _acyclic_order(keys: Sequence[str], pairs: Sequence[Pair]) -> list[str]:
 
 def _next(left: dict[str, None], out_degree: dict[str, int], in_degree: dict[str, int]) -> str:
     for degrees in (out_degree, in_degree):
-        found = next((key for key in left if degrees[key] == 0), None)
-        if found is not None:
-            return found
+        key = next((key for key in left if degrees[key] == 0), None)
+        if key is not None:
+            return key
     return max(left, key=lambda key: out_degree[key] - in_degree[key])
 
 
@@ -93,17 +93,17 @@ def _topological(
     return order
 
 
-def _best_rank(key: str, found: dict[str, int], incoming: list[str], outgoing: list[str]) -> int:
+def _best_rank(key: str, ranks: dict[str, int], incoming: list[str], outgoing: list[str]) -> int:
     """Return the rank between the neighbors with the shortest edges."""
     if len(incoming) == len(outgoing):
-        return found[key]
+        return ranks[key]
     if len(incoming) > len(outgoing):
-        return max(found[other] for other in incoming) + 1
-    return min(found[other] for other in outgoing) - 1
+        return max(ranks[other] for other in incoming) + 1
+    return min(ranks[other] for other in outgoing) - 1
 
 
-def _spread(found: dict[str, int], lonely: list[str]) -> None:
+def _spread(ranks: dict[str, int], lonely: list[str]) -> None:
     """Place vertices in a roughly square block."""
     columns = max(1, round(math.sqrt(len(lonely) / 2)))
     for index, key in enumerate(lonely):
-        found[key] = index % columns
+        ranks[key] = index % columns

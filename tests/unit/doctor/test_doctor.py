@@ -97,11 +97,11 @@ def test_unlocked_segments_are_leftovers(tmp_path: Path) -> None:
 
 
 def test_the_version_of_rclpy_is_checked() -> None:
-    assert check_rclpy(has_rclpy=True, found="7.1.6").level is Level.OK
-    assert check_rclpy(has_rclpy=True, found=None).level is Level.OK
-    other = check_rclpy(has_rclpy=True, found="3.3.11")
+    assert check_rclpy(has_rclpy=True, installed="7.1.6").level is Level.OK
+    assert check_rclpy(has_rclpy=True, installed=None).level is Level.OK
+    other = check_rclpy(has_rclpy=True, installed="3.3.11")
     assert (other.level, other.remedy is None) == (Level.WARNING, False)
-    missing = check_rclpy(has_rclpy=False, found=None)
+    missing = check_rclpy(has_rclpy=False, installed=None)
     assert missing.level is Level.ERROR
     assert "ros2-composer[ros]" in (missing.remedy or "")
 

@@ -143,11 +143,11 @@ def _choice(group: str, value: str, label: str, depth: int = 0) -> str:
 
 def _with_ancestors(namespaces: set[str]) -> set[str]:
     """Return the namespaces with their parents, and the root if there are several."""
-    found = set(namespaces)
+    shown = set(namespaces)
     for name in namespaces:
         levels = name.split("/")
-        found.update("/".join(levels[:depth]) for depth in range(2, len(levels)))
-    return found | {"/"} if len(found) > 1 else found
+        shown.update("/".join(levels[:depth]) for depth in range(2, len(levels)))
+    return shown | {"/"} if len(shown) > 1 else shown
 
 
 def _natural(name: str) -> list[tuple[str, int]]:
