@@ -62,12 +62,17 @@ class TypeCheck:
         """
         if self._problems is None:
             self._problems = self._collected()
-        others = [*reported]
-        return [
-            diagnostic(problem, source.reference.text.span, what)
+        found = [
+            (node, problem, diagnostic(problem, source.reference.text.span, what))
             for node, source, what in sources(context)
             for problem in self._problems.get(use_of(node, source), ())
-            if not _follows(problem, node, context, others)
+        ]
+        without_self = [item for _, problem, item in found if problem.family is Family.SELF]
+        others = [*reported, *without_self]
+        return without_self + [
+            item
+            for node, problem, item in found
+            if problem.family is not Family.SELF and not _follows(problem, node, context, others)
         ]
 
     def close(self) -> None:

@@ -21,8 +21,14 @@ from composer.python_code.checker.relevance import Relevance, unguarded_value
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family, Problem
-from composer.python_code.stubs.folder import LIBRARIES
-from composer.python_code.trees import Function, dotted, is_none, name_span, span_of
+from composer.python_code.trees import (
+    Function,
+    dotted,
+    is_none,
+    name_span,
+    positional_arguments,
+    span_of,
+)
 from composer.source import Span
 
 #: What the checker says about code that Python refuses to compile.
@@ -83,7 +89,6 @@ _SENDING = {
     "composer.behavior.ActionClient.send_goal": "the port sends",
     "composer.behavior.Goal.publish_feedback": "the feedback is",
 }
-_RCLPY_MODULES = tuple(f"rclpy.{path.stem}" for path in (LIBRARIES / "rclpy").iterdir())
 #: Modules besides the standard library of which every name is known.
 _COMPLETE_MODULES = frozenset({"composer", "numpy", "rclpy"})
 
@@ -107,23 +112,8 @@ class Reader:
 
     def problem(self) -> Problem | None:
         """Return what the finding means, None if it does not matter."""
-        match self.finding.kind:
-            case "missing-attribute" | "missing-module-attribute":
-                return self._attribute()
-            case "bad-argument-type":
-                return self._argument()
-            case "bad-assignment":
-                return self._assignment()
-            case "unexpected-keyword" | "bad-argument-count":
-                return self._keyword()
-            case "unknown-name":
-                return self._name()
-            case "unused-coroutine":
-                return self._await()
-            case "bad-return":
-                return self._return()
-            case "missing-import":
-                return self._import()
+        if self.finding.kind in _READERS:
+            return _READERS[self.finding.kind](self)
         first = self.finding.message.partition("\n")[0]
         if "`None`" in first or "`NoneType`" in first:
             return self._none()
@@ -208,15 +198,6 @@ class Reader:
         family = Family.IMPORT if is_import else Family.ATTRIBUTE
         return self._made(family, f"module '{module}' has no '{name}'", hint)
 
-    def _import(self) -> Problem:
-        found = re.search(r"`([\w.]+)`", self.finding.message)
-        name = found[1] if found is not None else self.span.text
-        at = self.span.file.line(self.span.line).find(name)
-        self.span = Span(self.span.file, self.span.line, max(at, 0) + 1, len(name))
-        close = nearest(name, _RCLPY_MODULES)
-        hint = f"did you mean '{close}'?" if close is not None else None
-        return self._made(Family.IMPORT, f"no module named '{name}'", hint)
-
     def _argument(self) -> Problem | None:
         found = re.search(_ARGUMENT, self.finding.message)
         if found is None:
@@ -285,6 +266,8 @@ class Reader:
         if found is None:
             return self._in_its_words()
         name = found[1]
+        if name == "self" and self.code.class_at(self.span.line) is not None:
+            return self._missing_self()
         self.about.append(f"name {name}")
         if name in sys.stdlib_module_names:
             hint = f"add 'import {name}'"
@@ -296,6 +279,16 @@ class Reader:
             alike = [x for x in names - {name} if x[:1].lower() == name[:1].lower()]
             hint = _did_you_mean(name, alike) or "import it, or define it"
         return self._made(Family.NAME, f"name '{name}' is not defined", hint)
+
+    def _missing_self(self) -> Problem | None:
+        """Return the problem of a method without arguments, or without the 'self' that it uses."""
+        class_, function = self.code.class_at(self.span.line), self.code.function_at(self.span.line)
+        if class_ is None or function is None or function.name in self.code.names:
+            return None  # a plain function, which the body of the class uses
+        names = ("self", *(item.arg for item in positional_arguments(function)))
+        self.span = name_span(function, "def", self.span.file)
+        message = f"method '{function.name}' of '{class_.name}' lacks 'self'"
+        return self._made(Family.SELF, message, f"write 'def {function.name}({', '.join(names)})'")
 
     def _await(self) -> Problem:
         called = self.span.text.partition("(")[0].strip()
@@ -346,6 +339,20 @@ class Reader:
         self.about.append(f"none {name}")
         hint = f"check 'if {name} is None' first"
         return Problem(Family.NONE, message, self.span, hint, is_certain=False)
+
+
+_READERS = {
+    "bad-argument-count": Reader._keyword,
+    "bad-argument-type": Reader._argument,
+    "bad-assignment": Reader._assignment,
+    "bad-function-definition": Reader._missing_self,
+    "bad-return": Reader._return,
+    "missing-attribute": Reader._attribute,
+    "missing-module-attribute": Reader._attribute,
+    "unexpected-keyword": Reader._keyword,
+    "unknown-name": Reader._name,
+    "unused-coroutine": Reader._await,
+}
 
 
 def _meant(message: str) -> str | None:

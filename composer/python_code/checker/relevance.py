@@ -51,8 +51,6 @@ _ROS = (
     r"|between `Literal\['[^`]*` and `(?:int|float)`"
 )
 _RESULT_FOR_RCLPY = r" return (?:type )?`[\w.]*(?:_Response|Result|CallbackReturnType)`"
-#: A missing module of rclpy; the composer checks other imports itself.
-_KNOWN_PACKAGE = r"`rclpy\."
 _BUILTINS = frozenset(
     {"Enum", "bool", "bytes", "dict", "float", "int", "list", "object", "set", "str", "tuple"}
 )
@@ -87,9 +85,7 @@ class Relevance:
             line = span.file.line(span.line)
             is_used = re.match(r"\s*(global |nonlocal |self\.\w+\s*:)", line) is None
             return is_used and span.text in self.code.names
-        if kind == "missing-import":
-            return re.search(_KNOWN_PACKAGE, message) is not None
-        if kind in _ALWAYS or message.startswith("No attribute"):
+        if kind in _ALWAYS or message.startswith(("No attribute", "Instance method")):
             return True
         return not self._is_loose_code(kind, message, span) and self._is_kept(kind, message, span)
 

@@ -9,7 +9,6 @@ from composer.model import Node
 from composer.python_code.checks.behaviors import behavior_problems
 from composer.python_code.checks.messages import message_problems
 from composer.python_code.checks.methods import (
-    missing_self,
     unawaited_values,
     unused_values,
 )
@@ -28,7 +27,6 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
         yield from message_problems(scope)
         yield from unused_values(scope)
         yield from unawaited_values(scope)
-    yield from missing_self(code)
     if node.behavior is not None:
         yield from behavior_problems(code)
     else:

@@ -24,6 +24,7 @@ from composer.python_code.modules import (
 )
 from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family, Problem
+from composer.python_code.stubs.folder import LIBRARIES
 from composer.python_code.syntax import Module, defined_names, read_module
 from composer.python_code.trees import dotted, start_span, walk
 from composer.source import shown_path
@@ -132,7 +133,12 @@ class _Imports:
         return _Missing(message, hint)
 
     def lacks(self, module: str, name: str) -> bool:
-        """Return whether a module has no such name, as far as is known."""
+        """Return whether a module has no such name, as far as is known.
+
+        The type checker knows the names in rclpy.
+        """
+        if module == "rclpy" or self.interfaces.find(f"{module.replace('.', '/')}/{name}"):
+            return False
         contents = self._contents(module)
         if contents is None or name == "*" or name.startswith("__") or name in contents.names:
             return False
@@ -150,6 +156,9 @@ class _Imports:
             names = _API_NAMES if module == _API else frozenset({"behavior", "typed"})
             is_known = folder in ("", "behavior")
             return _Contents(names, is_closed=module == _API) if is_known else None
+        if module == "rclpy":
+            stubs = (path.stem for path in (LIBRARIES / module).iterdir())
+            return _Contents(frozenset(stubs), is_closed=False)
         try:
             own = self._read_own(module)
         except Unreadable:

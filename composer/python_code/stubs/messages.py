@@ -11,7 +11,6 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from functools import lru_cache
 
 from composer.interfaces import (
     FLOATS,
@@ -71,19 +70,7 @@ def _module(text: str) -> str:
 
 
 def _text(name: str, definition: Interface) -> str:
-    """Return the stub of one interface, kept by its content: systems use the same ones."""
-    try:
-        return _kept_text(name, definition)
-    except TypeError:  # a default value is a list, so the content has no hash
-        return _written_text(name, definition)
-
-
-@lru_cache(maxsize=2048)
-def _kept_text(name: str, definition: Interface) -> str:
-    return _written_text(name, definition)
-
-
-def _written_text(name: str, definition: Interface) -> str:
+    """Return the stub of one interface."""
     match definition:
         case Service(request=request, response=response):
             named = {"Request": request, "Response": response}

@@ -145,12 +145,6 @@ FILES = [
     """,
     """
     class Robot:
-        def on_tick():  # SELF
-            pass
-
-        def helper(value):  # SELF
-            return self.limit + value
-
         def other(this, value):
             return value
 
@@ -187,9 +181,6 @@ def test_texts(tmp_path: Path) -> None:
     class Robot:
         def on_configure(self):
             self.publishers.velocity.publish(self.parameters["limt"])
-
-        def reset(request, response):
-            return self.response
     """
     assert {(item.message, item.hint) for item in problems(text, tmp_path, "behavior")} == {
         (
@@ -197,8 +188,4 @@ def test_texts(tmp_path: Path) -> None:
             "move it to on_activate",
         ),
         ("the node has no parameter 'limt'", "did you mean 'limit'?"),
-        (
-            "method 'reset' of 'Robot' lacks 'self'",
-            "write 'def reset(self, request, response)'",
-        ),
     }

@@ -246,7 +246,7 @@ FILES = [
             self.timer.reset  # UNUSED
             self.client == 1  # UNUSED
 
-        def helper():  # SELF?
+        def helper():
             pass
     """,
     """
