@@ -63,3 +63,24 @@ def test_project_without_the_checker_is_checked_by_the_rules(
     (tmp_path / "code.py").write_text("class Counter:\n    def on_tik(self):\n        pass\n")
     found = [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)]
     assert sorted(found) == ["missing-handler", "not-checked"]
+
+
+def test_problems_of_unchanged_files_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "code.py").write_text(CODE % "kept")
+    found = diagnostics_in(SYSTEM, tmp_path)
+    assert [item.rule.name for item in found] == ["unknown-attribute"]
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))  # without the checker
+    assert diagnostics_in(SYSTEM, tmp_path) == found
+    (entry,) = (tmp_path / "ros2-composer" / "checks").iterdir()
+    for damaged in (
+        b"",
+        b"\xff",
+        b"[[1]]",
+        b'[["code.py", "PORT", "no", [1, 1, 1]]]',
+        b"[" * 99_999,
+    ):
+        entry.write_bytes(damaged)
+        assert [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)] == ["not-checked"]
