@@ -34,7 +34,11 @@ class NotLiteral(Exception):
     """Only running the code would show the value. The text is the code."""
 
     def __init__(self, node: ast.expr) -> None:
-        super().__init__(ast.unparse(node)[:80])
+        super().__init__()
+        self._node = node
+
+    def __str__(self) -> str:
+        return ast.unparse(self._node)[:80]
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from composer.python_code.trees import (
     SCOPES,
     Function,
     Import,
+    children,
     dotted,
     full_names,
     imports_in,
@@ -196,7 +197,7 @@ def parse(source: SourceFile) -> ast.Module:
         if depth > MAXIMUM_DEPTH:
             raise Unreadable("has expressions that are nested too deep to be checked")
         depth = 0 if isinstance(node, ast.stmt) else depth + 1
-        pending += [(child, depth) for child in ast.iter_child_nodes(node)]
+        pending += [(child, depth) for child in children(node)]
     return tree
 
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
 
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checks.behaviors import behavior_problems
 from composer.python_code.checks.messages import message_problems
-from composer.python_code.checks.methods import (
-    unawaited_values,
-    unused_values,
-)
 from composer.python_code.checks.node_classes import node_class_problems
-from composer.python_code.checks.scopes import Code
+from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.lookup import BehaviorSource
-from composer.python_code.problems import Problem
+from composer.python_code.problems import Family, Problem
+from composer.python_code.trees import dotted
 
 __all__ = ["code_problems"]
+
+#: Methods of goals, ports and timers that have no meaning as plain attributes.
+_METHODS = frozenset(
+    {"abort", "cancel", "canceled", "destroy", "publish", "publish_feedback", "reset", "succeed"}
+)
 
 
 def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) -> Iterator[Problem]:
@@ -25,9 +28,23 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
     code = Code(node, source, interfaces)
     for scope in code.scopes:
         yield from message_problems(scope)
-        yield from unused_values(scope)
-        yield from unawaited_values(scope)
+        yield from _unused_values(scope)
     if node.behavior is not None:
         yield from behavior_problems(code)
     else:
         yield from node_class_problems(code)
+
+
+def _unused_values(scope: NodeScope) -> Iterator[Problem]:
+    """Yield the comparisons that are not used, and the methods that are not called."""
+    for node in scope.nodes:
+        match node:
+            case ast.Expr(value=ast.Compare(ops=[ast.Eq(), *_]) as value):
+                message = "the result of this comparison is not used"
+                yield scope.problem(Family.UNUSED, message, value, "assign with '='")
+            case ast.Expr(value=ast.Attribute(attr=name) as value):
+                method = scope.code.source.method(name) if scope.method is not None else None
+                is_own = dotted(value) == f"self.{name}" and method is not None and method.known
+                if is_own or name in _METHODS:
+                    message = f"'{name}' is not called"
+                    yield scope.problem(Family.UNUSED, message, value, "add '()'")
