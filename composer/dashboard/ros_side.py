@@ -167,7 +167,7 @@ class RosSide:
         _import()
         from composer.dashboard.observing.observed import Observed, first_topology
         from composer.remote.shared_session import SharedSession
-        from composer.runtime.middleware.dds_announcements import announce_less_often
+        from composer.runtime.middleware.dds_xml import announce_less_often
         from composer.runtime.middleware.environment import prepare_environment
 
         prepare_environment()
@@ -186,7 +186,7 @@ def _import() -> None:
         import composer.dashboard.observing.observed
         import composer.dashboard.pictures  # for the first diagram
         import composer.remote.shared_session
-        import composer.runtime.middleware.dds_announcements  # noqa: F401
+        import composer.runtime.middleware.dds_xml  # noqa: F401
 
 
 def _prepare() -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from composer.doctor import CheckResult, error, note, ok, warning
 from composer.model import Discovery, DiscoveryKind
-from composer.runtime.middleware.discovery import discovery_conflict
+from composer.runtime.middleware.environment import discovery_conflict
 from composer.runtime.middleware.shared_memory import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,

@@ -9,8 +9,7 @@ from composer.names import is_hidden
 from composer.remote.name_matching import find_node, full_name, not_found_error
 from composer.remote.session import Deadline, RosError, Session
 from composer.runtime.process.query_socket import NameAndTypes, visible
-from composer.runtime.ros_graph.action_info import ActionInfo, action_info
-from composer.runtime.ros_graph.node_info import NodeInfo, node_info
+from composer.runtime.ros_graph.node_endpoints import ActionInfo, NodeInfo, action_info, node_info
 
 T = TypeVar("T")
 

@@ -18,7 +18,7 @@ from composer.remote.session import Deadline, Session
 from composer.remote.systems.proxies import LIFECYCLE, PARAMETERS, Proxies
 from composer.runtime.ros.manager_protocol import full_parameter_name
 from composer.runtime.ros.parameter_values import plain_value
-from composer.runtime.ros_graph.endpoints_by_node import endpoints, node_names, visible_topics
+from composer.runtime.ros_graph.node_endpoints import endpoints, node_names, visible_topics
 from composer.tree import Plain
 
 #: How long to wait for the responses of nodes; later ones count as unknown.

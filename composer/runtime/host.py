@@ -46,11 +46,13 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
 from composer.runtime.metrics.figures import merged_chains
-from composer.runtime.middleware.dds_interfaces import use_interfaces
 from composer.runtime.middleware.dds_profiles import use_large_system_profile
 from composer.runtime.middleware.dds_segment import segment_for_large_messages
-from composer.runtime.middleware.discovery import active_variables
-from composer.runtime.middleware.environment import ROS_ARGUMENTS, prepare_environment
+from composer.runtime.middleware.environment import (
+    ROS_ARGUMENTS,
+    active_variables,
+    prepare_environment,
+)
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
@@ -157,7 +159,10 @@ class Host:
         prepare_environment(self._system.discovery)
         if self._uses_fast_exit:
             use_large_system_profile(os.environ)
-        self._node_set.warnings += use_interfaces(self._system.discovery, os.environ)
+        if self._system.discovery is not None and self._system.discovery.interfaces:
+            from composer.runtime.middleware.dds_xml import use_interfaces  # noqa: PLC0415 - slow, rare
+
+            self._node_set.warnings += use_interfaces(self._system.discovery, os.environ)
         namespace = join(self._system.namespace, self._system.name.value)
         ends_process = self._options.ends_process
         signals = stop_signals(self.stop, self._main_queue.wakeup, ends_process=ends_process)

@@ -19,7 +19,7 @@ from composer.model import Node, PrimaryState
 from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
 from composer.runtime.executors.futures import Future
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.main_queue import (

@@ -34,8 +34,7 @@ def require_ros(command: str, system: System | None = None) -> None:
     keep_stdout_for_data()
     gc.freeze()  # what is there now is not garbage
     gc.enable()
-    from composer.runtime.middleware.discovery import adopt_discovery
-    from composer.runtime.middleware.environment import prepare_environment
+    from composer.runtime.middleware.environment import adopt_discovery, prepare_environment
     from composer.runtime.process import StartRefused
 
     try:
@@ -49,7 +48,7 @@ def require_ros(command: str, system: System | None = None) -> None:
 
 def announce_discovery(system: System) -> None:
     """Print what other tools of ROS need to discover the system, if that is not the default."""
-    from composer.runtime.middleware.discovery import as_assignments, discovery_conflict
+    from composer.runtime.middleware.environment import as_assignments, discovery_conflict
 
     if system.discovery is None:
         return

@@ -62,7 +62,7 @@ class TimingFeed(Feed):
         }
 
     def _callback(self, item: CallbackRates, *, has_rates: bool) -> dict[str, Any]:
-        from composer.runtime.metrics.histogram import parse_buckets
+        from composer.runtime.metrics.statistics import parse_buckets
 
         return {
             **asdict(item.figures),

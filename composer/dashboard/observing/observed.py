@@ -20,8 +20,8 @@ from composer.remote.systems.local_queries import local_report
 from composer.remote.systems.managers import DISCOVERY_S, Systems
 from composer.remote.systems.system_reports import SystemReport
 from composer.runtime.process.instance_lock import LocalSystems
-from composer.runtime.ros_graph.endpoints_by_node import endpoints
 from composer.runtime.ros_graph.graph import COMMAND_PREFIX, SETTLE_S
+from composer.runtime.ros_graph.node_endpoints import endpoints
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import Work

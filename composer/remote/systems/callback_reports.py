@@ -8,8 +8,7 @@ from typing import TypeVar
 from composer.characters import visible
 from composer.fast_dataclass import dataclass
 from composer.remote.systems.system_reports import invalid_report
-from composer.runtime.metrics.diagnostics import from_statuses
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, from_statuses
 from composer.runtime.ros.diagnostic_arrays import read_array
 
 F = TypeVar("F", CallbackFigures, ChainFigures)

@@ -12,8 +12,7 @@ from typing import TypeAlias, TypeVar
 from composer.characters import visible
 from composer.fast_dataclass import dataclass
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, merged_chains
-from composer.runtime.metrics.numbers import finite, optional, whole
-from composer.runtime.ros.diagnostic_arrays import read_array
+from composer.runtime.ros.diagnostic_arrays import finite, optional, read_array, whole
 
 
 class InvalidReportError(Exception):

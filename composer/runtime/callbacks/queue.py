@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Coroutine
 from typing import Any, Generic, TypeVar
 
+from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.timing import CallbackTimer
 from composer.runtime.executors.strand import InlineStrand, Work
 
 T = TypeVar("T")

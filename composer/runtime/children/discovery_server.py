@@ -29,7 +29,7 @@ from composer.runtime.children.child_processes import (
     signal_name,
 )
 from composer.runtime.children.server_record import ServerRecord
-from composer.runtime.middleware.discovery import active_variables
+from composer.runtime.middleware.environment import active_variables
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import PortState, is_own_address, port_state, resolve
 

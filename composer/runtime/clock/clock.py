@@ -15,8 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.time import Time
 from rclpy.time_source import USE_SIM_TIME_NAME
 
-from composer.runtime.clock.sim_time import UNKNOWN, SimTimeSource
-from composer.runtime.clock.sim_timers import SimTimers
+from composer.runtime.clock.sim_time import UNKNOWN, SimTimers, SimTimeSource
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import TimerHandle
 

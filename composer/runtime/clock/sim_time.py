@@ -1,14 +1,19 @@
-"""The time of /clock, for all nodes of a process.
+"""The time of /clock, for all nodes of a process, and timers of a node in that time.
 
 In rclpy each node that uses simulated time has its own subscription: an endpoint per node, and the
 same message taken as often as there are nodes. Here one subscription serves all of them.
+
+Timers count whole nanoseconds, as rcl does: the steps of a simulator are exact multiples of the
+timers' periods, and sums of fractions would just miss them.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
-from typing import TypeAlias
+from functools import partial
+from typing import Protocol, TypeAlias
 
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
@@ -21,6 +26,145 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from composer.runtime.executors.entities.sources import Taken
 from composer.runtime.executors.loop import Loop
 from composer.runtime.metrics.repeat_limit import RepeatLimit
+
+NANOSECONDS = 1_000_000_000
+_NEVER = math.inf
+
+
+class SupportsCallSoon(Protocol):
+    """The part of a loop that timers need."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` on the loop as soon as it is free."""
+
+
+class SimTimer:
+    """A call that is due ``delay_ns`` after its creation, and periodically if ``repeats``."""
+
+    __slots__ = ("_timers", "callback", "cancelled", "delay_ns", "due_ns", "repeats")
+
+    def __init__(
+        self,
+        timers: SimTimers,
+        delay_s: float,
+        callback: Callable[[], object],
+        *,
+        repeats: bool,
+    ) -> None:
+        """Raise ValueError for a period that is not positive and a delay that is NaN."""
+        if repeats and not delay_s > 0:
+            raise ValueError(f"a period must be positive, not {delay_s:g} s")
+        if math.isnan(delay_s):
+            raise ValueError("a delay must be a number")
+        self._timers = timers
+        self.delay_ns: float = (
+            max(round(delay_s * NANOSECONDS), int(repeats)) if math.isfinite(delay_s) else delay_s
+        )
+        self.due_ns: float = 0
+        self.callback = callback
+        self.repeats = repeats
+        self.cancelled = False
+
+    @property
+    def late_s(self) -> float:
+        """How long ago the call was due, in seconds of the simulation."""
+        return (self._timers.now_ns - self.due_ns) / NANOSECONDS
+
+    def cancel(self) -> None:
+        """Never call again."""
+        self.cancelled = True
+        self._timers.discard(self)
+
+
+class SimTimers:
+    """The timers of one node; few, so that no heap is needed. From any thread.
+
+    Time advances only by :meth:`set_time`. When it jumps:
+
+    - forward: a timer that is due is called once, whatever number of periods has passed;
+    - backward: no timer waits longer than its period or delay from the new time on
+      (rcl/src/rcl/timer.c, ``_rcl_timer_time_jump``);
+    - from zero, which means unknown: all delays start.
+    """
+
+    def __init__(self, loop: SupportsCallSoon) -> None:
+        """Make the calls on ``loop``."""
+        self._loop = loop
+        self._changing = threading.Lock()
+        self._waiting: set[SimTimer] = set()
+        self._next_ns: float = _NEVER
+        self.now_ns = 0
+
+    def add(
+        self, delay_s: float, callback: Callable[[], object], *, repeats: bool = False
+    ) -> SimTimer:
+        """Call ``callback`` ``delay_s`` seconds of the simulation from now."""
+        timer = SimTimer(self, delay_s, callback, repeats=repeats)
+        if timer.delay_ns <= 0:
+            self._loop.call_soon(partial(self._call, timer))
+            return timer
+        with self._changing:
+            self._wait_for(timer, self.now_ns + timer.delay_ns)
+        return timer
+
+    def discard(self, timer: SimTimer) -> None:
+        """Stop waiting for a timer."""
+        with self._changing:
+            self._waiting.discard(timer)
+
+    def set_time(self, now_ns: int) -> None:
+        """Advance to ``now_ns`` and make all calls that are due."""
+        with self._changing:
+            before_ns, self.now_ns = self.now_ns, now_ns
+            if before_ns == 0:
+                self._reschedule(lambda timer: now_ns + timer.delay_ns)
+            elif now_ns < before_ns:
+                self._reschedule(lambda timer: min(timer.due_ns, now_ns + timer.delay_ns))
+            due = self._pop_due() if now_ns >= self._next_ns else ()
+        for timer in due:
+            self._loop.call_soon(partial(self._call, timer))
+
+    def _wait_for(self, timer: SimTimer, due_ns: float) -> None:
+        timer.due_ns = due_ns
+        self._waiting.add(timer)
+        self._next_ns = min(self._next_ns, due_ns)
+
+    def _reschedule(self, due_ns: Callable[[SimTimer], float]) -> None:
+        self._next_ns = _NEVER
+        for timer in self._waiting:
+            self._wait_for(timer, due_ns(timer))
+
+    def _pop_due(self) -> list[SimTimer]:
+        now_ns = self.now_ns
+        due = sorted(
+            (timer for timer in self._waiting if timer.due_ns <= now_ns),
+            key=lambda timer: timer.due_ns,
+        )
+        self._waiting.difference_update(due)
+        self._next_ns = min((timer.due_ns for timer in self._waiting), default=_NEVER)
+        return due
+
+    def _call(self, timer: SimTimer) -> None:
+        if timer.cancelled:
+            return
+        try:
+            timer.callback()
+        finally:
+            if timer.repeats:
+                self._repeat(timer)
+
+    def _repeat(self, timer: SimTimer) -> None:
+        """Wait for the next multiple of the period in the future."""
+        with self._changing:
+            if timer.cancelled:
+                return
+            late_ns = self.now_ns - timer.due_ns
+            if late_ns < 0:  # time has jumped back since it was due
+                self._wait_for(timer, self.now_ns + timer.delay_ns)
+            else:
+                periods = late_ns // timer.delay_ns + 1
+                self._wait_for(timer, timer.due_ns + periods * timer.delay_ns)
+
 
 #: As rclpy and rclcpp subscribe: only the latest time matters.
 _QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

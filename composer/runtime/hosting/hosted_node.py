@@ -38,15 +38,12 @@ from composer.runtime.hosting.names import action_names, remapping_arguments
 from composer.runtime.hosting.shared_state import SharedState
 from composer.runtime.hosting.user_code import ThreadedCall, end_callbacks
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class
-from composer.runtime.node.behavior_modules import plain_name
+from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class, plain_name
 from composer.runtime.node.local_node import LocalNode
-from composer.runtime.node.managed_node import NodeListener
+from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
 from composer.runtime.node.node import WrongReturn
-from composer.runtime.node.options import NodeOptions
-from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameters import declare, ros_parameters
-from composer.runtime.node.ros_node import make_ros_node
 
 _THREAD_ENDS_WITHIN_S = 0.2
 #: A constructor or a handler of a transition is reported once it has run for so long.

@@ -11,11 +11,9 @@ from rclpy.node import Node
 
 from composer.runtime.middleware.dds_participants import count_participants
 from composer.runtime.process.query_socket import KINDS, GraphView
-from composer.runtime.ros_graph.action_info import action_info
 from composer.runtime.ros_graph.changes import PolledGraphChanges
-from composer.runtime.ros_graph.endpoints_by_node import endpoints, node_names
 from composer.runtime.ros_graph.graph import SETTLE_S, RosGraph
-from composer.runtime.ros_graph.node_info import node_info
+from composer.runtime.ros_graph.node_endpoints import action_info, endpoints, node_info, node_names
 
 #: How long to wait for a process that has just started; commands wait longer than that.
 _COMPLETE_WITHIN_S = 0.4

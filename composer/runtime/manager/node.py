@@ -47,14 +47,20 @@ from composer.runtime.manager.proxy_services import ProxyLifecycleService, Proxy
 from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.manager.status_messages import status_message
 from composer.runtime.members.report import signed_report
-from composer.runtime.metrics.diagnostics import Figures, to_statuses, to_text
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.runtime.metrics.figures import (
+    CallbackFigures,
+    ChainFigures,
+    Figures,
+    to_statuses,
+    to_text,
+)
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.ros.diagnostic_arrays import Status as Diagnostic
 from composer.runtime.ros.diagnostic_arrays import write_array
+from composer.runtime.ros.limited_requests import limit_type_descriptions
 from composer.runtime.ros.manager_protocol import (
     ALL_OR_NOTHING,
     CALLBACKS_QOS,
@@ -66,7 +72,6 @@ from composer.runtime.ros.manager_protocol import (
     STATE_QOS,
     STATE_TOPIC,
 )
-from composer.runtime.ros.type_description import limit_type_descriptions
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.transforms.listener import TransformListeners

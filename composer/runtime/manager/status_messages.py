@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from composer.runtime.metrics.figures import ChainFigures
-from composer.runtime.metrics.numbers import optional_text
-from composer.runtime.ros.diagnostic_arrays import Level, Status
+from composer.runtime.ros.diagnostic_arrays import Level, Status, optional_text
 from composer.runtime.supervision.status import NodeStatus, SystemStatus
 
 _MAX_LENGTH = 500

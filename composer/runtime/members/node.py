@@ -17,7 +17,7 @@ from composer.runtime.executors.tasks import within
 from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
 from composer.runtime.members.report import MemberState
-from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES, TransitionOutcome
+from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES, TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
     INACTIVE,

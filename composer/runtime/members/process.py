@@ -40,9 +40,8 @@ from composer.runtime.members.report import (
     parse_report,
 )
 from composer.runtime.members.requests import MemberRequests
-from composer.runtime.metrics.diagnostics import from_text
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
-from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES
+from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, from_text
+from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held, report_key
 from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
 

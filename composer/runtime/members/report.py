@@ -17,8 +17,7 @@ from dataclasses import field
 from typing import Any
 
 from composer.fast_dataclass import dataclass
-from composer.runtime.metrics.numbers import finite, optional
-from composer.runtime.ros.diagnostic_arrays import Status, read_array, write_array
+from composer.runtime.ros.diagnostic_arrays import Status, finite, optional, read_array, write_array
 
 #: Processes report every second. One that has not reported for this time is lost.
 REPORTS_WITHIN_S = 5.0

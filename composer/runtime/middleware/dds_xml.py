@@ -1,9 +1,20 @@
-"""Reads and changes the XML profiles of Fast DDS."""
+"""Changes to our profiles of Fast DDS, which are XML: interfaces, announcements, segments."""
 
 from __future__ import annotations
 
+from collections.abc import MutableMapping, Sequence
+from contextlib import suppress
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+
+from composer.model import Discovery
+from composer.runtime.middleware.dds_profiles import (
+    is_default_profile,
+    is_own_profile,
+    save_profile,
+)
+from composer.runtime.process import StartRefused
+from composer.runtime.process.addresses import has_interface, interface_names
 
 _NAMESPACE = "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"
 _SHARED_MEMORY, _UDP = "shared_memory", "udp"
@@ -98,3 +109,64 @@ def _text(root: Element) -> str:
 
 def _parse(text: str) -> Element:
     return ElementTree.fromstring(text)  # noqa: S314 - a text of ours
+
+
+_PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
+_RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_UNUSED = "'interfaces' of the system are not used"
+#: With others, rmw_fastrtps replaces the transports of a profile.
+_RANGES = ("", "SUBNET", "SYSTEM_DEFAULT")
+
+
+def use_interfaces(discovery: Discovery, environment: MutableMapping[str, str]) -> list[str]:
+    """Select a profile for the network interfaces of a system, which has some.
+
+    Return a warning if the environment prevents it. Raises StartRefused if there is no such
+    interface: Fast DDS would discover nothing, and only log why.
+    """
+    interfaces = [item.value for item in discovery.interfaces]
+    for text in interfaces:
+        if not has_interface(text):
+            raise StartRefused(
+                f"this computer has no network interface '{text}' ('discovery' of the system)",
+                f"it has {', '.join(interface_names())}; see 'ip address'",
+            )
+    if (
+        not is_own_profile(environment)
+        or environment.get(_TRANSPORTS_VARIABLE)
+        or environment.get(_RANGE_VARIABLE, "") not in _RANGES
+    ):
+        return [
+            f"{_UNUSED}: the environment sets a profile or transports of Fast DDS, or"
+            f" {_RANGE_VARIABLE}"
+        ]
+    content = profile_for_interfaces(environment[_PROFILES_VARIABLE], interfaces)
+    try:
+        environment[_PROFILES_VARIABLE] = str(save_profile(content))
+    except OSError as error:
+        return [f"{_UNUSED}: cannot write the profile '{error.filename}': {error.strerror}"]
+    return []
+
+
+def profile_for_interfaces(path: str, interfaces: Sequence[str]) -> str:
+    """Return the profile in the file ``path`` with these network interfaces only, as XML."""
+    profile = Profile(path)
+    allowed = child(profile.udp, "interfaceWhiteList")
+    for interface in interfaces:
+        is_address = interface.replace(".", "").isdigit()
+        add(allowed, "address" if is_address else "interface", interface)
+    return profile.text()
+
+
+def announce_less_often(environment: MutableMapping[str, str]) -> None:
+    """Select a profile with the default period of announcements, 3 s.
+
+    Each announcement goes to all possible participants of this computer. Other processes answer the
+    first one of this process, and it answers theirs. Without a folder to write to, or if the user
+    has configured Fast DDS, nothing changes.
+    """
+    if is_default_profile(environment):
+        with suppress(OSError):
+            content = without(environment[_PROFILES_VARIABLE], "leaseAnnouncement")
+            environment[_PROFILES_VARIABLE] = str(save_profile(content))

@@ -35,7 +35,7 @@ from composer.runtime.executors.exceptions import (
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.tasks import within
 from composer.runtime.metrics.repeat_limit import RepeatLimit
-from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
 
 _NAMES = {

@@ -29,11 +29,9 @@ from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
-from composer.runtime.node.managed_node import NodeListener
-from composer.runtime.node.options import NodeOptions
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
+from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
-from composer.runtime.node.ros_node import make_ros_node
 
 T = TypeVar("T")
 

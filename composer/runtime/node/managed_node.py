@@ -7,12 +7,34 @@ from typing import Protocol, TypeVar, runtime_checkable
 
 from rclpy.node import Node as RosNode
 
+from composer.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
 from composer.plan import FaultKind
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.outcome import TransitionOutcome
+
+#: The label of the state that a node cannot leave.
+FINALIZED = "finalized"
+#: The labels of the states between transitions.
+PRIMARY_STATES = ("unconfigured", "inactive", "active", FINALIZED)
+
+
+@dataclass(frozen=True, slots=True)
+class TransitionOutcome:
+    """How a requested transition ended, in which state, and why it did not succeed.
+
+    ``external`` is false for the step of a plan; ``outdated`` is true for a step that was not run
+    because an external transition came first.
+    """
+
+    transition: str
+    state: str
+    success: bool
+    reason: str = ""
+    external: bool = True
+    outdated: bool = False
+
 
 T = TypeVar("T")
 

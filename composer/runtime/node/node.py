@@ -27,9 +27,8 @@ from composer.runtime.node.behavior_loader import (
 )
 from composer.runtime.node.entities import NodeEntities
 from composer.runtime.node.local_node import LibraryNode, LocalNode
-from composer.runtime.node.managed_node import NodeListener
+from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions
-from composer.runtime.node.outcome import TransitionOutcome
 from composer.runtime.node.parameters import NodeParameters, ParameterValues
 from composer.runtime.ports.timer import TimerPort
 

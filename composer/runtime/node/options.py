@@ -1,19 +1,22 @@
-"""How a node is run, and what all nodes of the process share."""
+"""How a node is run, what all nodes of the process share, and how its ROS node is created."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node as RosNode
+from rclpy.parameter import Parameter
 
 from composer.fast_dataclass import dataclass
-from composer.model import LogLevel
+from composer.model import LogLevel, Node
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.ros.limited_requests import limit_type_descriptions
 from composer.runtime.transforms.listener import TransformListeners
 
 
@@ -46,3 +49,43 @@ class NodeOptions:
     transition_timeout_s: float = 10.0
     system_is_up: bool = False
     make_library_node: Callable[[Any], Any] | None = None
+
+
+class _NoPublisher:
+    """Replaces the publisher of /parameter_events."""
+
+    def publish(self, _: ParameterEvent) -> None:
+        """Do nothing."""
+
+
+class _NodeWithoutParameterEvents(RosNode):
+    """A node that does not publish /parameter_events, for which rclpy has no option."""
+
+    def create_publisher(self, msg_type: Any, topic: str, *args: Any, **kwargs: Any) -> Any:
+        """Create a publisher, except for the one of /parameter_events that rclpy creates."""
+        if msg_type is ParameterEvent:
+            return _NoPublisher()
+        return super().create_publisher(msg_type, topic, *args, **kwargs)
+
+
+def make_ros_node(model: Node, arguments: Sequence[str] = ()) -> RosNode:
+    """Return a ROS node for ``model``, with command-line ``arguments`` of rcl.
+
+    It does not publish /rosout: the node's log does.
+    """
+    offers = model.introspection
+    kind = RosNode if offers.parameters else _NodeWithoutParameterEvents
+    overrides = []
+    if not offers.type_description:
+        overrides.append(Parameter("start_type_description_service", value=False))
+    node = kind(
+        model.ros_name.value,
+        namespace=model.namespace.value,
+        cli_args=list(arguments),
+        use_global_arguments=False,
+        enable_rosout=False,
+        start_parameter_services=False,  # see parameter_services.py
+        parameter_overrides=overrides,
+    )
+    limit_type_descriptions(node)
+    return node

@@ -21,8 +21,12 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.managed_node import NodeListener
-from composer.runtime.node.outcome import FINALIZED, PRIMARY_STATES, TransitionOutcome
+from composer.runtime.node.managed_node import (
+    FINALIZED,
+    PRIMARY_STATES,
+    NodeListener,
+    TransitionOutcome,
+)
 from composer.runtime.outside_nodes.remote_lifecycle import GOALS
 
 UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"

@@ -12,7 +12,7 @@ from rclpy.node import Node as RosNode
 
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
-from composer.runtime.node.outcome import PRIMARY_STATES
+from composer.runtime.node.managed_node import PRIMARY_STATES
 
 #: An answer that a server sends before it has discovered the client is lost.
 _ASK_AGAIN_S = 1.0

@@ -11,16 +11,16 @@ from rclpy.serialization import serialize_message
 from composer.behavior import CallCancelled
 from composer.fast_dataclass import dataclass
 from composer.model import FeedbackSteps, Port
+from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.callbacks.timing import CallbackTimer
 from composer.runtime.executors.entities.goal_server import GoalServer
 from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
-from composer.runtime.intra_process.action import LocalActionServer
+from composer.runtime.intra_process.servers import LocalActionServer
 from composer.runtime.ports.goal import RunningGoal
 from composer.runtime.ros.messages import Build, compile_message, interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile

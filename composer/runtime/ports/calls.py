@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from composer.behavior import CallCancelled, CallTimeout, ServerUnavailable
 from composer.model import Event, Port
+from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.callbacks.timing import CallbackTimer
 from composer.runtime.executors.exceptions import text_of
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep

@@ -8,7 +8,7 @@ from composer.behavior import CallCancelled, CallError
 from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Future, wrap_future
-from composer.runtime.intra_process.service import LocalService
+from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.ports.calls import CallingPort, CallLimit
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile

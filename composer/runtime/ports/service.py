@@ -9,15 +9,15 @@ from rclpy.service import Service
 
 from composer.behavior import CallError, ServerUnavailable
 from composer.model import Port
+from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.callbacks.timing import CallbackTimer
 from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.exceptions import describe, is_closing, shown
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.stacks import calls_user_code
-from composer.runtime.intra_process.service import LocalService
+from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 

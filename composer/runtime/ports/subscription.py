@@ -13,9 +13,9 @@ from rclpy.subscription import Subscription
 
 from composer.model import Port
 from composer.qos import Durability
+from composer.runtime.callbacks.callback import mutation_checked
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction
-from composer.runtime.callbacks.timing import mutation_checked
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.ros.messages import interface_class

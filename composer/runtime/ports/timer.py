@@ -7,11 +7,10 @@ from functools import partial
 from typing import Any
 
 from composer.model import Timer, TimerClock
-from composer.runtime.callbacks.callback import EMPTY, Callback
+from composer.runtime.callbacks.callback import EMPTY, Callback, mutation_checked
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.callbacks.timing import mutation_checked
 from composer.runtime.executors.tasks import TimerHandle
 
 

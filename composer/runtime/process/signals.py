@@ -1,14 +1,58 @@
-"""SIGINT, SIGTERM and SIGHUP as requests to stop."""
+"""SIGINT, SIGTERM and SIGHUP as requests to stop, and a pipe that wakes the main thread."""
 
 from __future__ import annotations
 
+import math
+import os
+import select
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
-from composer.runtime.process.wakeup_pipe import WakeupPipe
+_MILLISECONDS = 1000
+_LONGEST_MS = 2**31 - 1  # the longest timeout of poll(2): 24 days
+_READ_BYTES = 65536
+
+
+class WakeupPipe:
+    """Wakes the current wait, or the next one.
+
+    A lock does not work here: a signal that arrives just before the wait for a lock does not end
+    it, and Python never runs the handler. A byte in a pipe is still there for the wait.
+    """
+
+    def __init__(self) -> None:
+        #: Any byte written here wakes, also by ``signal.set_wakeup_fd``.
+        self._read_fd, self.fd = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._poll = select.poll()
+        self._poll.register(self._read_fd, select.POLLIN)
+
+    def wake(self) -> None:
+        """End the current or the next wait, from any thread or a signal handler."""
+        with suppress(BlockingIOError):  # full: the next wait ends anyway
+            os.write(self.fd, b"\0")
+
+    def wait(self, until_s: float = math.inf) -> bool:
+        """Sleep until a wake-up; return False if ``until_s`` (monotonic) comes first."""
+        while not self._poll.poll(_milliseconds_until(until_s)):
+            if time.monotonic() >= until_s:
+                return False
+        os.read(self._read_fd, _READ_BYTES)
+        return True
+
+    def __del__(self) -> None:
+        # Not sooner: a late wake-up must not write to a descriptor that was reused.
+        os.close(self._read_fd)
+        os.close(self.fd)
+
+
+def _milliseconds_until(end_s: float) -> int:
+    left_ms = max(0.0, end_s - time.monotonic()) * _MILLISECONDS
+    return math.ceil(min(left_ms, _LONGEST_MS))
+
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

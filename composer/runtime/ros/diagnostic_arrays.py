@@ -1,11 +1,8 @@
-"""Serialized messages of diagnostic_msgs/msg/DiagnosticArray, without an object for each value.
-
-The report of a small system has a hundred values, and rclpy would spend more time on their objects
-than the composer on everything else that a report takes.
-"""
+"""Serialized messages of diagnostic_msgs/msg/DiagnosticArray, without an object for each value."""
 
 from __future__ import annotations
 
+import math
 import struct
 import sys
 from array import array
@@ -135,3 +132,32 @@ def _aligned(position: int) -> int:
 def _decoded(text: str) -> str:
     """Return a text of bytes as the text that they encode."""
     return text if text.isascii() else text.encode("latin-1").decode(errors="replace")
+
+
+def finite(text: str) -> float:
+    """Return a number. Raises ValueError, also for infinity and NaN."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"'{text:.80}' is not a number")
+    return number
+
+
+def whole(text: str) -> int:
+    """Return an integer. Raises ValueError."""
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"'{text:.80}' is not an integer") from None
+
+
+def optional_text(number: float | None, digits: int) -> str:
+    """Return a number as text with some digits after the point; empty if it is not known."""
+    return "" if number is None else f"{number:.{digits}f}"
+
+
+def optional(text: str) -> float | None:
+    """Return the number of :func:`optional_text`. Raises ValueError."""
+    return finite(text) if text else None

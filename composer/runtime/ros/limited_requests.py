@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from lifecycle_msgs.srv import ChangeState
@@ -25,6 +25,7 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+from rclpy.node import Node
 from rclpy.type_support import check_is_valid_srv_type
 from type_description_interfaces.srv import GetTypeDescription
 
@@ -156,3 +157,19 @@ _CHECKS: dict[Any, _Check] = {
     ChangeState: _check_transition,
     GetTypeDescription: _check_type,
 }
+
+
+def limit_type_descriptions(node: Node) -> None:
+    """Refuse requests with long texts, which rcl would print. Call it before the node is served."""
+    for service in node.services:
+        if service.srv_type is GetTypeDescription:
+            service.srv_type = limited(GetTypeDescription)
+            service.callback = partial(_respond, service.callback)
+
+
+def _respond(callback: Any, request: Any, response: Any) -> Any:
+    if not isinstance(request, TooLarge):
+        return callback(request, response)
+    response.successful = False
+    response.failure_reason = request.reason
+    return response

@@ -22,7 +22,7 @@ CHANGE_STATE = "change_state"
 #: requested of the whole system, which the process keeps and reports: see ``plan/system_goals.py``.
 #: The step ``create /arm`` creates a finalized node again, which is unconfigured then.
 #: With the parameter ``figures``, a last result has the timings of callbacks and chains as its
-#: reason, as JSON: see ``metrics/diagnostics.py``. The parameter ``participant`` has the one that
+#: reason, as JSON: see ``metrics/figures.py``. The parameter ``participant`` has the one that
 #: is meant, as it reports itself: another process of the same name, on another computer for
 #: example, receives the request as well, but neither follows nor answers it. The parameters
 #: ``sender`` and ``numbers`` identify the steps, and ``seen_report`` is the number of the last

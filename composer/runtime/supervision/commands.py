@@ -24,7 +24,7 @@ from composer.plan import (
     start_causes,
     start_goals,
 )
-from composer.runtime.node.outcome import FINALIZED
+from composer.runtime.node.managed_node import FINALIZED
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor

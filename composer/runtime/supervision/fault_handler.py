@@ -9,7 +9,7 @@ from functools import partial
 
 from composer.model import OnFailure, PrimaryState
 from composer.plan import Decision, DesiredState, Fault, FaultKind, Plan, Restart, Step, decide
-from composer.runtime.node.outcome import FINALIZED
+from composer.runtime.node.managed_node import FINALIZED
 from composer.runtime.supervision.events import NodeFailed
 from composer.runtime.supervision.main_queue import LoopRecovered
 from composer.runtime.supervision.plan_executor import ExecutionOptions

@@ -12,7 +12,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from composer.fast_dataclass import dataclass
 from composer.plan import Fault
-from composer.runtime.process.wakeup_pipe import WakeupPipe
+from composer.runtime.process.signals import WakeupPipe
 
 T = TypeVar("T")
 K = TypeVar("K")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from composer.model import LogLevel, Node, PrimaryState
 from composer.plan import Fault, FaultKind
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
+from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
 from composer.runtime.supervision import events
 from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved, NodeReturned
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState

@@ -30,16 +30,19 @@ from composer.runtime.executors.placement import place_threads
 from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode
-from composer.runtime.intra_process.eligibility import shared_channels
-from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.intra_process.router import LocalRouter, shared_channels
 from composer.runtime.members.node import MemberNode
 from composer.runtime.members.other_processes import OtherProcesses
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.managed_node import ManagedNode, NodeListener
+from composer.runtime.node.managed_node import (
+    FINALIZED,
+    ManagedNode,
+    NodeListener,
+    TransitionOutcome,
+)
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
-from composer.runtime.node.outcome import FINALIZED, TransitionOutcome
 from composer.runtime.node.parameters import ParameterError
 from composer.runtime.outside_nodes.executable_node import ExecutableNode
 from composer.runtime.outside_nodes.external_node import ExternalNode

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from composer.fast_dataclass import dataclass
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
-from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved, StepEnded
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 

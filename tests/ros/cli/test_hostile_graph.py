@@ -14,8 +14,7 @@ from std_srvs.srv import Trigger
 
 from composer.remote.systems.callback_reports import parse_callbacks
 from composer.remote.systems.system_reports import InvalidReportError, parse_state
-from composer.runtime.metrics.diagnostics import to_statuses
-from composer.runtime.metrics.figures import CallbackFigures
+from composer.runtime.metrics.figures import CallbackFigures, to_statuses
 from composer.runtime.ros.diagnostic_arrays import write_array
 from composer.runtime.ros.manager_protocol import CALLBACKS_QOS, STATE_QOS
 from tests.ros.support.commands import (

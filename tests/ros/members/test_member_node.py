@@ -17,7 +17,7 @@ from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.node import MemberNode
 from composer.runtime.members.report import MemberState
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import OutsideContext
 from tests.ros.members.split_robot import DETECTOR, TEXT
 from tests.ros.support.in_process import system_of, wait_until

@@ -14,8 +14,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Empty
 
-from composer.runtime.middleware.dds_participants import count_participants
-from composer.runtime.ros_graph.ended_participants import ended_participants
+from composer.runtime.middleware.dds_participants import count_participants, ended_participants
 from composer.runtime.ros_graph.endpoints import UNKNOWN_NODE
 from composer.runtime.ros_graph.graph import RosGraph, participant
 from tests.ros.support.commands import PYTHON, hand_written

@@ -7,7 +7,7 @@ from typing import Any
 
 from composer.model import LogLevel
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.outcome import TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import OutsideContext, OutsideNode
 from tests.ros.support.in_process import system_of
 

@@ -23,8 +23,8 @@ from rclpy.qos import QoSPresetProfiles
 from composer.drift import ObservedEndpoint
 from composer.remote.systems.local_queries import local_report
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros_graph.endpoints_by_node import endpoints, node_names
 from composer.runtime.ros_graph.graph import RosGraph, participant
+from composer.runtime.ros_graph.node_endpoints import endpoints, node_names
 from tests.ros.support.commands import (
     COMPOSE,
     code_of_end,

@@ -121,8 +121,7 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
         discovery_range,
     )
     from composer.doctor.network import check_declared_discovery, check_network
-    from composer.runtime.middleware.discovery import use_discovery
-    from composer.runtime.middleware.environment import complete_environment
+    from composer.runtime.middleware.environment import complete_environment, use_discovery
     from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 
     yield from check_versions()

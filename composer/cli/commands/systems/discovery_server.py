@@ -73,8 +73,7 @@ def _run(discovery: Discovery) -> None:
     from composer.runtime.children.discovery_server import discovery_servers
     from composer.runtime.process import StartRefused
     from composer.runtime.process.service_manager import READY, STOPPING, ServiceManager
-    from composer.runtime.process.signals import stop_signals
-    from composer.runtime.process.wakeup_pipe import WakeupPipe
+    from composer.runtime.process.signals import WakeupPipe, stop_signals
 
     require_ros("compose discovery-server")
     manager, wakeup = ServiceManager(), WakeupPipe()

@@ -19,8 +19,13 @@ from composer.cli.support.output.callback_tables import (
 )
 from composer.remote.systems.system_reports import NodeReport, SystemReport, with_processes
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, figures, rates
-from composer.runtime.metrics.histogram import BATCH_SIZE, BOUNDS_S, Histogram
-from composer.runtime.metrics.statistics import CallbackStatistics, Statistics
+from composer.runtime.metrics.statistics import (
+    BATCH_SIZE,
+    BOUNDS_S,
+    CallbackStatistics,
+    Histogram,
+    Statistics,
+)
 
 
 def counted(*times_s: float) -> Histogram:

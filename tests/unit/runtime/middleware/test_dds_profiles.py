@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.middleware.dds_announcements import announce_less_often
 from composer.runtime.middleware.dds_profiles import (
     use_command_profile,
     use_discovery_profile,
     use_large_system_profile,
 )
+from composer.runtime.middleware.dds_xml import announce_less_often
 
 
 def test_the_default_profile_is_valid_xml(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 import pytest
 
 from composer.model import Discovery, DiscoveryKind
-from composer.runtime.middleware.dds_interfaces import use_interfaces
 from composer.runtime.middleware.dds_profiles import is_own_profile, use_discovery_profile
 from composer.runtime.middleware.dds_segment import profile_with_segment
-from composer.runtime.middleware.discovery import (
+from composer.runtime.middleware.dds_xml import use_interfaces
+from composer.runtime.middleware.environment import (
     active_variables,
     adopt_discovery,
     as_assignments,

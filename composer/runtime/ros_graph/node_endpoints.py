@@ -1,14 +1,69 @@
-"""The endpoints of all nodes in the ROS graph, with the QoS profiles that discovery reports."""
+"""The endpoints of nodes in the ROS graph, and the servers and clients of actions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 from composer.drift import ObservedEndpoint
+from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.names import is_hidden, join_node_name, split_node_name
+from composer.runtime.process.query_socket import NameAndTypes, visible
 from composer.runtime.ros_graph.graph import RosGraph
+
+
+@dataclass(frozen=True, slots=True)
+class NodeInfo:
+    """The endpoints of a node, by name."""
+
+    name: str
+    subscriptions: tuple[NameAndTypes, ...]
+    publishers: tuple[NameAndTypes, ...]
+    services: tuple[NameAndTypes, ...]
+    clients: tuple[NameAndTypes, ...]
+    action_servers: tuple[NameAndTypes, ...]
+    action_clients: tuple[NameAndTypes, ...]
+
+
+def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
+    """Return the endpoints of a node; those of ROS itself only if ``hidden``."""
+    namespace, name = split_node_name(full_name)
+    queries = (
+        graph.subscriptions_of,
+        graph.publishers_of,
+        graph.services_of,
+        graph.clients_of,
+        graph.action_servers_of,
+        graph.action_clients_of,
+    )
+    return NodeInfo(full_name, *(_sorted(query((name, namespace)), hidden) for query in queries))
+
+
+def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:
+    return tuple(sorted(found if hidden else visible(found)))
+
+
+@dataclass(frozen=True, slots=True)
+class ActionInfo:
+    """The nodes with a server or client of an action."""
+
+    name: str
+    types: tuple[str, ...]
+    servers: tuple[str, ...]
+    clients: tuple[str, ...]
+
+
+def action_info(graph: RosGraph, name: str, types: tuple[str, ...]) -> ActionInfo:
+    """Return the nodes of an action, by its full name, that are discovered now."""
+    servers, clients = [], []
+    for node, _ in graph.names("node"):
+        namespace, base_name = split_node_name(node)
+        where = (base_name, namespace)
+        servers += [node for found, _ in graph.action_servers_of(where) if found == name]
+        clients += [node for found, _ in graph.action_clients_of(where) if found == name]
+    return ActionInfo(name, types, tuple(servers), tuple(clients))
+
 
 #: The order of endpoints of a node.
 _ORDER = {kind: number for number, kind in enumerate(PortKind)}
