@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import gc
 import os
+import site
 import sys
-import sysconfig
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,7 +24,7 @@ _COMPOSER = f"{Path(__file__).parents[2]}{os.sep}"
 _SHARE = f"{_COMPOSER}share{os.sep}"
 _IMPORT_SYSTEM = "<frozen importlib"
 #: Where Python's own modules are, and packages that were installed.
-_LIBRARIES = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")})
+_LIBRARIES = (os.path.dirname(os.__file__), *site.getsitepackages())  # noqa: PTH120
 
 F = TypeVar("F", bound=Callable[..., Any])
 

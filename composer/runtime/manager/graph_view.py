@@ -43,10 +43,20 @@ class GraphObserver:
         #: The last answer about all endpoints, and the change of the graph before it.
         self._endpoints: dict[str, Any] | None = None
         self._change = -1
+        self._noted_change = -1
 
-    def note_participants(self) -> None:
-        """Note which participants are known. Call it every second."""
-        self._settled, self._recent = self._recent, RosGraph(self._node).participants()
+    def note_participants(self) -> bool:
+        """Note which participants are known; return whether the graph may have changed.
+
+        Call it every second. In a large system, a query takes milliseconds.
+        """
+        change = self._changes.number()
+        has_changed = change != self._noted_change
+        self._settled = self._recent
+        if has_changed:
+            self._noted_change = change
+            self._recent = RosGraph(self._node).participants()
+        return has_changed
 
     def view(self) -> GraphView | None:
         """Return the graph, None if it may be incomplete. Any thread may call."""

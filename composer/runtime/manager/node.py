@@ -292,8 +292,7 @@ class ManagerNode:
 
     def _tick(self) -> None:
         self._host.update_status()
-        self._instances.check()
-        self._graph.note_participants()
+        self._instances.check(graph_has_changed=self._graph.note_participants())
         if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
             self._publish()
         elif self._member is not None:

@@ -99,6 +99,7 @@ class OtherInstances:
         self._known_name = node.resolve_service_name(f"~/{IS_ACTIVE}")
         self._prefix = node.resolve_service_name(f"~/{INSTANCE_PREFIX}")
         self._calls: dict[str, _Call] = {}
+        self._has_others = False
         self._reported: set[str] = set()  # the services of instances that were reported
         self._add_service()
         self._loop.call_later(_CHECK_PERIOD_S, self._check_start)
@@ -108,11 +109,13 @@ class OtherInstances:
         """The prefix of the ids of all endpoints of this process: no other has this service."""
         return b"".join(map(participant, servers_of(self._node, self._name)))
 
-    def check(self) -> None:
+    def check(self, *, graph_has_changed: bool = True) -> None:
         """Look for other instances, and ask those that are not known."""
         self._end_calls()
-        # Every manager has this service, and counting is cheaper than listing all services.
-        if self._node.count_services(self._known_name) <= 1:
+        if graph_has_changed:
+            # Every manager has this service, and counting is cheaper than listing all services.
+            self._has_others = self._node.count_services(self._known_name) > 1
+        if not self._has_others:
             return
         found = {
             name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import threading
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -76,7 +77,7 @@ class GraphChanges(Waitable):
 
 
 class PolledGraphChanges:
-    """Counts the changes of the ROS graph without an executor, for rare queries of one thread.
+    """Counts the changes of the ROS graph without an executor, for rare queries of any thread.
 
     A context can have only one of these: each call resets its guard condition.
     """
@@ -85,16 +86,17 @@ class PolledGraphChanges:
         self._node = node
         self._wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 0, 0, node.context.handle)
         self._number = 0
+        self._looking = threading.Lock()
 
     def number(self) -> int:
         """Return another number than the last time if the graph may have changed since then."""
-        self._wait_set.clear_entities()
-        with self._node.handle:
+        with self._looking, self._node.handle:
+            self._wait_set.clear_entities()
             index = _add_to(self._wait_set, self._node)
             self._wait_set.wait(0)
-        if index is None or self._wait_set.is_ready("guard_condition", index):
-            self._number += 1
-        return self._number
+            if index is None or self._wait_set.is_ready("guard_condition", index):
+                self._number += 1
+            return self._number
 
 
 def _add_to(wait_set: Any, node: Node) -> int | None:
