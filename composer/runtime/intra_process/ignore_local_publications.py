@@ -2,7 +2,8 @@
 
 rmw has ``ignore_local_publications``; rclpy does not expose it. The flag is set where rmw reads it
 for each message: in the options of ``rmw_subscription_t``. The offsets are an assumption about the
-ABI of ROS 2 Jazzy, so a self-test with real endpoints runs once per process before it is used.
+ABI of ROS 2 Jazzy, so a self-test with real endpoints runs once per process before it is used. It
+tests the flag of matches as well.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import Empty
+
+from composer.runtime.intra_process.match_flag import checked_match
 
 _MIDDLEWARES = ("rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
 _TIMEOUT_S = 1.0
@@ -106,7 +109,9 @@ def _self_test(node: Node) -> None:
     topic = f"{_TEST_NODE}/t{uuid4().hex}"
     ignoring = node.create_subscription(Empty, topic, lambda _: None, profile)
     publisher = node.create_publisher(Empty, topic, profile)
-    receiving = node.create_subscription(Empty, topic, lambda _: None, profile)
+    receiving = checked_match(
+        publisher, lambda: node.create_subscription(Empty, topic, lambda _: None, profile)
+    )
     # External subscriptions are counted as matches minus local ones: those must match at once.
     matched = publisher.get_subscription_count()
     if matched != 2:

@@ -9,13 +9,16 @@ room for as many events as can be reported together.
 from __future__ import annotations
 
 import ctypes
-from typing import Final
+from collections.abc import Callable
+from typing import Final, TypeVar
 
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.publisher import Publisher
 
 from composer.runtime.executors.entities.readiness import EVENT
+
+T = TypeVar("T")
 
 _SIZE = 1 << 20  # more events than can be reported together; Linux commits pages on first use
 
@@ -34,11 +37,13 @@ class Matching:
     would be fetched from memory for each message.
     """
 
-    __slots__ = ("generation",)
+    __slots__ = ("generation", "is_supported")
 
     def __init__(self) -> None:
         #: A unique object.
         self.generation = object()
+        #: False if a match does not zero the flag here: then they are counted for each message.
+        self.is_supported = True
 
     def begin_generation(self) -> None:
         """Begin a generation. Call it when the flag is zero."""
@@ -61,7 +66,7 @@ class MatchListener:
         """Listen unless it is not ``enabled``: rmw has one callback per kind of event."""
         #: False if matches are not reported.
         self.is_supported = False
-        if not enabled:
+        if not (enabled and MATCHING.is_supported):
             return
         try:
             with publisher.handle:
@@ -81,3 +86,14 @@ class MatchListener:
             EVENT(self._event.pointer, None, 0)
         self._event.destroy_when_not_in_use()
         self.is_supported = False
+
+
+def checked_match(publisher: Publisher, match: Callable[[], T]) -> T:
+    """Return ``match()``, which matches a publisher, and check that it zeroes the flag."""
+    MATCHING.is_supported = True
+    listener = MatchListener(publisher)
+    MATCHING.begin_generation()
+    matched = match()
+    MATCHING.is_supported = listener.is_supported and not MATCH_FLAG[0]
+    listener.close()
+    return matched

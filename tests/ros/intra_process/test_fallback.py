@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
+from composer.runtime.intra_process import match_flag
 from composer.runtime.intra_process.ignore_local_publications import (
     _Options,
     _Subscription,
@@ -190,12 +191,19 @@ def test_the_doctor_reports_it(middleware: str | None, tmp_path: Path) -> None:
         assert "'delivery: dds'" in found["remedy"]
 
 
-def test_the_self_test_leaves_nothing_in_the_graph() -> None:
+@pytest.mark.parametrize("reports_matches", [True, False])
+def test_the_self_test_leaves_nothing_in_the_graph(
+    reports_matches: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(match_flag.MATCHING, "is_supported", not reports_matches)
+    if not reports_matches:
+        monkeypatch.setattr(match_flag, "EVENT", lambda *_: 0)  # it is accepted and never called
     context = Context()
     context.init([])
     node = Node("watcher", context=context)
     try:
         assert unsupported_reason.__wrapped__(context) is None
+        assert match_flag.MATCHING.is_supported == reports_matches
         found = [*node.get_service_names_and_types(), *node.get_topic_names_and_types()]
         assert [name for name, _ in found if "trial" in name] == []
     finally:
