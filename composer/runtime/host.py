@@ -67,6 +67,7 @@ from composer.runtime.supervision.health_monitor import HealthMonitor
 from composer.runtime.supervision.main_queue import Command, Item, MainQueue
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet, NodeSetOptions
+from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.start import SystemStart
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
@@ -121,7 +122,7 @@ class Host:
             ),
         )
         self._supervisor = Supervisor(
-            system, self._node_set, self._main_queue, self._status, self._reporter
+            Reconciler(system, self._node_set, self._main_queue, self._status, self._reporter)
         )
         self._commands = Commands(system, self._node_set, self._supervisor, self._status)
         self._start = SystemStart(

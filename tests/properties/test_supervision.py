@@ -31,6 +31,7 @@ from composer.runtime.supervision.main_queue import (
     StepEnded,
 )
 from composer.runtime.supervision.node_listener import SupervisionListener
+from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 from tests.examples import examples
@@ -359,7 +360,9 @@ class Supervision(RuleBasedStateMachine):
         reporter = Reporter(None)
         status = Status(self.system, in_dependency_order(SYSTEM, dependency_edges(SYSTEM)))
         node_set = cast("NodeSet", self.world)
-        self.supervisor = Supervisor(self.system, node_set, self.queue, status, reporter)
+        self.supervisor = Supervisor(
+            Reconciler(self.system, node_set, self.queue, status, reporter)
+        )
         self.commands = Commands(self.system, node_set, self.supervisor, status)
         listener_of: dict[str, SupervisionListener] = {}
         for model in self.system.nodes:

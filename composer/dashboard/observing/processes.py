@@ -1,29 +1,11 @@
-"""CPU time and memory of processes on this computer, from /proc."""
+"""CPU time and memory of processes on this computer, from one report to the next."""
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from composer.fast_dataclass import dataclass
-
-_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
-_MB = 1e6
-_MAX_BYTES = 4096  # more than it can be
-#: Fields of /proc/PID/stat after the name of the command; see proc(5).
-_UTIME, _STIME, _THREADS, _STARTED, _RSS = 11, 12, 17, 19, 21
-
-
-@dataclass(frozen=True, slots=True)
-class _Reading:
-    at_s: float
-    cpu_s: float
-    memory_mb: float
-    threads: int
-    up_s: float
+from composer.runtime.process.usage import ProcessUsage, process_usage
 
 
 def total(usages: Iterable[Mapping[str, Any] | None]) -> dict[str, Any] | None:
@@ -45,14 +27,14 @@ class ProcessMonitor:
     """The use of the processors by processes, between two calls."""
 
     def __init__(self) -> None:
-        self._before: dict[str, _Reading] = {}
+        self._before: dict[str, ProcessUsage] = {}
 
     def usage(self, pid: str) -> dict[str, Any] | None:
         """Return the usage of a process; None if there is no such process.
 
         ``cpu_percent`` is the share of one processor since the last call, None at the first.
         """
-        reading = _read(pid)
+        reading = process_usage(pid) if pid.isascii() and pid.isdigit() else None
         if reading is None:
             self._before.pop(pid, None)
             return None
@@ -67,26 +49,3 @@ class ProcessMonitor:
             "threads": reading.threads,
             "up_s": round(reading.up_s, 1),
         }
-
-
-def _read(pid: str) -> _Reading | None:
-    if not pid.isascii() or not pid.isdigit():
-        return None
-    try:
-        descriptor = os.open(f"/proc/{pid}/stat", os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:
-        return None
-    try:
-        text = os.read(descriptor, _MAX_BYTES).decode("utf-8", errors="replace")
-    except OSError:
-        return None
-    finally:
-        os.close(descriptor)
-    values = text.rpartition(")")[2].split()
-    return _Reading(
-        at_s=time.monotonic(),
-        cpu_s=(int(values[_UTIME]) + int(values[_STIME])) / _TICKS_PER_S,
-        memory_mb=int(values[_RSS]) * _PAGE_BYTES / _MB,
-        threads=int(values[_THREADS]),
-        up_s=time.clock_gettime(time.CLOCK_BOOTTIME) - int(values[_STARTED]) / _TICKS_PER_S,
-    )

@@ -7,6 +7,7 @@ deadlock (gh-106883), and reading a frame may crash. So no garbage is collected 
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import site
@@ -78,6 +79,11 @@ def stacks_of(threads: Iterable[int]) -> dict[int, list[FrameType]]:
         # messages, until the next garbage collection.
         current.clear()
         return stacks
+
+
+def raise_in(thread: int, kind: type[BaseException]) -> None:
+    """Raise an exception in a thread as soon as it runs Python code, in whatever function."""
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(kind))
 
 
 def format_stack(stack: Sequence[FrameType]) -> str:

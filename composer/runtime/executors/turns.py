@@ -72,7 +72,7 @@ class TurnTaking(BaseLoop):
         self._checked: list[bool] | None = None  # the call that had the turn at the last check
         self._handing_over = threading.Lock()
         self._turns: queue.SimpleQueue[Turn | None] = queue.SimpleQueue()  # for idle threads
-        self._idle: list[threading.Thread] = []
+        self._idle: set[threading.Thread] = set()
         self._threads: list[threading.Thread] = []
         self._add_thread(self._turn)
 
@@ -301,12 +301,19 @@ class TurnTaking(BaseLoop):
 
     def _next_turn(self) -> Turn | None:
         """Return the turn of this thread, which has lost its last one; None if the loop stops."""
-        self._blocked.discard(get_ident())
-        self._free_slots(1)
-        if self._has_turn():
-            return self._turn
-        self._idle.append(threading.current_thread())
-        return self._turns.get()
+        holds_slot = True
+        while True:
+            try:
+                self._blocked.discard(get_ident())
+                if holds_slot:
+                    holds_slot = False
+                    self._free_slots(1)
+                if self._has_turn():
+                    return self._turn
+                self._idle.add(threading.current_thread())
+                return self._turns.get()
+            except BaseException as error:  # an interrupt of a callback that has just returned
+                self.report(f"executor '{self._name}'", error)
 
 
 def _place_like(thread: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import inspect
 import threading
 import time
@@ -17,6 +16,7 @@ from composer.runtime.executors.stacks import (
     gc_paused,
     is_internal,
     location_of,
+    raise_in,
     stacks_of,
 )
 from composer.runtime.executors.strand import in_steps, scope_of
@@ -132,18 +132,18 @@ class CallAbandoned(Cancelled):
     """Raised in code of a class whose time is over. It is not a fault of the class."""
 
 
-def interrupt(ident: int) -> str:
+def interrupt(ident: int, call: FrameType | None = None) -> str:
     """Raise CallAbandoned in a thread as soon as it runs code of the user; return where it is.
 
-    In a function of C, such as ``time.sleep``, it is raised once that returns.
+    With ``call``, only until that call has returned. In a function of C, such as ``time.sleep``, it
+    is raised once that returns.
     """
     for _ in range(_ATTEMPTS):
-        stack = stacks_of((ident,)).get(ident)
-        if stack is None:
+        stack = stacks_of((ident,)).get(ident, [])
+        if not stack or (call is not None and call not in stack):
             return ""
         if not is_internal(stack[0].f_code.co_filename):
-            exception = ctypes.py_object(CallAbandoned)
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), exception)
+            raise_in(ident, CallAbandoned)
             return location_of(stack)
         del stack
         time.sleep(_PERIOD_S)
@@ -160,8 +160,8 @@ async def end_callbacks(instance: Instance) -> None:
 
 def interrupt_callbacks(instance: Instance, function: UserFunction | None = None) -> None:
     """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
-    for ident, name in running_callbacks(instance, function):
-        at = interrupt(ident)
+    for ident, call, name in running_callbacks(instance, function):
+        at = interrupt(ident, call)
         if (ident, name) not in instance.interrupted:
             instance.interrupted.add((ident, name))
             where = f"; it is at {at}" if at else ""
@@ -170,15 +170,19 @@ def interrupt_callbacks(instance: Instance, function: UserFunction | None = None
 
 def running_callbacks(
     instance: Instance, function: UserFunction | None = None
-) -> list[tuple[int, str]]:
-    """Return the callbacks that other threads run: their threads' identifiers, and their names."""
+) -> list[tuple[int, FrameType, str]]:
+    """Return the callbacks that other threads run: the thread, the frame and the name of each."""
     current = threading.get_ident()
-    found: list[tuple[int, str]] = []
+    found: list[tuple[int, FrameType, str]] = []
     busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
     for ident, stack in busy.items():
         with gc_paused():
-            called = [item for item in map(_function_of, stack) if item is not None]
-        found += [(ident, item.__name__) for item in called if item.is_one(instance, function)][:1]
+            called = [(frame, item) for frame in stack if (item := _function_of(frame)) is not None]
+        found += [
+            (ident, frame, item.__name__)
+            for frame, item in called
+            if item.is_one(instance, function)
+        ][:1]
     return found
 
 

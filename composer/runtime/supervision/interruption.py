@@ -6,7 +6,6 @@ call that it sees twice has run in between.
 
 from __future__ import annotations
 
-import ctypes
 import inspect
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from composer.runtime.executors.stacks import (
     format_stack,
     gc_paused,
     location_of,
+    raise_in,
     stacks_of,
 )
 from composer.runtime.node.managed_node import ManagedNode
@@ -93,8 +93,6 @@ class RunningCallback:
         A callback that is always in code of the composer when its stack is sampled is not
         interrupted.
         """
-        exception = ctypes.py_object(CallbackInterrupted)
-        thread = ctypes.c_ulong(self.thread)
         for _ in range(_ATTEMPTS):
             # After a sleep, this thread holds the GIL for 5 ms, so the sampled stack stays valid.
             sleep(_MOMENT_S)
@@ -105,7 +103,7 @@ class RunningCallback:
             if at is None or _plain_frame(stack[at:]) is not self.call:
                 continue
             if not any(map(_is_composer, stack[:at])):
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, exception)
+                raise_in(self.thread, CallbackInterrupted)
                 return
 
 

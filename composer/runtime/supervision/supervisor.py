@@ -11,9 +11,8 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
-from composer.model import LogLevel, PrimaryState, System
+from composer.model import LogLevel, PrimaryState
 from composer.plan import (
     DesiredState,
     Fault,
@@ -23,18 +22,13 @@ from composer.plan import (
     is_nothing_left,
     reconcile,
 )
-from composer.runtime.supervision.events import (
-    Reporter,
-    Stuck,
-)
+from composer.runtime.supervision.events import Stuck
 from composer.runtime.supervision.fault_handler import FaultHandler
 from composer.runtime.supervision.main_queue import (
     CallbackBlocks,
     CallbackHanging,
     Command,
-    Item,
     LoopRecovered,
-    MainQueue,
     NodeEvent,
     NodeMoved,
     NodeReturned,
@@ -43,10 +37,6 @@ from composer.runtime.supervision.main_queue import (
 from composer.runtime.supervision.plan_executor import ExecutionOptions, StepFailed
 from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.shared_desired_state import SharedDesiredState
-from composer.runtime.supervision.status import Status
-
-if TYPE_CHECKING:  # this module and its tests need no ROS
-    from composer.runtime.supervision.node_set import NodeSet
 
 #: In the cause of a plan that moves of several nodes have caused.
 _MAX_CAUSES = 3
@@ -55,21 +45,14 @@ _MAX_CAUSES = 3
 class Supervisor:
     """The desired state of a system, and the reactions to everything that deviates from it."""
 
-    def __init__(
-        self,
-        system: System,
-        node_set: NodeSet,
-        main_queue: MainQueue[Item],
-        status: Status,
-        reporter: Reporter,
-    ) -> None:
-        self._node_set = node_set
-        self._main_queue = main_queue
-        self._status = status
-        self._reporter = reporter
-        self._system = system
-        self._reconciler = Reconciler(system, node_set, main_queue, status, reporter)
-        self._faults = FaultHandler(self._reconciler)
+    def __init__(self, reconciler: Reconciler) -> None:
+        self._system = reconciler.system
+        self._node_set = reconciler.node_set
+        self._main_queue = reconciler.main_queue
+        self._status = reconciler.status
+        self._reporter = reconciler.reporter
+        self._reconciler = reconciler
+        self._faults = FaultHandler(reconciler)
 
     @property
     def shared(self) -> SharedDesiredState:

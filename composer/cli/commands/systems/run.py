@@ -79,7 +79,7 @@ def run(
             metavar="SECONDS",
             min=0.0,
             callback=finite,
-            help="Shut down after this time.",
+            help="Shut down this long after the end of the bring-up.",
             show_default=False,
         ),
     ] = None,
@@ -364,7 +364,7 @@ def _options(
     from composer.cli.support.process import end_within
     from composer.model import LogLevel
     from composer.runtime.host_options import HostOptions
-    from composer.runtime.process.start_time import process_start_s
+    from composer.runtime.process.usage import process_start_s
 
     return HostOptions(
         run_for_s=run_for,
