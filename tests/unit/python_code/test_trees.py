@@ -25,7 +25,8 @@ TEXTS = [PATTERNS, *(Path(file).read_text() for file in (ast.__file__, __file__)
 def test_a_walk_visits_all_nodes_in_source_order(text: str) -> None:
     tree = ast.parse(text)
     visited = list(walk(tree.body))
-    assert {*visited, tree} == {*ast.walk(tree)}
+    every = {node for node in ast.walk(tree) if not isinstance(node, ast.expr_context)}
+    assert {*visited, tree} == every
     lines = [node.lineno for node in visited if isinstance(node, ast.stmt)]
     assert lines == sorted(lines)
 
