@@ -28,22 +28,6 @@ API_CLASSES = frozenset(
     for name, item in vars(behavior).items()
     if isinstance(item, type) and item.__module__ == behavior.__name__
 )
-#: Handlers that every behavior may have, with the arguments they are called with.
-GENERAL_HANDLERS: Mapping[str, tuple[str, ...]] = {
-    "on_configure": (),
-    "on_activate": (),
-    "on_deactivate": (),
-    "on_cleanup": (),
-    "on_shutdown": (),
-    "on_error": ("cause",),
-    "on_parameters": ("changes",),
-}
-
-_ARGUMENTS: Mapping[PortKind, tuple[str, ...]] = {
-    PortKind.SUBSCRIPTION: ("message",),
-    PortKind.SERVICE: ("request", "response"),
-    PortKind.ACTION_SERVER: ("goal",),
-}
 _PUBLISH = re.compile(r"self\.publishers\.(\w+)\.publish")
 _PREFIXES = ("on_", "accept_")
 #: What may leave out the code in it, or stop it.
@@ -59,6 +43,51 @@ UNDECLARED = frozenset(
 )
 #: Packages whose functions take a node and declare no parameters of the class.
 _OF_ROS = frozenset({"message_filters", "rclpy", "tf2_ros"})
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The arguments of a handler by name, with their types, and the type of its result.
+
+    ``{0}`` in a type stands for the interface of a port.
+    """
+
+    arguments: tuple[tuple[str, str], ...] = ()
+    result: str = "None"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the arguments."""
+        return tuple(name for name, _ in self.arguments)
+
+    def of(self, interface: str) -> Signature:
+        """Return the signature for a port with an interface, as Python names it."""
+        arguments = tuple((name, type_.format(interface)) for name, type_ in self.arguments)
+        return Signature(arguments, self.result.format(interface))
+
+
+#: Handlers that every behavior may have.
+GENERAL_HANDLERS: Mapping[str, Signature] = {
+    "on_configure": Signature(),
+    "on_activate": Signature(),
+    "on_deactivate": Signature(),
+    "on_cleanup": Signature(),
+    "on_shutdown": Signature(),
+    "on_error": Signature((("cause", "Exception"),)),
+    "on_parameters": Signature((("changes", "composer.behavior.Changes"),)),
+}
+_GOAL = "composer.behavior.Goal[{0}.Goal, {0}.Feedback]"
+#: The handlers of a port, by the beginning of their names.
+_PORT_HANDLERS: Mapping[PortKind, Mapping[str, Signature]] = {
+    PortKind.SUBSCRIPTION: {"on_": Signature((("message", "{0}"),))},
+    PortKind.SERVICE: {
+        "on_": Signature((("request", "{0}.Request"), ("response", "{0}.Response")), "{0}.Response")
+    },
+    PortKind.ACTION_SERVER: {
+        "on_": Signature((("goal", _GOAL),), "{0}.Result"),
+        "accept_": Signature((("request", "{0}.Goal"),), "bool"),
+    },
+}
 
 
 def node_classes(system: System) -> tuple[NodeClass, ...]:
@@ -89,7 +118,7 @@ class Handler:
     name: str
     of: Located[str]  # the port's or timer's name
     kind: str  # "subscription", "timer", ...
-    arguments: tuple[str, ...]
+    signature: Signature
     needed: bool
 
 
@@ -107,15 +136,12 @@ def use_of(node: Node, source: BehaviorSource) -> tuple[object, ...]:
 def handlers(node: Node) -> Iterator[Handler]:
     """Yield the handlers for the ports and timers of a node."""
     for port in node.ports:
-        arguments = _ARGUMENTS.get(port.kind)
-        if arguments is None:
-            continue
-        yield Handler(f"on_{port.name}", port.name, port.kind.value, arguments, _is_needed(port))
-        if port.kind is PortKind.ACTION_SERVER:
-            yield Handler(f"accept_{port.name}", port.name, port.kind.value, ("request",), False)
+        for prefix, signature in _PORT_HANDLERS.get(port.kind, {}).items():
+            needed = prefix == "on_" and _is_needed(port)
+            yield Handler(f"{prefix}{port.name}", port.name, port.kind.value, signature, needed)
     for timer in node.timers:
         needed = timer.reaction is None
-        yield Handler(f"on_{timer.name}", timer.name, "timer", (), needed)
+        yield Handler(f"on_{timer.name}", timer.name, "timer", Signature(), needed)
 
 
 def _is_needed(port: Port) -> bool:

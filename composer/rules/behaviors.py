@@ -84,7 +84,7 @@ def _missing(source: BehaviorSource, handler: Handler, unbound: dict[str, Method
         return Diagnostic(MISSING_HANDLER, message, unbound[close].span, (label,), hint)
     span = source.class_span
     related = (Label(span, "the behavior class"),) if span is not None else ()
-    hint = f"add 'def {handler.name}({', '.join(('self', *handler.arguments))})'"
+    hint = f"add 'def {handler.name}({', '.join(('self', *handler.signature.names))})'"
     return Diagnostic(MISSING_HANDLER, message, handler.of.span, related, hint)
 
 
@@ -98,8 +98,8 @@ def _hint(node: Node, name: str, bound: list[str]) -> str | None:
 
 def _signatures(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     place, class_name = source.reference.text.span, source.reference.class_name
-    expected = {name: (arguments, place) for name, arguments in GENERAL_HANDLERS.items()}
-    expected |= {item.name: (item.arguments, item.of.span) for item in handlers(node)}
+    expected = {name: (signature.names, place) for name, signature in GENERAL_HANDLERS.items()}
+    expected |= {item.name: (item.signature.names, item.of.span) for item in handlers(node)}
     for name, (arguments, span) in expected.items():
         method = source.method(name)
         if method is None or method.node is None or method.accepts(len(arguments)):

@@ -7,26 +7,30 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from composer.python_code.lookup import imported_from
-from composer.python_code.stubs.behaviors import Signature
+from composer.python_code.nodes import Signature
 from composer.python_code.syntax import Module
 from composer.python_code.trees import Function, argument, called_name, dotted, is_none, last_name
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
 _SENT_GOAL = "rclpy.action.client.ClientGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
-#: The callbacks of an action server: their position, argument and result.
+#: The callbacks of an action server, with their position.
 _OF_ACTION_SERVERS = {
-    "execute_callback": (3, ("goal_handle", _HANDLE), "{0}.Result"),
-    "goal_callback": (None, ("goal_request", "{0}.Goal"), ""),
-    "cancel_callback": (None, ("goal_handle", _HANDLE), ""),
-    "handle_accepted_callback": (None, ("goal_handle", _HANDLE), ""),
+    "execute_callback": (3, Signature((("goal_handle", _HANDLE),), "{0}.Result")),
+    "goal_callback": (None, Signature((("goal_request", "{0}.Goal"),), "")),
+    "cancel_callback": (None, Signature((("goal_handle", _HANDLE),), "")),
+    "handle_accepted_callback": (None, Signature((("goal_handle", _HANDLE),), "")),
 }
+_OF_SUBSCRIPTIONS = Signature((("message", "{0}"),), "")
+_OF_SERVICES = Signature((("request", "{0}.Request"), ("response", "{0}.Response")), "{0}.Response")
 _TRANSITIONS = ("activate", "cleanup", "configure", "deactivate", "error", "shutdown")
 _TRANSITION = Signature(
     (("state", "rclpy.lifecycle.LifecycleState"),), "rclpy.lifecycle.TransitionCallbackReturn"
 )
-_PARAMETERS = (("parameters", "list[{0}]"),)
-_CHANGED = "rcl_interfaces.msg.SetParametersResult"
-_FEEDBACK = "rclpy.action.client._FeedbackMessage[{0}.Feedback]"
+_OF_PARAMETERS = Signature((("parameters", "list[{0}]"),), "rcl_interfaces.msg.SetParametersResult")
+_FEEDBACK = Signature((("feedback", "{0}.Feedback"),), "")
+_FEEDBACK_MESSAGE = Signature(
+    (("feedback_message", "rclpy.action.client._FeedbackMessage[{0}.Feedback]"),), ""
+)
 _FUTURES = {
     "call_async": "rclpy.task.Future[{0}.Response]",
     "send_goal_async": f"rclpy.task.Future[{_SENT_GOAL}]",
@@ -71,39 +75,36 @@ def _of_call(
     match called_name(call):
         case "create_subscription":
             type_ = _type(argument(call, 0, "msg_type"), module)
-            yield from _bound(argument(call, 2, "callback"), type_, (("message", "{0}"),))
+            yield from _bound(argument(call, 2, "callback"), type_, _OF_SUBSCRIPTIONS)
         case "create_service":
             type_ = _type(argument(call, 0, "srv_type"), module)
-            arguments = (("request", "{0}.Request"), ("response", "{0}.Response"))
-            callback = argument(call, 2, "callback")
-            yield from _bound(callback, type_, arguments, "{0}.Response")
+            yield from _bound(argument(call, 2, "callback"), type_, _OF_SERVICES)
         case "add_on_set_parameters_callback":
             callback = argument(call, 0, "callback")
-            yield from _bound(callback, "rclpy.parameter.Parameter", _PARAMETERS, _CHANGED)
+            yield from _bound(callback, "rclpy.parameter.Parameter", _OF_PARAMETERS)
         case "ActionServer":
             type_ = _type(argument(call, 1, "action_type"), module)
-            for keyword, (position, taken, result) in _OF_ACTION_SERVERS.items():
+            for keyword, (position, signature) in _OF_ACTION_SERVERS.items():
                 at = len(call.args) if position is None else position
-                yield from _bound(argument(call, at, keyword), type_, (taken,), result)
+                yield from _bound(argument(call, at, keyword), type_, signature)
         case "send_goal":
             callback = argument(call, len(call.args), "on_feedback")
             port = dotted(call.func).removesuffix(".send_goal")
-            yield from _bound(callback, clients.get(port, ""), (("feedback", "{0}.Feedback"),))
+            yield from _bound(callback, clients.get(port, ""), _FEEDBACK)
         case "send_goal_async":
             callback = argument(call, 1, "feedback_callback")
-            feedback = (("feedback_message", _FEEDBACK),)
-            yield from _bound(callback, clients["send_goal_async"], feedback)
+            yield from _bound(callback, clients["send_goal_async"], _FEEDBACK_MESSAGE)
         case "add_done_callback" if isinstance(call.func, ast.Attribute):
             receiver = call.func.value
             made = futures.get(dotted(receiver), "")
             if isinstance(receiver, ast.Call):
                 made = last_name(receiver.func)
-            future = (("future", _FUTURES.get(made, "")),)
+            future = Signature((("future", _FUTURES.get(made, "")),), "")
             yield from _bound(argument(call, 0, "callback"), clients.get(made, ""), future)
 
 
 def _bound(
-    callback: ast.expr | None, type_: str, arguments: tuple[tuple[str, str], ...], result: str = ""
+    callback: ast.expr | None, type_: str, signature: Signature
 ) -> Iterator[tuple[str, Signature]]:
     """Yield the method that is passed as ``self.method``, with its signature.
 
@@ -115,9 +116,8 @@ def _bound(
         callback = callback.args[0]
     name = dotted(callback) if callback is not None else ""
     if type_ and name.startswith("self.") and name.count(".") == 1:
-        taken = tuple((argument_name, text.format(type_)) for argument_name, text in arguments)
-        taken = (*before, *taken)
-        yield name.removeprefix("self."), Signature(taken, result.format(type_))
+        typed = signature.of(type_)
+        yield name.removeprefix("self."), Signature((*before, *typed.arguments), typed.result)
 
 
 def _futures(node: ast.ClassDef | Function) -> dict[str, str]:

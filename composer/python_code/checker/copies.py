@@ -15,7 +15,7 @@ from typing import TypeGuard
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.checker.file_sets import ClassEdit
-from composer.python_code.stubs.behaviors import Signature
+from composer.python_code.nodes import Signature
 from composer.python_code.stubs.messages import interface_modules
 from composer.python_code.syntax import Module
 from composer.python_code.trees import Function, characters, dotted, is_none, positional_arguments

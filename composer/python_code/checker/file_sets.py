@@ -17,8 +17,8 @@ from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node, PortKind
 from composer.python_code.lookup import BehaviorSource, BrokenModule
+from composer.python_code.nodes import Signature
 from composer.python_code.stubs.behaviors import (
-    Signature,
     behavior_class_name,
     behavior_module,
     port_type,

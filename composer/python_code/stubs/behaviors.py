@@ -9,6 +9,7 @@ from keyword import iskeyword
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node, Parameter, Port, PortKind
+from composer.python_code.nodes import GENERAL_HANDLERS, Signature, handlers
 from composer.python_code.stubs.messages import interface_modules, python_name
 from composer.typed import SUFFIX
 
@@ -24,7 +25,6 @@ PARAMETER_TYPES: Mapping[str, str] = {
     "double_array": "list[float]",
     "string_array": "list[str]",
 }
-_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 #: The attributes of a behavior with ports, and the kinds of port in them.
 PORT_ATTRIBUTES: Mapping[str, PortKind] = {
     "publishers": PortKind.PUBLISHER,
@@ -41,14 +41,6 @@ class NamedNode:
     name: str
     node: Node
     place: str
-
-
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """The arguments of a handler by name, with their types, and the type of its result."""
-
-    arguments: tuple[tuple[str, str], ...] = ()
-    result: str = "None"
 
 
 def behavior_class_name(name: str) -> str:
@@ -106,24 +98,13 @@ def port_type(port: Port, interfaces: Interfaces) -> str | None:
 
 def signatures(node: Node, interfaces: Interfaces) -> dict[str, Signature]:
     """Return the handlers that the behavior of a node may have."""
-    found = {f"on_{timer.name.value}": Signature() for timer in node.timers}
-    for port in node.ports:
-        type_, name = port_type(port, interfaces), port.name.value
-        if type_ is None:
-            continue
-        match port.kind:
-            case PortKind.SUBSCRIPTION:
-                found[f"on_{name}"] = Signature((("message", type_),))
-            case PortKind.SERVICE:
-                arguments = (("request", f"{type_}.Request"), ("response", f"{type_}.Response"))
-                found[f"on_{name}"] = Signature(arguments, f"{type_}.Response")
-            case PortKind.ACTION_SERVER:
-                goal = f"composer.behavior.Goal[{type_}.Goal, {type_}.Feedback]"
-                found[f"on_{name}"] = Signature((("goal", goal),), f"{type_}.Result")
-                found[f"accept_{name}"] = Signature((("request", f"{type_}.Goal"),), "bool")
-    found |= {f"on_{name}": Signature() for name in _TRANSITIONS}
-    found["on_error"] = Signature((("cause", "Exception"),))
-    found["on_parameters"] = Signature((("changes", "composer.behavior.Changes"),))
+    types = {port.name.value: port_type(port, interfaces) for port in node.ports}
+    found = {f"on_{timer.name}": Signature() for timer in node.timers}
+    for handler in handlers(node):
+        type_ = types.get(handler.of.value)
+        if type_ is not None and handler.kind != "timer":
+            found[handler.name] = handler.signature.of(type_)
+    found |= GENERAL_HANDLERS
     return {name: item for name, item in found.items() if name.isidentifier()}
 
 
