@@ -29,7 +29,7 @@ from composer.node_types import NodeTypes, interface_folders
 from composer.project import SETTINGS_FILE, Project
 from composer.project.rule_selection import apply_rule_settings, check_rule_settings
 from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
-from composer.resolve.parameter_files.rules import PARAMETER_SUBSTITUTION
+from composer.resolve.parameter_files.reader import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
 from composer.rules.node_types import unused_node_types

@@ -12,8 +12,7 @@ from pathlib import Path
 from composer.assembly.include_entries import IncludeReader
 from composer.assembly.includes import IncludeResolver, system_file
 from composer.assembly.inheritance import Inherited, NodeTypeFile, inherit
-from composer.assembly.limits import IncludeLimits, LimitExceeded
-from composer.assembly.rules import INVALID_INCLUDE
+from composer.assembly.limits import INVALID_INCLUDE, IncludeLimits, LimitExceeded
 from composer.diagnostics import Diagnostic
 from composer.document.rules import TOO_LARGE
 from composer.expand.rules import CYCLE, DUPLICATE_NAME

@@ -8,9 +8,8 @@ from dataclasses import field
 from itertools import islice
 from pathlib import Path
 
-from composer.assembly.limits import IncludeLimits
+from composer.assembly.limits import INVALID_INCLUDE, IncludeLimits
 from composer.assembly.namespacing import Placement
-from composer.assembly.rules import INVALID_INCLUDE
 from composer.diagnostics import Diagnostic, nearest, shown
 from composer.document import read_document
 from composer.document.rules import TOO_LARGE, UNREADABLE_FILE

@@ -6,9 +6,8 @@ from collections.abc import Mapping as Map
 from dataclasses import replace
 from pathlib import Path
 
-from composer.assembly.limits import IncludeLimits, LimitExceeded
+from composer.assembly.limits import UNKNOWN_BASE, IncludeLimits, LimitExceeded
 from composer.assembly.merging import merge_maps
-from composer.assembly.rules import UNKNOWN_BASE
 from composer.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.document import read_document
 from composer.document.limits import MAX_INCLUDE_DEPTH

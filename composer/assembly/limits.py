@@ -1,12 +1,16 @@
-"""Limits for a system together with everything that it includes."""
+"""The rules of ``include`` and ``extends``, and the limits for all that a system includes."""
 
 from __future__ import annotations
 
-from composer.diagnostics import Diagnostic
+from composer.diagnostics import Diagnostic, error
 from composer.document.limits import MAX_BYTES, MAX_INCLUDED_VALUES, MAX_INCLUDES, MAX_MATCHES
 from composer.document.rules import TOO_LARGE
 from composer.fast_dataclass import dataclass
 from composer.source import Span
+
+INVALID_INCLUDE = error("RC290", "invalid-include")
+UNKNOWN_OVERRIDE = error("RC293", "unknown-override")
+UNKNOWN_BASE = error("RC295", "unknown-base")
 
 #: Comparisons of names with patterns.
 _MAX_COMPARISONS = 500_000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from composer.assembly.rules import INVALID_INCLUDE, UNKNOWN_OVERRIDE
+from composer.assembly.limits import INVALID_INCLUDE, UNKNOWN_OVERRIDE
 from composer.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.expand.rules import DUPLICATE_NAME
 from composer.fast_dataclass import dataclass

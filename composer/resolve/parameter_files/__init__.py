@@ -11,8 +11,7 @@ from pathlib import Path
 
 from composer.diagnostics import Diagnostic, shown
 from composer.project import OUTSIDE_HINT, Project
-from composer.resolve.parameter_files.reader import read_parameter_file
-from composer.resolve.parameter_files.rules import PARAMETER_FILE
+from composer.resolve.parameter_files.reader import PARAMETER_FILE, read_parameter_file
 from composer.resolve.parameter_files.sections import ParameterFiles
 from composer.resolve.tree_values import is_opaque, texts
 from composer.tree import Tree

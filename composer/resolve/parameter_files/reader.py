@@ -6,17 +6,16 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic, Label, nearest, shown
+from composer.diagnostics import Diagnostic, Label, error, nearest, shown, warning
 from composer.document import read_parameter_document
 from composer.names import node_name_problem
-from composer.resolve.parameter_files.rules import (
-    DUPLICATE_PARAMETER,
-    PARAMETER_FILE,
-    PARAMETER_SUBSTITUTION,
-)
 from composer.resolve.parameter_files.sections import ParameterFiles, Section
 from composer.source import Located, SourceFile, Span, shown_path
 from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
+
+PARAMETER_FILE = error("RC043", "parameter-file")
+DUPLICATE_PARAMETER = warning("RC046", "duplicate-parameter")
+PARAMETER_SUBSTITUTION = warning("RC045", "parameter-substitution")
 
 PARAMETERS = "ros__parameters"
 _MISSPELLED = ("parameters", "params", "ros_params", "ros__params", "ros_parameters")
