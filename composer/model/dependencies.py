@@ -61,6 +61,10 @@ def dependency_edges(system: System) -> tuple[DependencyEdge, ...]:
     Nodes that serve each other have no order, and declared dependencies take precedence over
     implied ones.
     """
+    return system.computed(_dependency_edges)
+
+
+def _dependency_edges(system: System) -> tuple[DependencyEdge, ...]:
     declared = tuple(declared_edges(system))
     implied = tuple(implied_edges(system))
     group = {
@@ -96,12 +100,16 @@ def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
     return tuple(sorted(cycles, key=lambda cycle: rank[cycle[0]]))
 
 
-def in_dependency_order(system: System, edges: Sequence[DependencyEdge]) -> tuple[str, ...]:
+def in_dependency_order(system: System) -> tuple[str, ...]:
     """Return the names of all nodes in dependency order, else as declared.
 
     A cycle, which the rules refuse, is broken at its first declared node.
     """
-    graph = _graph(system, edges)
+    return system.computed(_in_dependency_order)
+
+
+def _in_dependency_order(system: System) -> tuple[str, ...]:
+    graph = _graph(system, dependency_edges(system))
     names = list(graph)
     rank = {name: index for index, name in enumerate(names)}
     waiting = {name: len(needed) for name, needed in graph.items()}

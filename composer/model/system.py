@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import field
 from enum import StrEnum
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 from composer.fast_dataclass import dataclass
 from composer.model.discovery import Discovery
@@ -52,6 +52,7 @@ class _Named(Protocol):
 
 
 N = TypeVar("N", bound=_Named)
+T = TypeVar("T")
 
 
 def _by_name(items: Iterable[N]) -> dict[str, N]:
@@ -364,9 +365,17 @@ class System:
     unmatched_parameters: tuple[UnmatchedParameters, ...] = ()
     unknown: tuple[UnknownKey, ...] = ()  # unknown names from the command line
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)
+    _computed: dict[object, Any] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_nodes", _by_name(self.nodes))
+        object.__setattr__(self, "_computed", {})
+
+    def computed(self, function: Callable[[System], T]) -> T:
+        """Return ``function(self)``, which is computed once: a system does not change."""
+        if function not in self._computed:
+            self._computed[function] = function(self)
+        return cast(T, self._computed[function])
 
     def node(self, name: str) -> Node | None:
         """Return the node with the given key in ``nodes``, or None."""

@@ -30,7 +30,7 @@ def tear_down(system: System, process: str | None = None) -> Plan:
     steps that a node's current state does not allow.
     """
     edges = dependency_edges(system)
-    order = nodes_of(system, reversed(in_dependency_order(system, edges)))
+    order = nodes_of(system, reversed(in_dependency_order(system)))
     if process is not None:
         order = tuple(node for node in order if node.process and node.process.value == process)
     return build_plan(
@@ -45,15 +45,8 @@ def tear_down(system: System, process: str | None = None) -> Plan:
 
 def start_goals(system: System, goal: PrimaryState) -> Mapping[str, PrimaryState]:
     """Return the state in which each node starts when the system as a whole goes to ``goal``."""
-    return start_goals_in_order(system, goal, in_dependency_order(system, dependency_edges(system)))
-
-
-def start_goals_in_order(
-    system: System, goal: PrimaryState, order: Iterable[str]
-) -> Mapping[str, PrimaryState]:
-    """Return the same for nodes whose dependency order is known."""
     goals: dict[str, PrimaryState] = {}
-    for node in nodes_of(system, order):
+    for node in nodes_of(system, in_dependency_order(system)):
         limits = [_limit(dependency, goals) for dependency in node.depends_on]
         own = [] if node.autostart is None else [node.autostart.value]
         goals[node.name.value] = min([goal, *own, *limits], key=rank)

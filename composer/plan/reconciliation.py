@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from composer.model import PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
-from composer.plan.bringup import start_goals_in_order
+from composer.plan.bringup import start_goals
 from composer.plan.desired_state import Condition, DesiredState
 from composer.plan.steps import Plan, nodes_of, rank
 from composer.plan.transitions import plan_transitions
@@ -184,12 +184,11 @@ def _needs(
     """
     ignored = {} if desired is None else desired.ignored
     edges = dependency_edges(system)
-    order = in_dependency_order(system, edges)
-    starts = start_goals_in_order(system, PrimaryState.ACTIVE, order)
+    starts = start_goals(system, PrimaryState.ACTIVE)
     needs: dict[str, list[DependencyEdge]] = {}
     for edge in edges:
         if edge.on not in ignored:
             needed = min(edge.state, starts[edge.on], key=rank) if edge.implied else edge.state
             needs.setdefault(edge.node, []).append(replace(edge, state=needed))
-    for name in order:
+    for name in in_dependency_order(system):
         yield name, tuple(needs.get(name, ()))

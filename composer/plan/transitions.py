@@ -27,7 +27,7 @@ def plan_transitions(
     without a state or a goal are left alone.
     """
     edges = dependency_edges(system)
-    order = nodes_of(system, in_dependency_order(system, edges))
+    order = nodes_of(system, in_dependency_order(system))
     movable = tuple(
         (node, rank(states[node.name.value]), rank(goals[node.name.value]))
         for node in order

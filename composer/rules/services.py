@@ -9,7 +9,7 @@ from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import number, port_name
 from composer.diagnostics import Diagnostic, Label, error, info
 from composer.model import Channel, ChannelKind, ImplementationKind, PortKind, PortOfNode
-from composer.model.dependencies import dependency_cycles, dependency_edges, in_dependency_order
+from composer.model.dependencies import dependency_cycles, in_dependency_order
 from composer.rules.lifecycle import START_ORDER
 from composer.source import Span
 
@@ -52,7 +52,7 @@ def check_client_before_server(context: Context) -> Iterator[Diagnostic]:
     system = context.system
     if dependency_cycles(system) or not system.implied_dependencies:
         return
-    order = in_dependency_order(system, dependency_edges(system))
+    order = in_dependency_order(system)
     rank = {name: place for place, name in enumerate(order)}
     for channel in context.channels:
         if channel.kind is ChannelKind.TOPIC or len(channel.sources) != 1:

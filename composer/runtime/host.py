@@ -33,7 +33,6 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
 from composer.model import LogLevel, Node, System
-from composer.model.dependencies import dependency_edges, in_dependency_order
 from composer.names import PROGRAM_LOGGER, join
 from composer.plan import Fault, Plan
 from composer.runtime.children.discovery_server import discovery_servers
@@ -102,9 +101,8 @@ class Host:
         self._options = options or HostOptions()
         self._main_queue: MainQueue[Item] = MainQueue()
         self._reporter = Reporter(report, self._options.started_at_s)
-        order = in_dependency_order(system, dependency_edges(system))
         key = self._options.report_key
-        self._status = Status(system, order, is_child=bool(key))
+        self._status = Status(system, is_child=bool(key))
         is_member = self._options.process is not None
         self._report_key = key or (os.urandom(_KEY_BYTES).hex() if is_member else "")
         self._node_set = NodeSet(

@@ -11,7 +11,6 @@ from composer.model import Dependency, Node, System
 from composer.model.dependencies import (
     declared_edges,
     dependency_cycles,
-    dependency_edges,
     in_dependency_order,
 )
 from composer.source import Located, SourceFile, Span
@@ -46,7 +45,7 @@ def system_of(graph: list[list[int]]) -> System:
 def test_order_and_cycles_agree_with_the_standard_library(graph: list[list[int]]) -> None:
     system = system_of(graph)
     edges = {(edge.node, edge.on) for edge in declared_edges(system)}
-    order = in_dependency_order(system, dependency_edges(system))
+    order = in_dependency_order(system)
     assert sorted(order) == sorted(node.name.value for node in system.nodes)
     sorter = TopologicalSorter({node: set() for node in order})
     for node, needed in edges:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from composer.model import Node, PrimaryState
-from composer.model.dependencies import dependency_edges, in_dependency_order
+from composer.model.dependencies import dependency_edges
 from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
@@ -358,7 +358,7 @@ class Supervision(RuleBasedStateMachine):
         self.world = World()
         self.queue = NotedQueue(self.world)
         reporter = Reporter(None)
-        status = Status(self.system, in_dependency_order(SYSTEM, dependency_edges(SYSTEM)))
+        status = Status(self.system)
         node_set = cast("NodeSet", self.world)
         self.supervisor = Supervisor(
             Reconciler(self.system, node_set, self.queue, status, reporter)

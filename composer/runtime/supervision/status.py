@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from composer.fast_dataclass import dataclass
 from composer.model import Node, PrimaryState, System
-from composer.model.dependencies import needed_states
+from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import STARTING, Condition, optional_nodes, parse_goals, start_goals
 from composer.runtime.metrics.statistics import Statistics
 
@@ -174,8 +174,7 @@ class _Counters(NamedTuple):
 class Status:
     """The current status of the system and its nodes. Thread-safe."""
 
-    def __init__(self, system: System, order: tuple[str, ...], *, is_child: bool = False) -> None:
-        """``order`` are the keys of all nodes, in the order of the bring-up."""
+    def __init__(self, system: System, *, is_child: bool = False) -> None:
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
         self._statistics: Mapping[str, Statistics] = {}
@@ -215,7 +214,7 @@ class Status:
                 pid=str(os.getpid()) if models[name].in_process else "",
                 since_s=now_s,
             )
-            for name in order
+            for name in in_dependency_order(system)
         }
 
     def on_change(self, changed: Callable[[], None]) -> None:
