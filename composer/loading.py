@@ -274,7 +274,7 @@ def _location(file: _Resolved) -> Path:
 
 
 def _may_be_included(path: Path, project: Project, checked: Collection[Path]) -> bool:
-    """Return whether a file beside or above this one, which is not checked now, names it."""
+    """Return whether a file next to or above this one, which is not checked now, names it."""
     folders = takewhile(project.holds, path.parents)
     for other in (item for folder in folders for item in folder.glob("*.y*ml")):
         with suppress(OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""systems/pipeline.yaml beside a hand-written pipeline, as the ``ros2`` command sees both.
+"""systems/pipeline.yaml and a hand-written pipeline, as the ``ros2`` command sees both.
 
 Needs ROS 2 with ros2cli on PATH. ``DIFFERENCES`` decides where both may differ.
 """
@@ -154,7 +154,12 @@ ENDLESS = ("topic hz", "topic bw", "topic delay")
 MEASURES_FOR_S = 6.0
 ENDS_WITHIN_S = 40.0
 #: A process that is not scheduled for a moment discovers the others late.
-NOT_DISCOVERED = ("ot found", "Unable to find node", "Unknown", "not appear to be published yet")
+NOT_DISCOVERED = (
+    "Node not found",
+    "Unable to find node",
+    "Unknown service",
+    "does not appear to be published yet",
+)
 ATTEMPTS = 3
 DISCOVERY = ("--no-daemon", "--spin-time", "2")
 WITHOUT_DISCOVERY = ("service call", "action send_goal", "topic pub", *ENDLESS)
