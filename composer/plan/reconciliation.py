@@ -143,9 +143,9 @@ def _reachable(
     """Return the goals without those that would activate a node before what it depends on.
 
     A dependency that a user keeps down takes no node down, but no node is activated without it, nor
-    before one without a state, which is in a transition or has failed. A class is not configured
-    either, because its constructor may wait for the dependency. A node whose failure is ignored is
-    not brought up again.
+    before one without a state, which is in a transition or has failed. Nor is a class configured
+    before a dependency is where it is to be: its constructor may wait for it. A node whose failure
+    is ignored is not brought up again.
     """
     reachable = dict(desired_states(system, desired))
     for name, needs in _needs(system, desired):
@@ -154,14 +154,15 @@ def _reachable(
             continue
         if name in desired.ignored:
             reachable[name] = min(reachable.get(name, states[name]), states[name], key=rank)
-        if name in reachable and any(
-            rank(reachable.get(edge.on, edge.state)) < rank(edge.state) for edge in needs
-        ):
-            node = system.node(name)
-            is_class = node is not None and node.hosted_class is not None
-            limit = PrimaryState.UNCONFIGURED if is_class else PrimaryState.INACTIVE
-            limit = max(states[name], limit, key=rank)
-            reachable[name] = min(reachable[name], limit, key=rank)
+        missing = [
+            edge for edge in needs if rank(reachable.get(edge.on, edge.state)) < rank(edge.state)
+        ]
+        if missing and reachable.get(name) is PrimaryState.ACTIVE:
+            reachable[name] = max(states[name], PrimaryState.INACTIVE, key=rank)
+        late = [edge.on for edge in missing if reachable.get(edge.on) != desired.goals.get(edge.on)]
+        node = system.node(name)
+        if late and node is not None and node.hosted_class is not None:
+            reachable[name] = min(reachable.get(name, states[name]), states[name], key=rank)
     return reachable
 
 

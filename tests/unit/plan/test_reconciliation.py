@@ -133,10 +133,17 @@ def test_no_node_is_activated_before_a_dependency_that_a_user_deactivated() -> N
 
 
 @pytest.mark.parametrize(
-    ("here", "steps"),
-    [("ui", []), ("uu", []), ("au", ["configure viewer", "activate viewer"])],
+    ("here", "goal", "steps"),
+    [
+        ("ui", "aa", []),
+        ("uu", "aa", []),
+        ("au", "aa", ["configure viewer", "activate viewer"]),
+        ("iu", "ii", ["configure viewer"]),
+    ],
 )
-def test_a_class_is_not_configured_before_what_it_depends_on(here: str, steps: list[str]) -> None:
+def test_a_class_is_not_configured_before_what_it_depends_on(
+    here: str, goal: str, steps: list[str]
+) -> None:
     system = system_of(
         """
         system: robot
@@ -145,11 +152,13 @@ def test_a_class_is_not_configured_before_what_it_depends_on(here: str, steps: l
           viewer: {class: "viewer:Viewer", lifecycle: {depends_on: [sensor]}}
         """
     )
-    names = ("sensor", "viewer")
-    desired = DesiredState(dict.fromkeys(names, ACTIVE)).fail(fault("sensor"))
-    at = {name: LETTERS[letter] for name, letter in zip(names, here, strict=True)}
-    if at["sensor"] is ACTIVE:
-        desired = desired.release("sensor")
+    at, goals = (
+        {name: LETTERS[letter] for name, letter in zip(("sensor", "viewer"), text, strict=True)}
+        for text in (here, goal)
+    )
+    desired = DesiredState(goals)
+    if at["sensor"] is PrimaryState.UNCONFIGURED:
+        desired = desired.fail(fault("sensor"))
     plan = reconcile(system, desired, at, "")
     assert [f"{step.transition} {step.node}" for step in plan.steps] == steps
 
