@@ -10,16 +10,17 @@ from composer.graph.diagram import (
     Edge,
     EdgeKind,
     Graph,
+    Namespaces,
     Problem,
     Vertex,
     VertexKind,
+    parent_of,
     worst,
 )
 from composer.graph.facts import channel_facts, rate, short_type
 from composer.graph.node_views import node_vertex
 from composer.graph.scene import (
     SENDING,
-    Namespaces,
     Scene,
     SceneChannel,
     SceneEndpoint,
@@ -27,7 +28,6 @@ from composer.graph.scene import (
     channel_key,
     channels,
     node_key,
-    parent_of,
     port_key,
 )
 from composer.model import ChannelKind, PortKind

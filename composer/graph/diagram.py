@@ -1,11 +1,11 @@
 """The content of a diagram, independent of its format.
 
-Every view (``views/``) turns a system into a :class:`Graph`; every renderer (``mermaid``, ``dot``,
-``json``, ``svg``) turns a Graph into text.
+Every view turns a scene into a :class:`Graph`; every format turns a Graph into text.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from enum import StrEnum
 
@@ -124,3 +124,61 @@ class Graph:
     vertices: tuple[Vertex, ...]
     edges: tuple[Edge, ...]
     clusters: tuple[Cluster, ...] = ()
+
+
+class Namespaces:
+    """The namespaces of nodes. A namespace with only one child and no nodes is not drawn."""
+
+    def __init__(self, namespaces: Iterable[str]) -> None:
+        used = set(namespaces) - {"/"}
+        self._drawn = {name for name in with_ancestors(used) if name in used or _forks(name, used)}
+
+    def clusters(self) -> tuple[Cluster, ...]:
+        """Return a cluster for each drawn namespace, parents first."""
+        return tuple(
+            Cluster(name, name, self.around(parent_of(name)), namespace=name)
+            for name in sorted(self._drawn)
+        )
+
+    def around(self, namespace: str) -> str:
+        """Return the innermost drawn namespace that contains ``namespace``, or an empty text."""
+        while namespace not in self._drawn:
+            if namespace == "/":
+                return ""
+            namespace = parent_of(namespace)
+        return namespace
+
+    def around_name(self, full_name: str) -> str:
+        """Return the innermost drawn namespace of the name of a topic, service or action."""
+        return self.around(parent_of(full_name))
+
+
+def parent_of(name: str) -> str:
+    """Return the namespace of a full name."""
+    return name.rpartition("/")[0] or "/"
+
+
+def with_ancestors(namespaces: Iterable[str]) -> set[str]:
+    """Return the namespaces and those around them, without the root."""
+    ancestors: set[str] = set()
+    for namespace in namespaces:
+        name = namespace
+        while name != "/":
+            ancestors.add(name)
+            name = parent_of(name)
+    return ancestors
+
+
+def _forks(name: str, used: set[str]) -> bool:
+    prefix = f"{name}/"
+    children = {
+        other.removeprefix(prefix).split("/")[0] for other in used if other.startswith(prefix)
+    }
+    return len(children) > 1
+
+
+def natural_order(name: str) -> list[tuple[int, str]]:
+    """Return a key for sorting by which area2 comes before area10."""
+    return [
+        (int(item), "") if item.isdigit() else (-1, item) for item in re.split(r"([0-9]+)", name)
+    ]

@@ -11,12 +11,12 @@ from composer.graph.diagram import (
     Edge,
     EdgeKind,
     Graph,
+    Namespaces,
     Vertex,
     VertexKind,
     worst,
 )
 from composer.graph.scene import (
-    Namespaces,
     Scene,
     SceneNode,
     SceneTransform,

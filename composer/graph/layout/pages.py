@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import accumulate, combinations
 
-from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
+from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex, natural_order
 from composer.graph.layout.layered import lay_out
 from composer.graph.layout.measure import measure
 from composer.graph.layout.result import Layout, Path, Point, Rectangle, Size
@@ -157,7 +156,7 @@ def _parts(graph: Graph) -> tuple[list[Graph], list[Edge]]:
     part_of = {vertex.key: around.get(vertex.cluster, "") for vertex in graph.vertices}
     parts = _split(graph, part_of)
     # What all use comes first.
-    parts.sort(key=lambda part: [_natural(item.label) for item in part.clusters[:1]])
+    parts.sort(key=lambda part: [natural_order(item.label) for item in part.clusters[:1]])
     return parts, [edge for edge in graph.edges if part_of[edge.source] != part_of[edge.target]]
 
 
@@ -194,13 +193,6 @@ def _outermost(graph: Graph) -> dict[str, str]:
     for cluster in graph.clusters:
         outermost[cluster.key] = outermost[cluster.parent] if cluster.parent else cluster.key
     return outermost
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    """Return a key by which area2 comes before area10."""
-    return [
-        (int(item), "") if item.isdigit() else (-1, item) for item in re.split(r"([0-9]+)", name)
-    ]
 
 
 def _straight_paths(edges: Sequence[Edge], layout: Layout) -> Iterator[Path]:

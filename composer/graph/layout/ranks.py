@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from graphlib import TopologicalSorter
 
 Pair = tuple[str, str]
 
@@ -29,7 +30,7 @@ def assign_ranks(clusters: Mapping[str, str], pairs: Sequence[Pair]) -> dict[str
     keys = list(clusters)
     outgoing = _neighbors(keys, pairs)
     incoming = _neighbors(keys, [pair[::-1] for pair in pairs])
-    order = _topological(keys, outgoing, incoming)
+    order = list(TopologicalSorter(incoming).static_order())
     ranks: dict[str, int] = {}
     for key in order:
         ranks[key] = max((ranks[other] + 1 for other in incoming[key]), default=0)
@@ -78,19 +79,6 @@ def _next(left: dict[str, None], out_degree: dict[str, int], in_degree: dict[str
         if key is not None:
             return key
     return max(left, key=lambda key: out_degree[key] - in_degree[key])
-
-
-def _topological(
-    keys: Sequence[str], outgoing: dict[str, list[str]], incoming: dict[str, list[str]]
-) -> list[str]:
-    waiting = {key: len(incoming[key]) for key in keys}
-    order = [key for key in keys if waiting[key] == 0]
-    for key in order:
-        for other in outgoing[key]:
-            waiting[other] -= 1
-            if waiting[other] == 0:
-                order.append(other)
-    return order
 
 
 def _best_rank(key: str, ranks: dict[str, int], incoming: list[str], outgoing: list[str]) -> int:

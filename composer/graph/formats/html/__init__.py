@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from composer.graph.diagram import Graph, VertexKind
+from composer.graph.diagram import Graph, VertexKind, natural_order, with_ancestors
 from composer.graph.formats.html.articles import articles
 from composer.graph.formats.svg import contents, markers, number, text
 from composer.graph.formats.theme import page_style
@@ -122,13 +122,16 @@ def _filters(graphs: Sequence[Graph]) -> Iterator[str]:
     kinds = {vertex.kind for vertex in vertices} | ({VertexKind.NODE} if blocks else set())
     namespaces = {vertex.namespace for vertex in vertices if vertex.kind is VertexKind.NODE}
     namespaces |= {block.namespace for block in blocks}
+    namespaces |= with_ancestors(namespaces)
+    if len(namespaces) > 1:
+        namespaces.add("/")
     yield '<details class="filter"><summary>Filter</summary><div class="menu">'
     yield "<fieldset><legend>Kind</legend>"
     yield from (_choice("kind", kind.value, f"{kind.value}s") for kind in _KINDS if kind in kinds)
     yield "</fieldset><fieldset><legend>Namespace</legend>"
     yield from (
         _choice("namespace", name, name, depth=name.rstrip("/").count("/"))
-        for name in sorted(_with_ancestors(namespaces), key=_natural)
+        for name in sorted(namespaces, key=natural_order)
     )
     yield "</fieldset>"
     yield '<button type="button" id="everything">Show everything</button></div></details>'
@@ -139,24 +142,6 @@ def _choice(group: str, value: str, label: str, depth: int = 0) -> str:
         f'<label style="padding-left:{depth * 16}px"><input type="checkbox" name="{group}"'
         f' value="{text(value)}" checked> {text(label)}</label>'
     )
-
-
-def _with_ancestors(namespaces: set[str]) -> set[str]:
-    """Return the namespaces with their parents, and the root if there are several."""
-    shown = set(namespaces)
-    for name in namespaces:
-        levels = name.split("/")
-        shown.update("/".join(levels[:depth]) for depth in range(2, len(levels)))
-    return shown | {"/"} if len(shown) > 1 else shown
-
-
-def _natural(name: str) -> list[tuple[str, int]]:
-    """Return what sorts ``/area2`` before ``/area10``."""
-    return [
-        (words, int(digits or 0))
-        for words, digits in re.findall(r"(\D*)(\d*)", name)
-        if words or digits
-    ]
 
 
 def _view(graph: Graph, *, shown: bool) -> Iterator[str]:
