@@ -22,9 +22,6 @@ UNSAFE = (
 UNSAFE_IN_LINES = re.compile(f"[{UNSAFE}\r]")
 _UNSAFE_IN_LINE = re.compile(f"[{UNSAFE}\r\n\t]")
 
-#: Control and format characters (such as bidi overrides), surrogates, private use, line separators,
-#: and spaces that look like the one that YAML accepts.
-_ESCAPED_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp", "Zs"})
 _ZERO_WIDTH_CATEGORIES = frozenset({"Mn", "Me"})
 _TAB = "    "
 
@@ -36,12 +33,12 @@ def is_safe(text: str) -> bool:
 
 def escape_lines(text: str) -> str:
     """Return ``text`` with unsafe characters escaped as in Python, but not line feeds and tabs."""
-    return UNSAFE_IN_LINES.sub(_escape, text)
+    return UNSAFE_IN_LINES.sub(lambda found: _escaped(found[0]), text)
 
 
 def escape_line(text: str) -> str:
     """Return ``text``, which belongs on one line, with line feeds and tabs escaped as well."""
-    return _UNSAFE_IN_LINE.sub(_escape, text)
+    return _UNSAFE_IN_LINE.sub(lambda found: _escaped(found[0]), text)
 
 
 def escape_json(text: str) -> str:
@@ -50,10 +47,16 @@ def escape_json(text: str) -> str:
 
 
 def visible(text: str) -> str:
-    """Return ``text`` for a terminal, with tabs as spaces and control characters escaped."""
-    if text.isascii() and text.isprintable():
+    """Return ``text`` for a terminal, with tabs as spaces and unprintable characters escaped.
+
+    Unprintable are also spaces that look like the one that YAML accepts.
+    """
+    if text.isprintable():
         return text
-    return "".join(_visible_character(character) for character in text)
+    return "".join(
+        _TAB if character == "\t" else character if character.isprintable() else _escaped(character)
+        for character in text
+    )
 
 
 def width(text: str) -> int:
@@ -65,22 +68,11 @@ def width(text: str) -> int:
     return len(shown) if shown.isascii() else sum(map(_cells, shown))
 
 
-def _visible_character(character: str) -> str:
-    if character == "\t":
-        return _TAB
-    if character == " " or unicodedata.category(character) not in _ESCAPED_CATEGORIES:
-        return character
-    code = ord(character)
-    if code <= 0xFF:
-        return f"\\x{code:02x}"
-    return f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"
-
-
 def _cells(character: str) -> int:
     if unicodedata.category(character) in _ZERO_WIDTH_CATEGORIES:
         return 0
     return 2 if unicodedata.east_asian_width(character) in {"W", "F"} else 1
 
 
-def _escape(found: re.Match[str]) -> str:
-    return repr(found[0])[1:-1]
+def _escaped(character: str) -> str:
+    return repr(character)[1:-1]

@@ -240,17 +240,10 @@ def _of_same_endpoint(
         )
     profiles = [each.qos.profile for each in ports]
     for endpoint in endpoints:
-        if (
-            endpoint not in others
-            and endpoint.qos is not None
-            and not _matches_any(endpoint.qos, profiles, port.kind)
-        ):
+        if endpoint in others or endpoint.qos is None:
+            continue
+        if all(_differing(endpoint.qos, profile, port.kind) for profile in profiles):
             yield from _qos_differences(node, port, subject, endpoint.qos)
-
-
-def _matches_any(live: QosProfile, declared: list[QosProfile], kind: PortKind) -> bool:
-    """Return whether the live profile matches one of the declared profiles."""
-    return any(not _differing(live, profile, kind) for profile in declared)
 
 
 def _differing(live: QosProfile, declared: QosProfile, kind: PortKind) -> list[str]:

@@ -20,7 +20,7 @@ from composer.characters import visible, width
         ("\x9b31m", "\\x9b31m"),
         ("\U000e0001", "\\U000e0001"),
         ("\ud800", "\\ud800"),
-        ("line\r\nline", "line\\x0d\\x0aline"),
+        ("line\r\nline", "line\\r\\nline"),
     ],
 )
 def test_control_characters_are_escaped(text: str, shown: str) -> None:

@@ -166,7 +166,7 @@ def test_github_commands_are_escaped() -> None:
     )
     [line] = render_github([found]).splitlines()
     assert "file=a%2Cline=1%3A%3Ab%25.yaml,line=1" in line
-    assert "100%25\\x0a::error::gotcha\\x0d" in line
+    assert "100%25\\n::error::gotcha\\r" in line
     assert "\x1b" not in line
 
 
