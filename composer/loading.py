@@ -19,8 +19,17 @@ from typing import TypeAlias
 from composer.analysis.follow_ups import without_follow_ups
 from composer.assembly import NodeTypeFile, assemble, inherit
 from composer.assembly.deduplication import add_include_labels, deduplicate
-from composer.diagnostics import Diagnostic, Severity, has_errors, in_order, registered_rules
+from composer.diagnostics import (
+    Diagnostic,
+    Severity,
+    has_errors,
+    in_order,
+    registered_rules,
+    shown,
+)
 from composer.document import parse_bytes, read_document
+from composer.document.limits import MAX_ENTRIES
+from composer.document.rules import TOO_LARGE
 from composer.expand import expand
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
@@ -38,6 +47,7 @@ from composer.schema import check_schema, kind_of, kinds
 from composer.schema.kinds import check_kind
 from composer.source import SourceFile, Span
 from composer.tree import Mapping
+from composer.tree import Sequence as ListTree
 
 #: What identifies a diagnostic across the systems in which it appears: its rule and place.
 _Identity: TypeAlias = tuple[str, str]
@@ -331,6 +341,8 @@ def _merge(document: _Document, definitions: _Definitions) -> _Merged:
     if not tree:
         return _Merged()
     match kind_of(tree):
+        case kinds.SYSTEM if (surplus := _surplus_entry(tree)) is not None:
+            return _Merged(diagnostics=[surplus])
         case kinds.SYSTEM:
             return _merge_system(tree, document.source, definitions)
         case kinds.NODE:
@@ -343,6 +355,9 @@ def _merge(document: _Document, definitions: _Definitions) -> _Merged:
 def _merge_system(tree: Mapping, source: SourceFile, definitions: _Definitions) -> _Merged:
     # Each file is expanded and checked against the schema before it is merged.
     assembly = assemble(tree, source, definitions.folder, definitions.project)
+    surplus = None if assembly.tree is None else _surplus_entry(assembly.tree)
+    if surplus is not None:
+        return _Merged(diagnostics=[*assembly.diagnostics, surplus])
     return _Merged(
         assembly.tree,
         assembly.tree,
@@ -351,6 +366,21 @@ def _merge_system(tree: Mapping, source: SourceFile, definitions: _Definitions) 
         assembly.included,
         assembly.is_partial,
     )
+
+
+def _surplus_entry(tree: Mapping) -> Diagnostic | None:
+    """Return the diagnostic for a section with too many entries."""
+    for section in tree:
+        match section.value:
+            case Mapping(entries=entries) if len(entries) > MAX_ENTRIES:
+                span = entries[MAX_ENTRIES].key.span
+            case ListTree(items=items) if len(items) > MAX_ENTRIES:
+                span = items[MAX_ENTRIES].span
+            case _:
+                continue
+        message = f"'{shown(section.name)}' has more than {MAX_ENTRIES:,} entries"
+        return Diagnostic(TOO_LARGE, message, span)
+    return None
 
 
 def _merge_node_type(tree: Mapping, source: SourceFile, definitions: _Definitions) -> _Merged:

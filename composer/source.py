@@ -55,7 +55,8 @@ class Span:
     @property
     def text(self) -> str:
         """What stands there, without the quotation marks around it."""
-        return self.file.line(self.line)[self.column - 1 :][: self.length].strip("'\"")
+        start = self.column - 1
+        return self.file.line(self.line)[start : start + self.length].strip("'\"")
 
     def __str__(self) -> str:
         return f"{self.file.path}:{self.line}:{self.column}"

@@ -87,6 +87,7 @@ class Vocabulary:
         self._forwards = sorted(self._by_folded)
         self._backwards = sorted(name[::-1] for name in self._by_folded)
 
+    @lru_cache(maxsize=1024)  # noqa: B019 - vocabularies are cached themselves; typos repeat
     def close(self, name: str, count: int = 1) -> list[str]:
         """Return up to ``count`` names similar to ``name``, most similar first."""
         if len(name) > LONGEST_NAME:
@@ -107,7 +108,7 @@ class Vocabulary:
 
 @lru_cache(maxsize=16)
 def vocabulary(names: tuple[str, ...]) -> Vocabulary:
-    """Return the vocabulary of ``names``, cached, since typos often repeat."""
+    """Return the vocabulary of ``names``, cached."""
     return Vocabulary(names)
 
 

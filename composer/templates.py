@@ -25,6 +25,10 @@ from composer.source import Located, Span
 from composer.tree import ScalarValue, Tree
 
 _FORMAT = re.compile(r"[<>^]?[-+ ]?#?0?\d{0,2},?(\.\d{1,2})?[bdeEfFgGoxX%s]?", re.ASCII)
+#: More of one template are not reported.
+_MAX_PROBLEMS = 100
+#: Expressions in one text, and the texts between them.
+_MAX_PARTS = 1000
 _FORMAT_HINT = "a format is like .2f, 5d, >10 or x"
 
 
@@ -164,6 +168,12 @@ def _compile(value: Tree, problems: list[TemplateProblem]) -> Template:
 def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem]) -> Template:
     parts: list[str | Formatted] = []
     for offset, piece in _pieces(text):
+        if len(problems) >= _MAX_PROBLEMS:
+            break
+        if len(parts) > _MAX_PARTS:
+            message = f"this text has more than {_MAX_PARTS} parts"
+            problems.append(TemplateProblem(message, scalar.part(offset, 1)))
+            break
         if piece in ("{{", "}}"):
             parts.append(piece[0])
         elif piece.startswith("{"):

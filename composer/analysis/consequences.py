@@ -17,6 +17,7 @@ _WORD = re.compile(r"\w+")
 #: The name of an interface, without its part such as '_Request'.
 _INTERFACE = re.compile(r"[a-z]\w*/(?:msg|srv|action)/[A-Za-z0-9]+")
 _NAMESPACE = re.compile(r"\bnamespace\b")
+_NEARBY = 200  # characters before a variable, in which the key of its value is
 #: What is only reported because nodes are not in their namespaces.
 _OF_NAMESPACES = frozenset({"duplicate-server", "port-connected-twice"})
 _SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER})
@@ -132,7 +133,8 @@ def _left_out_of_all(item: Diagnostic) -> frozenset[str]:
 
 
 def _is_of_namespace(span: Span) -> bool:
-    return _NAMESPACE.search(span.file.line(span.line)[: span.column]) is not None
+    line = span.file.line(span.line)
+    return _NAMESPACE.search(line[max(0, span.column - _NEARBY) : span.column]) is not None
 
 
 def _of_folder(span: Span) -> frozenset[str]:

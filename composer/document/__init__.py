@@ -14,8 +14,9 @@ from pathlib import Path
 import yaml
 
 from composer.diagnostics import Diagnostic
-from composer.document.builder import Stopped, TreeBuilder, too_many_values
-from composer.document.events import first_excess_value, parse_events
+from composer.document.builder import Stopped, TreeBuilder
+from composer.document.error_limit import TooManyErrors
+from composer.document.events import parse_events
 from composer.document.files import decode, read_bytes, too_large
 from composer.document.limits import MAX_BYTES
 from composer.document.parameter_files import ParameterFileBuilder
@@ -106,19 +107,15 @@ def _build(
     builder: TreeBuilder, source: SourceFile, *, may_be_invisible: bool = False
 ) -> list[Diagnostic] | None:
     """Let ``builder`` handle the events of a text; return the diagnostics if it has no tree."""
-    if len(source.text) > MAX_BYTES:
-        return [too_large(source)]
-    diagnostics = check_text(source, may_be_invisible=may_be_invisible)
+    is_large = len(source.text) > MAX_BYTES
+    diagnostics = [too_large(source)] if is_large else check_text(source, may_be_invisible)
     if diagnostics:
         return diagnostics
     try:
-        surplus = first_excess_value(source.text)
-        if surplus is not None:
-            return [too_many_values(source, surplus)]
         with closing(parse_events(source.text)) as stream:
             for event in stream:
                 builder.handle(event)
-    except Stopped as stopped:
+    except (Stopped, TooManyErrors) as stopped:
         return [*builder.diagnostics, stopped.diagnostic]
     except (yaml.YAMLError, ValueError) as error:
         from composer.document.syntax_errors import explain  # noqa: PLC0415 - only for invalid files

@@ -9,6 +9,7 @@ import yaml
 
 from composer.diagnostics import Diagnostic, Label, Rule, shown
 from composer.document import rules
+from composer.document.error_limit import LimitedDiagnostics
 from composer.document.events import Mark, collection_span, scalar_span, span_at
 from composer.document.limits import MAX_DEPTH, MAX_VALUES
 from composer.document.scalars import NumberRefused, check_value, resolve_plain
@@ -72,7 +73,7 @@ class TreeBuilder:
         self, source: SourceFile, resolve: Callable[[str], ScalarValue] = resolve_plain
     ) -> None:
         self.root: Tree | None = None
-        self.diagnostics: list[Diagnostic] = []
+        self.diagnostics = LimitedDiagnostics()
         self._source = source
         self._resolve = resolve
         self._open: list[_Open] = []
@@ -242,7 +243,7 @@ class TreeBuilder:
         key = parent.key
         if not parent.is_map or key is None or key.content_offset or not key.verbatim:
             return
-        if self._source.line(value.span.line)[: value.span.column - 1].rstrip().endswith(":"):
+        if _follows_colon(self._source.line(value.span.line), value.span.column - 1):
             return
         name, colon, rest = str(key.value).partition(":")
         if colon and name and rest and name.isidentifier():
@@ -266,16 +267,19 @@ class TreeBuilder:
     def _count(self, values: int, mark: Mark | None) -> None:
         self._values += values
         if self._values > MAX_VALUES:
-            raise Stopped(too_many_values(self._source, mark))
+            message = f"this file has more than {MAX_VALUES:,} values"
+            span = span_at(self._source, mark)
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
 
     def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
         self.diagnostics.append(Diagnostic(rule, message, span, hint=hint))
 
 
-def too_many_values(source: SourceFile, mark: Mark | None) -> Diagnostic:
-    """Return the diagnostic for too many values; ``mark`` is the first one beyond MAX_VALUES."""
-    message = f"this file has more than {MAX_VALUES:,} values"
-    return Diagnostic(rules.TOO_LARGE, message, span_at(source, mark))
+def _follows_colon(line: str, end: int) -> bool:
+    """Return whether the last character before ``end``, apart from blanks, is a colon."""
+    while end > 0 and line[end - 1].isspace():
+        end -= 1
+    return line[end - 1 : end] == ":"
 
 
 def _undefined(name: str) -> str:

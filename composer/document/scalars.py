@@ -33,7 +33,7 @@ _NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 _FIRST_OF_NUMBER = frozenset("0123456789+-.")
 
 
-def check_text(source: SourceFile, *, may_be_invisible: bool) -> list[Diagnostic]:
+def check_text(source: SourceFile, may_be_invisible: bool) -> list[Diagnostic]:
     """Return a diagnostic for the first forbidden character in the text.
 
     If characters ``may_be_invisible``, they are only forbidden where :func:`check_value` finds

@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Map
 
 from composer.diagnostics import Diagnostic, Label, shown
+from composer.document.error_limit import TooManyErrors
 from composer.expand import rules
 from composer.expand.copies import COPYING
 from composer.expand.scope import Scope, dependency_order, measure, read_scope
@@ -43,6 +44,8 @@ def expand(tree: Mapping, given: Map[str, Entry]) -> tuple[Mapping, list[Diagnos
     except TooLarge as stopped:
         found = [*unknown.values(), *diagnostics, *substitution.diagnostics]
         return tree, [*found, stopped.diagnostic]
+    except TooManyErrors as stopped:
+        return tree, stopped.diagnostics
     # What the file uses and does not declare is reported there.
     arguments = [item for name, item in unknown.items() if name not in substitution.unknown]
     found = [*arguments, *diagnostics, *substitution.diagnostics]

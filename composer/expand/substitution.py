@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import field
 
 from composer.diagnostics import Diagnostic, Label, Rule, shown
+from composer.document.error_limit import LimitedDiagnostics
 from composer.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
 from composer.document.rules import DUPLICATE_KEY, TOO_LARGE
 from composer.expand import rules
@@ -91,7 +92,7 @@ class Substitution:
     """Replaces the variables of one file in its trees, and counts the size."""
 
     scope: Scope
-    diagnostics: list[Diagnostic] = field(default_factory=list)
+    diagnostics: LimitedDiagnostics = field(default_factory=LimitedDiagnostics)
     growth: Growth = field(default_factory=Growth)
     unknown: set[str] = field(default_factory=set)  # names of undeclared variables
 

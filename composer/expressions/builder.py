@@ -5,11 +5,11 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, TypeVar
 
 from composer.diagnostics import suggestion
-from composer.expressions.expression import Expression, FieldPath
+from composer.expressions.expression import Expression, FieldPath, Function
 from composer.expressions.operations import (
     ARITHMETIC,
     CONSTANTS,
@@ -55,17 +55,17 @@ def compile_expression(source: str) -> Expression:
     """
     tree = parse(source)
     body, paths = build(tree)
-    return Expression(source, paths, tree, _function(body))
+    return Expression(source, paths, tree, partial(_function, body))
 
 
-def _function(body: ast.expr) -> Callable[[Mapping[str, Any]], Any]:
+def _function(body: ast.expr) -> Function:
     arguments = ast.arguments(
         posonlyargs=[], args=[ast.arg(SCOPE)], kwonlyargs=[], kw_defaults=[], defaults=[]
     )
     function = ast.copy_location(ast.Lambda(arguments, body), body)
     code = compile(ast.fix_missing_locations(ast.Expression(function)), "<expression>", "eval")
     # Safe: build() made this code from OPERATIONS and constants only.
-    compiled: Callable[[Mapping[str, Any]], Any] = eval(  # noqa: S307
+    compiled: Function = eval(  # noqa: S307
         code, {"__builtins__": {}, **OPERATIONS}
     )
     return compiled

@@ -7,7 +7,7 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import field
 from itertools import takewhile
 from types import CodeType, TracebackType
-from typing import Any
+from typing import Any, TypeAlias
 
 from composer.diagnostics import shown
 from composer.expressions.values import EvaluationError, Refusal, describe, map_key
@@ -20,6 +20,10 @@ _REASONS: Mapping[type[Exception], str] = {
     TypeError: "a string and a number have no order",
     ValueError: "not defined for this value",
 }
+
+
+#: Returns the value of an expression with the names in a scope.
+Function: TypeAlias = Callable[[Mapping[str, Any]], Any]
 
 
 def _is_name(part: str | int) -> bool:
@@ -57,13 +61,15 @@ class Expression:
     """A compiled expression. Expressions with the same source are equal.
 
     ``tree`` is its syntax tree, for type inference; columns in it count
-    characters of the source.
+    characters of the source. ``compile`` returns its
+    ``function``, which is made when it is first evaluated.
     """
 
     source: str
     paths: tuple[FieldPath, ...] = field(compare=False)
     tree: ast.expr = field(compare=False, repr=False)
-    function: Callable[[Mapping[str, Any]], Any] = field(compare=False, repr=False)
+    compile: Callable[[], Function] = field(compare=False, repr=False)
+    function: Function | None = field(default=None, compare=False, repr=False)
 
     def evaluate(self, scope: Mapping[str, Any]) -> Any:
         """Return the value with the names in ``scope``: messages and maps are read, not changed.
@@ -71,7 +77,7 @@ class Expression:
         Raises EvaluationError, and nothing else, when there is none.
         """
         try:
-            return self.function(scope)
+            return (self.function or self._compiled())(scope)
         except Exception as error:
             raise EvaluationError(self._explain(error)) from error
 
@@ -86,8 +92,13 @@ class Expression:
     def __str__(self) -> str:
         return self.source
 
+    def _compiled(self) -> Function:
+        function = self.compile()
+        object.__setattr__(self, "function", function)
+        return function
+
     def _explain(self, error: Exception) -> str:
-        code: CodeType = self.function.__code__
+        code: CodeType = (self.function or self._compiled()).__code__
         part = _failed_part(self.source, code, error.__traceback__)
         return f"'{shown(part)}': {_reason(error)}"
 

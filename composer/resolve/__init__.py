@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from composer.diagnostics import Diagnostic, in_order
+from composer.document.error_limit import TooManyErrors
 from composer.model import System
 from composer.node_types import NodeTypes
 from composer.resolve.overrides import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides
@@ -42,12 +43,15 @@ def resolve(
     home = folders.get(source.path, Path(source.path).parent)
     source_folders = SourceFolders(home, folders, node_types)
     extra = overrides if overrides is not None else Overrides()
-    match kind_of(tree):
-        case kinds.SYSTEM:
-            system, diagnostics = resolve_system(tree, source, source_folders, extra)
-        case kinds.NODE:
-            system, diagnostics = resolve_node_type(tree, source, source_folders, extra)
-        case _:
-            wrong = check_kind(tree, source)
-            return None, [wrong] if wrong is not None else []
+    try:
+        match kind_of(tree):
+            case kinds.SYSTEM:
+                system, diagnostics = resolve_system(tree, source, source_folders, extra)
+            case kinds.NODE:
+                system, diagnostics = resolve_node_type(tree, source, source_folders, extra)
+            case _:
+                wrong = check_kind(tree, source)
+                return None, [wrong] if wrong is not None else []
+    except TooManyErrors as stopped:
+        return None, in_order(stopped.diagnostics)
     return system, in_order(diagnostics)

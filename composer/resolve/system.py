@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache, partial
 
 from composer.diagnostics import Diagnostic
+from composer.document.error_limit import LimitedDiagnostics
 from composer.model import (
     DEFAULT_SUPERVISION,
     USE_SIM_TIME,
@@ -65,7 +66,7 @@ def resolve_system(
     tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return the system of an expanded tree. See :func:`composer.resolve.resolve`."""
-    diagnostics: list[Diagnostic] = []
+    diagnostics = LimitedDiagnostics()
     qos = qos_table(tree.get("qos_profiles"))
     namespace = _system_namespace(tree, overrides)
     joined, port_connections = read_connections(tree.get("connections"), namespace.value, qos)
@@ -129,7 +130,7 @@ def resolve_node_type(
     tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return a system with a single node of a node type, to validate the type alone."""
-    diagnostics: list[Diagnostic] = []
+    diagnostics = LimitedDiagnostics()
     qos = qos_table(None)
     declared = declare(tree, folders, qos, diagnostics)
     name = _name(tree, "node")

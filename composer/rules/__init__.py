@@ -16,29 +16,30 @@ from pathlib import Path
 from composer.analysis.context import Context, location
 from composer.analysis.formatting import with_short_values
 from composer.diagnostics import Diagnostic, Severity, in_order
+from composer.document.error_limit import LimitedDiagnostics, TooManyErrors
 
 Check = Callable[[Context], Iterator[Diagnostic]]
 
 
 def run_checks(context: Context) -> list[Diagnostic]:
     """Return the diagnostics of all rules, sorted by location."""
-    found = reported(context, (item for check in all_checks() for item in check(context)))
+    found: list[Diagnostic] = LimitedDiagnostics()
+    try:
+        found += reported(context, (item for check in all_checks() for item in check(context)))
+    except TooManyErrors as stopped:
+        found = stopped.diagnostics
     return in_order(_without_repeats(found))
 
 
-def reported(context: Context, diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+def reported(context: Context, diagnostics: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """Leave out locations that an earlier stage reported, and warnings on lines with its errors."""
     refused = {location(span) for span in context.refused}
     refused_lines = {(file, line) for file, line, _ in refused}
-    return [
-        with_short_values(diagnostic)
-        for diagnostic in diagnostics
-        if location(diagnostic.primary) not in refused
-        and (
-            diagnostic.severity is Severity.ERROR
-            or location(diagnostic.primary)[:2] not in refused_lines
-        )
-    ]
+    for diagnostic in diagnostics:
+        place = location(diagnostic.primary)
+        is_error = diagnostic.severity is Severity.ERROR
+        if place not in refused and (is_error or place[:2] not in refused_lines):
+            yield with_short_values(diagnostic)
 
 
 def _without_repeats(found: list[Diagnostic]) -> list[Diagnostic]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 
 from composer.diagnostics import (
     Diagnostic,
@@ -28,10 +29,9 @@ from composer.source import SourceFile, Span
 UNUSED_IGNORE = warning("RC502", "unused-ignore")
 
 _MARK = "compose:"
-#: A comment, not the endpoint of a quoted string: no quote follows.
-_COMMENT = re.compile(
-    r"""(?:^|\s)\#\s*(?P<mark>compose:\s*ignore)\b(?:\[(?P<names>[^\]]*)\])?[^"']*$"""
-)
+_COMMENT = re.compile(r"(?:^|\s)\#[ \t]*(?P<mark>compose:[ \t]*ignore)\b(?:\[(?P<names>[^\]]*)\])?")
+#: Rules that the comments of a file may ignore.
+_MAX_IGNORES = 500
 _NAME = re.compile(r"[^\s,]+")
 _ONLY_COMMENT = re.compile(r"\s*(#.*)?$")
 
@@ -83,20 +83,29 @@ def without_ignored(
             kept.append(diagnostic)
     if complete:
         names = tuple(name for rule in registered_rules() for name in (rule.code, rule.name))
-        unused = [ignore for ignore in ignores_in(source) if ignore.span not in used]
+        comments = list(ignores_in(source))
+        unused = [ignore for ignore in comments[:_MAX_IGNORES] if ignore.span not in used]
         if any(ignore.rule in names for ignore in unused) and may_be_needed():
             unused = [item for item in unused if item.span in errors or item.rule not in names]
         kept += [_unused(ignore, names, is_error=ignore.span in errors) for ignore in unused]
+        if len(comments) > _MAX_IGNORES:
+            message = f"this file ignores more than {_MAX_IGNORES} rules; the rest has no effect"
+            hint = "put 'ignore' into the settings of the project"
+            kept.append(Diagnostic(UNUSED_IGNORE, message, comments[-1].span, hint=hint))
     return kept, used
 
 
 def ignores_in(source: SourceFile) -> Iterator[Ignore]:
-    """Yield the rules that the comments of a file ignore."""
+    """Yield the rules that the comments of a file ignore, and the first one beyond the limit."""
+    return islice(_all_ignores(source), _MAX_IGNORES + 1)
+
+
+def _all_ignores(source: SourceFile) -> Iterator[Ignore]:
     if _MARK not in source.text:
         return
     waiting: list[tuple[int, re.Match[str]]] = []  # comments about the next line with content
     for number, text in enumerate(source.lines, start=1):
-        found = _COMMENT.search(text) if _MARK in text else None
+        found = _comment(text) if _MARK in text else None
         if _ONLY_COMMENT.match(text) is None:
             waiting += [] if found is None else [(number, found)]
             yield from _ignores(waiting, number, source)
@@ -104,6 +113,11 @@ def ignores_in(source: SourceFile) -> Iterator[Ignore]:
         elif found is not None:
             waiting.append((number, found))
     yield from _ignores(waiting, len(source.lines), source)
+
+
+def _comment(line: str) -> re.Match[str] | None:
+    """Return the comment of a line: no quote follows, else it may be part of a quoted string."""
+    return _COMMENT.search(line, max(line.rfind('"'), line.rfind("'")) + 1)
 
 
 def _ignores(
@@ -130,7 +144,7 @@ class _Table:
         path = span.file.path
         if path not in self._files:
             lines: dict[int, list[Ignore]] = {}
-            for ignore in ignores_in(span.file):
+            for ignore in islice(ignores_in(span.file), _MAX_IGNORES):
                 lines.setdefault(ignore.line, []).append(ignore)
             self._files[path] = lines
         return self._files[path].get(span.line, [])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import port_name
 from composer.diagnostics import Diagnostic, Label, warning
-from composer.model import Channel, ChannelKind, Event, Port, PortKind, PortOfNode, PrimaryState
+from composer.model import ChannelKind, Event, Port, PortKind, PortOfNode, PrimaryState
 from composer.rules.connections import diagnostic_location, name_location
 
 TOPIC_LOOP = warning("RC326", "topic-loop")
@@ -98,7 +98,8 @@ def check_own_publisher(context: Context) -> Iterator[Diagnostic]:
             any(end.node.full_name not in names for end in ends)
             for ends in (channel.sources, channel.sinks)
         )
-        sending = [end for end in both if _sends_back(channel, end)]
+        ports = {(end.node.full_name, end.port.name.value) for end in channel.sources}
+        sending = [end for end in both if _sends_back(end, ports)]
         if len(names) != 1 or (is_shared and not sending):
             continue  # nodes exchange messages
         if not any(_is_unconditional(end) for end in sending):  # topic-loop reports these
@@ -114,13 +115,14 @@ def check_own_publisher(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-def _sends_back(channel: Channel, end: PortOfNode) -> bool:
-    """Return whether the reaction of a subscription publishes to its own topic."""
+def _sends_back(end: PortOfNode, ports: Container[tuple[str, str]]) -> bool:
+    """Return whether the reaction of a subscription publishes to its own topic.
+
+    ``ports`` are the publishers of the topic: their nodes and their names.
+    """
     reaction = end.port.reaction(Event.MESSAGE)
-    sent = {send.port.value for send in reaction.publish} if reaction is not None else set()
-    return any(
-        source.node is end.node and source.port.name.value in sent for source in channel.sources
-    )
+    sent = () if reaction is None else reaction.publish
+    return any((end.node.full_name, send.port.value) in ports for send in sent)
 
 
 def _is_unconditional(end: PortOfNode) -> bool:

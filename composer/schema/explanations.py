@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Label, nearest, shown
+from composer.document.error_limit import LimitedDiagnostics, TooManyErrors
+from composer.document.limits import MAX_ERRORS
 from composer.fast_dataclass import dataclass
 from composer.schema import rules
 from composer.schema.common_mistakes import advice, intended_key, value_advice
@@ -91,7 +94,8 @@ class _SchemaError:
     @property
     def unknown(self) -> list[str]:
         """The keys that the schema does not have."""
-        return [key for key in self.instance if key not in self.schema["properties"]]
+        unknown = (key for key in self.instance if key not in self.schema["properties"])
+        return list(islice(unknown, MAX_ERRORS + 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,14 +138,15 @@ class _MisspelledKeys:
 
 def explain_errors(errors: Iterable[ValidationError], index: TreeIndex) -> list[Diagnostic]:
     """Return the diagnostics for ``errors``, without those that only follow from another."""
-    located = [_located(error, index) for error in errors]
+    located = [_located(error, index) for error in islice(errors, MAX_ERRORS + 1)]
     misspelled = _MisspelledKeys.among(located)
-    diagnostics = (
-        diagnostic
-        for error in located
-        if not misspelled.covers(error)
-        for diagnostic in _EXPLAINERS[error.validator](error, misspelled)
-    )
+    diagnostics = LimitedDiagnostics()
+    try:
+        for error in located:
+            if not misspelled.covers(error):
+                diagnostics += _EXPLAINERS[error.validator](error, misspelled)
+    except TooManyErrors as stopped:
+        return stopped.diagnostics
     return list(dict.fromkeys(diagnostics))
 
 

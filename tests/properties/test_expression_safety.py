@@ -185,7 +185,7 @@ def test_values_are_bounded(source: str) -> None:
 @given(expressions())
 def test_compiled_code_accesses_only_its_operations(source: str) -> None:
     try:
-        code: CodeType = compile_expression(source).function.__code__
+        code: CodeType = compile_expression(source).compile().__code__
     except ExpressionError:
         return
     assert set(code.co_names) <= set(OPERATIONS)

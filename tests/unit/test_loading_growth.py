@@ -119,6 +119,47 @@ def test_many_included_nodes(tmp_path: Path) -> None:
     assert_linear(validate, 100, 800)
 
 
+#: By name: the begin of a file, a part that is repeated up to the size, and the end. A ``#`` in it
+#: is the number of the part.
+LARGE_FILES: dict[str, tuple[str, str, str]] = {
+    "nodes in one line": ("nodes: {", "n#: {}, ", "}\n"),
+    "unknown keys in one line": ("nodes: {", "a#: {b#: 1}, ", "}\n"),
+    "keys without values": ("nodes: {", "a#, ", "}\n"),
+    "maps of nothing": ("nodes: {x: {state: {a: [", "{a: }, ", "]}}}\n"),
+    "braces": ("nodes: {x: {on_activate: {log: '", "} ", "'}}}\n"),
+    "expressions": ("nodes: {x: {on_activate: {log: '", "{a#} ", "'}}}\n"),
+    "quotes in braces": ('nodes: {x: {on_activate: {log: "', "{'} ", '"}}}\n'),
+    "variables": ("nodes: {x: {on_activate: {log: '", "${a#} ", "'}}}\n"),
+    "escapes": ("nodes: {x: {state: {a: [", '"\\a", ', "]}}}\n"),
+    "ignore comments": ("nodes: {x: {}}\n", "# compose: ignore[RC5]\n", ""),
+    "ignored rules": ("nodes: {x: {}} # compose: ignore[", "RC5#, ", "]\n"),
+    "ignore comments in quotes": ("nodes: {x: {}} ", "# compose: ignore[", "'\"\n"),
+    "misspelt types": ("nodes:\n", "  n#: {publishers: {t: {type: std_msgs/msg/Flot#}}}\n", ""),
+    "state": ("nodes:\n  x:\n    state:\n", "      a#: 1\n", ""),
+    "executors": ("nodes: {x: {}}\nexecutors:\n", "  e#: {}\n", ""),
+    "one topic": (
+        "nodes:\n",
+        f"  n#: {{publishers: {{p: {{{STRING}, topic: /t}}}}, "
+        f"subscriptions: {{s: {{{STRING}, topic: /t}}}}}}\n",
+        "",
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("begin", "part", "end"), LARGE_FILES.values(), ids=LARGE_FILES)
+def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
+    """Up to a megabyte, also beyond the limits."""
+
+    def validate(size: int) -> None:
+        parts = size // len(part.replace("#", "10000"))
+        text = "".join(part.replace("#", str(number)) for number in range(parts))
+        content = f"system: large\n{begin}{text}{end}".encode()
+        load_bytes(content, tmp_path, shown="large.yaml")
+
+    assert_linear(validate, 100_000, 1_000_000)
+
+
 def test_loading_pauses_the_cycle_collection_only_while_it_runs(tmp_path: Path) -> None:
     text = f"system: a\nnodes:\n  first: {{publishers: {{a: {PORT}}}}}\n{written(100)}"
     (tmp_path / "a.yaml").write_text(text)

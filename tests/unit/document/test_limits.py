@@ -9,7 +9,7 @@ import time
 import pytest
 
 from composer.document import parse_bytes, parse_document
-from composer.document.limits import MAX_BYTES, MAX_DEPTH, MAX_VALUES
+from composer.document.limits import MAX_BYTES, MAX_DEPTH, MAX_ERRORS, MAX_VALUES
 from composer.source import SourceFile
 
 #: Of CPU time, so that a busy machine makes no difference.
@@ -45,7 +45,7 @@ ATTACKS = {
         "too-large",
     ),
     "alias of itself": ("a: &a [*a]", "unsupported-yaml"),
-    "one key again and again": ("a: 1\n" * 20_000, "duplicate-key"),
+    "one key again and again": ("a: 1\n" * MAX_ERRORS, "duplicate-key"),
     "blanks": (" " * FULL, "yaml-syntax"),
     "empty lines": ("\n" * FULL, "yaml-syntax"),
     "a comment": ("#" * FULL, "yaml-syntax"),
@@ -123,3 +123,11 @@ def test_memory() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
     )
     assert int(ran.stdout) < 200_000  # kilobytes
+
+
+def test_errors() -> None:
+    tree, diagnostics = parse_document(SourceFile("f", "a: 1\n" * 20_000))
+    assert tree is None
+    assert len(diagnostics) == MAX_ERRORS + 1
+    last = diagnostics[-1]
+    assert (last.rule.name, str(last.primary)) == ("too-large", f"f:{MAX_ERRORS + 2}:1")
