@@ -13,6 +13,7 @@ from composer.diagnostics import Diagnostic
 from composer.document.rules import UNREADABLE_FILE
 from composer.fast_dataclass import dataclass
 from composer.project import SETTINGS_FILE, Project
+from composer.regular_files import open_regular
 from composer.source import SourceFile, Span
 
 _SUFFIXES = frozenset({".yaml", ".yml"})
@@ -127,7 +128,7 @@ def _link_out_of_project(path: Path) -> Diagnostic:
 def _is_composer_file(path: Path) -> bool:
     """Return whether a file is a system or node type, without parsing it."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
     except OSError:
         return True  # reading it reports the error

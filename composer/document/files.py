@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import os
-import stat
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -12,15 +11,9 @@ from pathlib import Path
 from composer.diagnostics import Diagnostic, nearest, shown
 from composer.document.limits import MAX_BYTES
 from composer.document.rules import TOO_LARGE, UNREADABLE_FILE
+from composer.regular_files import FileTooLargeError, NotRegularError, read_regular
 from composer.source import SourceFile, Span
 
-_KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFSOCK: "a socket",
-}
 _LONGEST_PATH = 4096  # PATH_MAX of Linux
 _ENTRIES_FOR_HINT = 1000
 _WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
@@ -80,28 +73,16 @@ def _not_utf8(data: bytes, offset: int, span: Span) -> Diagnostic:
 def _read(path: Path) -> bytes | None:
     """Return the content, or None if it is too large. Raises _NotRead."""
     try:
-        # Checked before opening, since opening a device can have side effects, and again after,
-        # since the file may have been replaced in between.
-        _require_regular(path.stat().st_mode)
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
-        with os.fdopen(descriptor, "rb") as file:
-            status = os.fstat(descriptor)
-            _require_regular(status.st_mode)
-            if status.st_size > MAX_BYTES:
-                return None
-            data = file.read(MAX_BYTES + 1)
+        return read_regular(path, MAX_BYTES)
+    except FileTooLargeError:
+        return None
     except FileNotFoundError:
         raise _NotRead("there is no such file", _similar_name(path)) from None
+    except NotRegularError as error:
+        raise _NotRead(error.strerror or str(error)) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else None
         raise _NotRead(f"this file cannot be read: {reason or error}") from None
-    return data if len(data) <= MAX_BYTES else None
-
-
-def _require_regular(mode: int) -> None:
-    if not stat.S_ISREG(mode):
-        kind = _KINDS.get(stat.S_IFMT(mode), "not a regular file")
-        raise _NotRead(f"expected a file, found {kind}")
 
 
 def _similar_name(path: Path) -> str | None:

@@ -17,7 +17,9 @@ from typing import Any
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces.sources import installed_prefixes
+from composer.regular_files import open_regular, read_regular
 
+_MAX_DESCRIPTION_BYTES = 4_000_000
 #: The wheels of ROS begin with it; a sourced ROS installs rclpy under that name.
 _ROS_PREFIX = "ros-"
 _PACKAGES = ("ros2-composer", "rclpy")
@@ -98,7 +100,7 @@ def _type_hash(name: str) -> str | None:
     for prefix in installed_prefixes():
         path = prefix.root / "share" / f"{name}.json"
         try:
-            described = json.loads(path.read_text(encoding="utf-8"))["type_hashes"]
+            described = json.loads(read_regular(path, _MAX_DESCRIPTION_BYTES))["type_hashes"]
         except (OSError, ValueError, KeyError, TypeError):
             continue
         return _hash_of(described, name)
@@ -111,7 +113,7 @@ def _hash_of(described: Iterable[Mapping[str, str]], name: str) -> str | None:
 
 def _digest(path: Path) -> str | None:
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return None

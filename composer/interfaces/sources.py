@@ -17,6 +17,7 @@ from typing import Protocol
 
 from composer.fast_dataclass import dataclass
 from composer.interfaces.parser import split_name
+from composer.regular_files import NotRegularError, read_regular
 
 FOLDERS = ("msg", "srv", "action")
 _MAXIMUM_BYTES = 1_000_000
@@ -208,11 +209,10 @@ class _Unreadable(Exception):
 def _text(path: Path) -> str | None:
     """Return the text of a regular file, None if there is none. Raises _Unreadable."""
     try:
-        if not path.is_file():
-            return None
-        if path.stat().st_size > _MAXIMUM_BYTES:
-            raise _Unreadable(f"it is larger than {_MAXIMUM_BYTES // 1000} kB")
-        return path.read_text(encoding="utf-8")
+        text = read_regular(path, _MAXIMUM_BYTES).decode()
+        return text.replace("\r\n", "\n").replace("\r", "\n")
+    except (FileNotFoundError, NotADirectoryError, NotRegularError):
+        return None
     except UnicodeDecodeError as error:
         raise _Unreadable("it is not UTF-8") from error
     except OSError as error:

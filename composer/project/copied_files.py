@@ -19,6 +19,7 @@ from typing import TypeAlias
 from pathspec import GitIgnoreSpec, PathSpec
 
 from composer.fast_dataclass import dataclass
+from composer.regular_files import open_regular, read_regular
 
 #: In a workspace: it holds a copy of a project, which may be replaced.
 MARK = ".compose-sync"
@@ -40,6 +41,7 @@ _KEY_NAME = re.compile(
 _KEY_CONTENT = re.compile(
     rb"^(-{4,5} ?BEGIN [A-Z0-9 ]*PRIVATE KEY|PuTTY-User-Key-File|AGE-SECRET-KEY-)", re.MULTILINE
 )
+_MAX_PATTERN_BYTES = 1_000_000
 _HEAD_BYTES = 16_384  # text may precede a key
 _OTHER_USERS = 0o077
 _PRIVATE = "the private key of a host"
@@ -198,9 +200,11 @@ def _from_docker(line: str) -> str:
 
 def _lines(path: Path) -> list[str]:
     """Return the patterns of a file; none if it is not there."""
-    if not path.is_file():
+    try:
+        data = read_regular(path, _MAX_PATTERN_BYTES)
+    except OSError:
         return []
-    text = path.read_text(encoding="utf-8", errors="replace").removeprefix("\ufeff")
+    text = data.decode(errors="replace").removeprefix("\ufeff")
     lines = [line.strip() for line in text.splitlines()]
     return [line for line in lines if line and not line.startswith("#")]
 
@@ -219,6 +223,6 @@ def _status(path: Path, *, follow: bool = True) -> os.stat_result | None:
 
 
 def _head(path: Path) -> bytes:
-    with suppress(OSError), path.open("rb") as file:
+    with suppress(OSError), open_regular(path) as file:
         return file.read(_HEAD_BYTES)
     return b""

@@ -6,7 +6,6 @@ import importlib.machinery
 import importlib.util
 import io
 import os
-import stat
 import sys
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,6 +16,7 @@ from pathlib import Path
 from composer.fast_dataclass import dataclass
 from composer.ownership import TrustedUsers
 from composer.project import Project
+from composer.regular_files import FileTooLargeError, NotRegularError, read_regular
 from composer.source import Span
 from composer.spelling import Vocabulary
 
@@ -92,12 +92,11 @@ def relative_module_file(module: str, level: int, importer: Path) -> Path | None
 def read_text(path: Path) -> str:
     """Return the text of a Python file, by its declared encoding. Raises Unreadable."""
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise Unreadable("is not a regular file")
-        if status.st_size > MAXIMUM_BYTES:
-            raise Unreadable(f"is larger than {MAXIMUM_BYTES} bytes")
-        content = path.read_bytes()
+        content = read_regular(path, MAXIMUM_BYTES)
+    except NotRegularError:
+        raise Unreadable("is not a regular file") from None
+    except FileTooLargeError:
+        raise Unreadable(f"is larger than {MAXIMUM_BYTES} bytes") from None
     except OSError as error:
         raise Unreadable(f"cannot be read: {error.strerror}") from None
     try:

@@ -8,9 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from composer.regular_files import NotRegularError, open_regular
 from composer.run_log.record import Record, parse_line
 from composer.run_log.rotation import log_files
 from composer.run_log.runs import Run
+
+_MAX_LINE_BYTES = 1_000_000
 
 
 class RunReader:
@@ -34,8 +37,8 @@ class RunReader:
             self.close()
             self._path = later[0]
             try:
-                self._lines = _LineReader(self._path.open("rb"))
-            except FileNotFoundError:  # removed just now, as the oldest file
+                self._lines = _LineReader(open_regular(self._path))
+            except (FileNotFoundError, NotRegularError):  # the oldest file may just be removed
                 continue
 
     def close(self) -> None:
@@ -53,7 +56,7 @@ def last_records(run: Run, max_bytes: int) -> list[Record]:
     """Return the records in the last ``max_bytes`` of a run, as far as they can be read."""
     lines: list[bytes] = []
     for path in reversed(log_files(run.folder)):
-        with suppress(OSError), path.open("rb") as file:
+        with suppress(OSError), open_regular(path) as file:
             size = file.seek(0, os.SEEK_END)
             file.seek(max(0, size - max_bytes))
             read = file.read(max_bytes).splitlines()
@@ -72,9 +75,9 @@ class _LineReader:
         self._incomplete = b""
 
     def lines(self) -> Iterator[bytes]:
-        """Yield the lines since the last call."""
-        for part in self._file:
-            self._incomplete += part
+        """Yield the lines since the last call; of a longer one than any record, the end."""
+        while part := self._file.readline(_MAX_LINE_BYTES):
+            self._incomplete = (self._incomplete + part)[-_MAX_LINE_BYTES:]
             if part.endswith(b"\n"):
                 line, self._incomplete = self._incomplete, b""
                 yield line

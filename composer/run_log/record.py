@@ -6,10 +6,12 @@ import json
 from datetime import UTC, datetime
 from typing import Any
 
+from composer.characters import escape_line
 from composer.fast_dataclass import dataclass
 
 _MICROSECOND_NS = 1000
 _SECOND_NS = 1_000_000_000
+_END_NS = 2**63  # of the times of ROS, in the year 2262
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,19 +46,23 @@ class Record:
 
 
 def parse_line(line: bytes) -> Record | None:
-    """Return the record in a line of a log file; None if it is not one, as after a full disk."""
+    """Return the record in a line of a log file; None if it is not one, as after a full disk.
+
+    All but the message is safe to be shown in one line.
+    """
     try:
         content: dict[str, Any] = json.loads(line)
         texts = {key: content[key] for key in ("level", "logger", "node", "message")}
         since_epoch = datetime.fromisoformat(content["time"]) - _EPOCH
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return None
-    if not all(isinstance(text, str) for text in texts.values()):
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
     seconds = since_epoch.days * 86_400 + since_epoch.seconds
-    return Record(
-        time_ns=seconds * _SECOND_NS + since_epoch.microseconds * _MICROSECOND_NS, **texts
-    )
+    time_ns = seconds * _SECOND_NS + since_epoch.microseconds * _MICROSECOND_NS
+    if not (0 <= time_ns < _END_NS and all(isinstance(text, str) for text in texts.values())):
+        return None
+    message = texts.pop("message")
+    safe = {key: escape_line(text) for key, text in texts.items()}
+    return Record(time_ns=time_ns, message=message, **safe)
 
 
 _EPOCH = datetime.fromtimestamp(0, UTC)

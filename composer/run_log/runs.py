@@ -13,12 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from composer.fast_dataclass import dataclass
+from composer.regular_files import open_regular, read_regular
 from composer.run_log.rotation import log_files
 
 FOLDER = "compose"
 #: How many runs of a system are kept, with the one that starts.
 MAX_RUNS = 20
 _ABOUT = "run.json"
+_MAX_ABOUT_BYTES = 65_536
+#: The folders of systems: their names, with dots in place of slashes.
+_SYSTEM = re.compile(r"\w+(\.\w+)*", re.ASCII)
 _NAME = re.compile(r"(\d{4}(?:-\d\d){5}-\d{3})-\d+")
 _NAME_FORMAT = "%Y-%m-%d-%H-%M-%S-%f"
 
@@ -48,7 +52,8 @@ class Run:
     @property
     def domain(self) -> str:
         """The ROS domain id; empty if it is not known."""
-        return str(self.about().get("domain", ""))
+        domain = self.about().get("domain")
+        return domain if isinstance(domain, str) and domain.isdecimal() else ""
 
     @property
     def whole_system(self) -> str:
@@ -58,8 +63,7 @@ class Run:
     @property
     def started(self) -> datetime:
         """When the run started, in the local time zone."""
-        text, _, _ = self.name.rpartition("-")
-        return datetime.strptime(text, _NAME_FORMAT).replace(tzinfo=UTC).astimezone()
+        return _started(self.name)
 
     @property
     def pid(self) -> str:
@@ -75,15 +79,15 @@ class Run:
 
     def about(self) -> dict[str, Any]:
         """Return what the run says about itself; nothing if that cannot be read."""
-        with suppress(OSError, ValueError):
-            about = json.loads((self.folder / _ABOUT).read_text(encoding="utf-8"))
+        with suppress(OSError, ValueError, RecursionError):
+            about = json.loads(read_regular(self.folder / _ABOUT, _MAX_ABOUT_BYTES))
             return about if isinstance(about, dict) else {}
         return {}
 
     def is_running(self) -> bool:
         """Say whether the process that writes the log is running, on this computer."""
         try:
-            with (self.folder / _ABOUT).open("rb") as file:
+            with open_regular(self.folder / _ABOUT) as file:
                 fcntl.lockf(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
@@ -168,7 +172,8 @@ def _systems(logs: Path) -> list[tuple[str, Path]]:
     """Return the full names of systems and processes, and the folders of their runs."""
     with suppress(OSError):
         folders = sorted((logs / FOLDER).iterdir())
-        return [("/" + folder.name.replace(".", "/"), folder) for folder in folders]
+        names = [("/" + folder.name.replace(".", "/"), folder) for folder in folders]
+        return [(name, folder) for name, folder in names if _SYSTEM.fullmatch(folder.name)]
     return []
 
 
@@ -178,9 +183,21 @@ def _has_name(full_name: str, name: str) -> bool:
 
 def _runs_in(folder: Path, system: str) -> list[Run]:
     with suppress(OSError):
-        names = sorted(item.name for item in folder.iterdir() if _NAME.fullmatch(item.name))
+        names = sorted(item.name for item in folder.iterdir() if _is_run(item.name))
         return [Run(folder / name, system) for name in names]
     return []
+
+
+def _is_run(name: str) -> bool:
+    with suppress(ValueError, OverflowError, OSError):  # not a date
+        return _NAME.fullmatch(name) is not None and _started(name) is not None
+    return False
+
+
+def _started(name: str) -> datetime:
+    """Return when the run of a folder started. Raises ValueError, OverflowError, OSError."""
+    text, _, _ = name.rpartition("-")
+    return datetime.strptime(text, _NAME_FORMAT).replace(tzinfo=UTC).astimezone()
 
 
 def _remove(run: Run) -> None:

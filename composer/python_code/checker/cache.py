@@ -14,6 +14,7 @@ from pathlib import Path
 
 from composer.python_code.checker.file_sets import FileSet
 from composer.python_code.problems import Family, Problem
+from composer.regular_files import read_regular
 from composer.source import Span
 
 try:
@@ -38,12 +39,13 @@ def entry_of(state: Iterable[str]) -> Path:
 def read_entry(entry: Path, files: FileSet) -> list[tuple[str, Problem]] | None:
     """Return the problems that were kept, each with the name of its file, or None."""
     try:
-        status = entry.stat(follow_symlinks=False)
-        if status.st_uid != os.geteuid() or status.st_size > _MAXIMUM_BYTES:
+        if entry.stat(follow_symlinks=False).st_uid != os.geteuid():
             return None
         return [
             (name, Problem(Family[family], message, Span(files.files[name].text, *place), *others))
-            for name, family, message, place, *others in json.loads(entry.read_bytes())
+            for name, family, message, place, *others in json.loads(
+                read_regular(entry, _MAXIMUM_BYTES)
+            )
         ]
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None

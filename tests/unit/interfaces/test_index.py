@@ -142,7 +142,7 @@ def test_a_definition_that_cannot_be_read_says_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "reason"),
-    [(b"bool \xff", "it is not UTF-8"), (b"#" * 1_000_001, "it is larger than 1000 kB")],
+    [(b"bool \xff", "it is not UTF-8"), (b"#" * 1_000_001, "it is larger than 1,000,000 bytes")],
 )
 def test_a_file_that_cannot_be_read_is_a_problem(
     tmp_path: Path, content: bytes, reason: str

@@ -54,10 +54,47 @@ def test_a_record_is_read_as_it_was_written(message: str) -> None:
         b"[" * 100_000,
         record().to_line()[:-5].encode(),
         record().to_line().replace('"text"', "7").encode(),
+        record().to_line().replace("2026", "9999").encode(),
+        record().to_line().replace("2026", "0001").replace("Z", "+23:59").encode(),
     ],
 )
 def test_what_is_not_a_record_is_skipped(line: bytes) -> None:
     assert parse_line(line) is None
+
+
+def test_only_the_message_has_lines() -> None:
+    forged = record(level="info\n[FATAL]", node="/x\n[ERROR] [compose]\x1b[2J")
+    read = parse_line(forged.to_line().encode())
+    assert read is not None
+    assert (read.level, read.node) == ("info\\n[FATAL]", "/x\\n[ERROR] [compose]\\x1b[2J")
+
+
+def test_anything_may_be_in_the_log_folder(tmp_path: Path) -> None:
+    """Pipes, devices, links to nowhere, dates that are none, and very many entries."""
+    logs = tmp_path / FOLDER
+    name = "2026-03-01-12-00-00-000-1"
+    for system in ("pipes", "devices", "folders", "brackets", "line"):
+        (logs / system / name).mkdir(parents=True)
+    for file in ("run.json", "log-000001.jsonl"):
+        os.mkfifo(logs / "pipes" / name / file)
+        (logs / "devices" / name / file).symlink_to("/dev/zero")
+        (logs / "folders" / name / file).mkdir()
+        (logs / "brackets" / name / file).write_text("[" * 100_000)
+        (logs / "line" / name / file).write_text("x" * 3_000_000 + "\n" + record().to_line())
+    for system in ("not a name", "two\nlines", "many"):
+        (logs / system / name).mkdir(parents=True)
+    for number in range(3_000):
+        (logs / "many" / f"2026-13-45-99-99-99-999-{number}").mkdir()
+    os.mkfifo(logs / "pipe")
+    (logs / "loop").symlink_to(logs)
+    runs = find_runs(tmp_path)
+    assert [run.system for run in runs] == [
+        "/brackets", "/devices", "/folders", "/line", "/many", "/pipes"
+    ]  # fmt: skip
+    for run in runs:
+        assert (run.domain, run.is_running(), run.started.year) == ("", False, 2026)
+        with SystemLog(tmp_path, run) as log:
+            assert [*log.new()] == ([record()] if run.system == "/line" else [])
 
 
 def test_files_are_rotated_between_lines_and_the_oldest_is_removed(tmp_path: Path) -> None:
