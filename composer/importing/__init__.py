@@ -6,6 +6,7 @@ ROS or runs the code of users.
 """
 
 from composer.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
+from composer.importing.readable import readable
 from composer.importing.writing import write_node_type, write_parameters, write_system
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "FoundParameter",
     "FoundPort",
     "FoundSystem",
+    "readable",
     "write_node_type",
     "write_parameters",
     "write_system",

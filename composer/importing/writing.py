@@ -34,6 +34,8 @@ _POLICIES = (
     "liveliness",
     "liveliness_lease_duration_ms",
 )
+#: What was left out and is listed in a file.
+_MAX_LISTED = 200
 _NOWHERE = Span(SourceFile("", ""), 1, 1, 1)
 _NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_]+")
 
@@ -44,7 +46,9 @@ def write_system(found: FoundSystem, parameter_file: str | None = None) -> str:
     """Return a system file. ``parameter_file`` is the file of :func:`write_parameters`, if any."""
     comments: _Comments = {(): found.comments}
     if found.left_out:
-        comments[()] += ("", "Left out:", *(f"- {text}" for text in found.left_out))
+        listed = found.left_out[:_MAX_LISTED]
+        more = (f"... and {len(found.left_out) - _MAX_LISTED} more",) * (listed != found.left_out)
+        comments[()] += ("", "Left out:", *(f"- {text}" for text in listed), *more)
     nodes: dict[str, Plain] = {}
     for key, node in node_keys(found.nodes).items():
         nodes[key] = _node(key, node, ("nodes", key), comments)

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import pytest
+
 from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
-from composer.importing import FoundNode, FoundParameter, FoundPort, write_node_type, write_system
+from composer.importing import (
+    FoundNode,
+    FoundParameter,
+    FoundPort,
+    FoundSystem,
+    readable,
+    write_node_type,
+    write_system,
+)
 from composer.importing.live import describe_graph
 from composer.interfaces import Interfaces
 from composer.loading import load
@@ -147,3 +158,45 @@ publishers:
 
 def test_types_of_the_graph_are_those_of_the_index() -> None:
     assert STRING in Interfaces.load().names("msg")
+
+
+LARGE = 3_000_000
+
+
+@pytest.mark.slow  # megabytes are written and read
+@pytest.mark.parametrize(
+    ("parameters", "left_out"),
+    [
+        ([FoundParameter("text", "string", "x" * LARGE)], ["text"]),
+        ([FoundParameter("numbers", "integer_array", [1] * 300_000)], ["numbers"]),
+        ([FoundParameter("broken", "string", "a\x1b[2J")], ["broken"]),
+        ([FoundParameter("broken", "double_array", [1.0, math.nan])], ["broken"]),
+        ([FoundParameter("told", "bool", True, {"description": "\u202e"})], []),
+        ([FoundParameter(f"p{i}", "string", "x" * 9_000) for i in range(300)], None),
+    ],
+)
+def test_what_a_file_cannot_hold_is_left_out(
+    parameters: list[FoundParameter], left_out: list[str] | None, tmp_path: Path
+) -> None:
+    small = FoundParameter("small", "integer", 1)
+    node = FoundNode("driver", keys={"external": True}, parameters=(small, *parameters))
+    found = readable(FoundSystem("large", (node,)))
+    path = tmp_path / "large.yaml"
+    path.write_text(write_system(found), encoding="utf-8")
+    result = load(path)
+    assert [item.message for item in result.diagnostics] == []
+    assert result.system is not None
+    names = {parameter.name.value for parameter in result.system.nodes[0].parameters}
+    assert "small" in names
+    missing = [item.name for item in parameters if item.name not in names]
+    assert missing == left_out if left_out is not None else 30 < len(missing) < 150
+    assert len(found.left_out) == len(missing)
+
+
+@pytest.mark.slow
+def test_nodes_that_a_file_cannot_hold_are_left_out() -> None:
+    nodes = tuple(FoundNode(f"n{number}", keys={"external": True}) for number in range(6_000))
+    found = readable(FoundSystem("large", nodes))
+    assert len(found.nodes) == 5_000
+    assert found.left_out[0] == "node /n5000: the file is full"
+    assert write_system(found).count("the file is full") == 200

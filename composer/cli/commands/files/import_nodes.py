@@ -102,8 +102,9 @@ def live(
         raise CommandError(
             f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
         )
-    from composer.importing import write_system
+    from composer.importing import readable, write_system
 
+    found = readable(found)
     _write(write_system(found), output)
     _report_left_out(found.left_out)
 
