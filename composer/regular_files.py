@@ -1,7 +1,8 @@
-"""Read files that may be anything: a folder can hold pipes, devices and files without an end.
+"""Read files that may be anything, and write whole ones.
 
-Only regular files are opened, also through symbolic links, and at most a given size is read. So
-reading never waits, and never takes more memory than that.
+A folder can hold pipes, devices and files without an end. Only regular files are opened, also
+through symbolic links, and at most a given size is read. So reading never waits, and never takes
+more memory than that.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
 
@@ -55,6 +57,16 @@ def read_regular(path: Path, limit: int) -> bytes:
         message = f"it is larger than {limit:,} bytes"
         raise FileTooLargeError(errno.EFBIG, message, str(path))
     return data
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a new file, whole or not at all. Raises OSError, with the name of the file."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:  # on a full disk, it does not name the file
+        with suppress(OSError):
+            path.unlink()
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def _require_regular(path: Path, mode: int) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.fast_dataclass import dataclass
-from composer.regular_files import open_regular, read_regular
+from composer.regular_files import open_regular, read_regular, write_whole
 from composer.run_log.rotation import log_files
 
 FOLDER = "compose"
@@ -112,12 +112,15 @@ class RunFolder:
         now = datetime.now(UTC).strftime(_NAME_FORMAT)[:-3]
         self.path = parent / f"{now}-{os.getpid()}"
         self.path.mkdir()
-        # Not inherited by processes that user code forks, as a lock of flock() would be.
-        self._about = (self.path / _ABOUT).open("x", encoding="utf-8")
         about = {"system": system, "host": socket.gethostname(), "pid": os.getpid()}
         about |= {"part": part, "forwarded": forwarded, "domain": current_domain()}
-        self._about.write(f"{json.dumps(about)}\n")
-        self._about.flush()
+        try:
+            write_whole(self.path / _ABOUT, f"{json.dumps(about)}\n")
+        except OSError:
+            self.path.rmdir()
+            raise
+        # Not inherited by processes that user code forks, as a lock of flock() would be.
+        self._about = (self.path / _ABOUT).open("r+", encoding="utf-8")
         with suppress(OSError):  # a file system without locks: the run does not look running
             fcntl.lockf(self._about, fcntl.LOCK_EX | fcntl.LOCK_NB)
         for run in _runs_in(parent, system)[:-MAX_RUNS]:

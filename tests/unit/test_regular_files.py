@@ -1,12 +1,18 @@
 from __future__ import annotations
 
 import os
+import resource
 import socket
 from pathlib import Path
 
 import pytest
 
-from composer.regular_files import FileTooLargeError, NotRegularError, read_regular
+from composer.regular_files import (
+    FileTooLargeError,
+    NotRegularError,
+    read_regular,
+    write_whole,
+)
 
 
 @pytest.fixture
@@ -43,3 +49,14 @@ def test_nothing_else_is_opened(folder: Path, name: str, kind: str) -> None:
 def test_a_path_that_leads_nowhere(folder: Path, name: str) -> None:
     with pytest.raises(OSError, match=name):
         read_regular(folder / name, 5)
+
+
+def test_a_full_disk_leaves_no_part_of_a_file(folder: Path) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"File too large: '.*new'"):
+            write_whole(folder / "new", "x" * 20_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not (folder / "new").exists()

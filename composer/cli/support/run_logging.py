@@ -45,10 +45,13 @@ class RunLog:
 
     def close(self) -> None:
         """Write what waits, as far as possible."""
-        if self._queue is not None:
-            self._queue.close()
-        if self._folder is not None:
-            self._folder.close()
+        if self._queue is None or self._folder is None:
+            return
+        is_complete = self._queue.close() and not self._queue.has_dropped
+        if not is_complete:
+            why = "the disk was full or too slow"
+            say(f"warning: lines are missing in the log '{self._folder.path}': {why}")
+        self._folder.close()
 
     def _start(self) -> None:
         self._is_started = True

@@ -16,6 +16,7 @@ from time import monotonic
 from typing import Any
 
 from composer.model import Executable, ExecutableKind, LifecycleKind, LogLevel, Node
+from composer.regular_files import write_whole
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
@@ -215,7 +216,7 @@ class ExecutableNode(OutsideNode):
         if not text:
             return command
         path = self._children.prepare() / f"{self._logger}.yaml"
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text)
         return replace(command, words=(*command.words, "--params-file", str(path)))
 
     def _check_names_later(self, child: Child) -> None:

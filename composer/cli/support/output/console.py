@@ -130,6 +130,11 @@ class OutputQueue:
                 break
         return not self._thread.is_alive()
 
+    @property
+    def has_dropped(self) -> bool:
+        """Whether lines are missing that no note in the output reports."""
+        return self._dropped_lines > 0
+
     def _wake(self) -> None:
         self._is_idle = False
         self._wakeup.release()
