@@ -1,5 +1,11 @@
 """Which requests are allowed: the token, and the Host and Origin of requests.
 
+A browser exchanges the token for a cookie and a key. Browsers send cookies to all ports of a
+computer, so servers of other users may receive it: with the cookie alone, there is only the page,
+which contains nothing of this user. Its scripts keep the key where only pages of the same port can
+read it, and open the WebSocket with it. Both are derived from the token: a page is connected again
+to the next dashboard with the same token, and both are worthless for any other.
+
 A page of another site can send requests to this server through the browser of its visitor. It does
 not know the token, the cookie is not sent with its requests (SameSite=Strict), and its requests are
 refused by their Origin. A site that rebinds its own name to this address (DNS rebinding) is refused
@@ -8,6 +14,7 @@ by the Host.
 
 from __future__ import annotations
 
+import hmac
 import ipaddress
 import secrets
 import socket
@@ -56,8 +63,16 @@ class Request:
         authorization = self.headers.get("authorization", "")
         if authorization.lower().startswith(_BEARER):
             return authorization[len(_BEARER) :].strip()
+        return self._in_query("token")
+
+    @property
+    def given_key(self) -> str | None:
+        """The key that a page has got in exchange for the token."""
+        return self._in_query("key")
+
+    def _in_query(self, name: str) -> str | None:
         try:
-            values = parse_qs(self.query, max_num_fields=20).get("token", [])
+            values = parse_qs(self.query, keep_blank_values=True, max_num_fields=20).get(name, [])
         except ValueError:
             return None
         return values[0] if len(values) == 1 else None
@@ -67,7 +82,10 @@ class Access:
     """Decides about requests to the server at ``host`` and ``port``."""
 
     def __init__(self, token: str, host: str, port: int) -> None:
-        self._token = token.encode()
+        self._token = token
+        self._cookie = _derived(token, f"cookie {port}")
+        #: What a page needs to open the WebSocket.
+        self.key = _derived(token, f"key {port}")
         self._is_loopback = is_loopback(host)
         self._port = port
         #: Cookies are shared by all ports of a computer, so the name contains the port.
@@ -76,8 +94,7 @@ class Access:
     @property
     def cookie(self) -> str:
         """The Set-Cookie header for a browser that knows the token."""
-        token = self._token.decode()
-        return f"{self.cookie_name}={token}; HttpOnly; SameSite=Strict; Path=/"
+        return f"{self.cookie_name}={self._cookie}; HttpOnly; SameSite=Strict; Path=/"
 
     def refusal(self, request: Request) -> Refusal | None:
         """Return why a request is refused, or None if it is allowed."""
@@ -89,8 +106,7 @@ class Access:
 
     def is_valid(self, token: str | None) -> bool:
         """Return whether this is the token, in a time that does not depend on the token."""
-        given = (token or "").encode("utf-8", "surrogatepass")
-        return secrets.compare_digest(given, self._token)
+        return _is_same(token, self._token)
 
     def _host_refusal(self, headers: Mapping[str, str]) -> Refusal | None:
         host = headers.get("host", "")
@@ -119,11 +135,14 @@ class Access:
             return None
         if request.given_token is not None:
             return Refusal(401, "the token is not valid: it changes with each start")
-        if self.is_valid(self._cookie_token(request.headers)):
+        key = request.given_key
+        needs_key = request.is_websocket or key is not None
+        has_key = not needs_key or _is_same(key, self.key)
+        if has_key and _is_same(self._given_cookie(request.headers), self._cookie):
             return None
         return Refusal(401, "open the address with the token that 'compose dashboard' printed")
 
-    def _cookie_token(self, headers: Mapping[str, str]) -> str | None:
+    def _given_cookie(self, headers: Mapping[str, str]) -> str | None:
         try:
             cookie = SimpleCookie(headers.get("cookie", "")).get(self.cookie_name)
         except CookieError:
@@ -145,6 +164,15 @@ class Access:
         if is_loopback(name):
             return True
         return not self._is_loopback and (_is_address(name) or name in _own_names())
+
+
+def _derived(token: str, purpose: str) -> str:
+    return hmac.new(token.encode(), purpose.encode(), "sha256").hexdigest()
+
+
+def _is_same(given: str | None, secret: str) -> bool:
+    content = (given or "").encode("utf-8", "surrogatepass")
+    return secrets.compare_digest(content, secret.encode())
 
 
 def new_token() -> str:

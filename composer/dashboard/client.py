@@ -6,6 +6,7 @@ Whatever it sends, it gets an error with a reason, and nothing else is affected.
 from __future__ import annotations
 
 import asyncio
+import logging
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Coroutine
@@ -14,10 +15,14 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
+from composer.characters import escape_line
 from composer.dashboard.context import Dashboard
 from composer.dashboard.feeds import Receiver
+from composer.dashboard.protocol.errors import BadRequestError, RequestError, internal_error
 from composer.dashboard.protocol.outbox import Outbox, Update
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 
+_LOG = logging.getLogger(__name__)
 MAX_PENDING = 16
 #: A program that sends only malformed messages is disconnected.
 _MAX_MALFORMED = 20
@@ -37,6 +42,8 @@ class Client(ABC):
         self._arrived: deque[tuple[Callable[[Update], None], Update]] = deque()
         self._is_woken = False
         self._is_open = True
+        self._repeats = RepeatLimit()
+        self._size = 0  # of the message that is handled
 
     async def run(self) -> None:
         """Serve the program until it leaves."""
@@ -67,6 +74,10 @@ class Client(ABC):
         """Start what a message requests, or answer with an error; return whether it is valid."""
 
     @abstractmethod
+    def _refuse(self, error: RequestError) -> None:
+        """Say why a message is refused."""
+
+    @abstractmethod
     def _end(self) -> None:
         """End all subscriptions."""
 
@@ -92,16 +103,43 @@ class Client(ABC):
             if message["type"] == "websocket.disconnect":
                 return
             text = message.get("text")
-            is_valid = self._take(message.get("bytes") or b"" if text is None else text)
+            is_valid = self._handle(message.get("bytes") or b"" if text is None else text)
             malformed = 0 if is_valid else malformed + 1
             if malformed >= _MAX_MALFORMED or self._outbox.is_full_of_replies:
                 await self._close(POLICY_VIOLATION, "too many requests without sense")
                 return
 
-    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
-        task = self._loop.create_task(coroutine)
+    def _handle(self, message: str | bytes) -> bool:
+        """Start what a message requests; return whether it is valid."""
+        self._size = len(message)
+        try:
+            return self._take(message)
+        except Exception as error:  # of one message, which must not end the connection
+            self._refuse(internal_error("a message", error))
+            return False
+
+    def _log_refused(self, error: RequestError) -> None:
+        """Log a message that makes no sense, in one line."""
+        if isinstance(error, BadRequestError):
+            admission = self._repeats.admit("")
+            if admission is not None:
+                text = escape_line(f"{error!s:.200}")
+                _LOG.warning("a message is refused: %s%s", text, admission.suffix)
+
+    def _spawn(self, run: Callable[[], Coroutine[Any, Any, None]], size: int = 0) -> None:
+        """Run a coroutine that keeps a message of a size. Raises RequestError if that is too much.
+
+        There is always room for a size of 0.
+        """
+        self._outbox.budget.take(size)
+        task = self._loop.create_task(run())
         self._pending.add(task)
-        task.add_done_callback(self._pending.discard)
+
+        def end(_: asyncio.Task[None]) -> None:
+            self._pending.discard(task)
+            self._outbox.budget.give(size)
+
+        task.add_done_callback(end)
 
     def _receiver(self, take: Callable[[Update], None]) -> Receiver:
         """Return a receiver for the thread of feeds; ``take`` gets the updates on this thread."""

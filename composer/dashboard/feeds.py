@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 import time
@@ -11,14 +10,13 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.dashboard.protocol.errors import RequestError, from_ros
+from composer.dashboard.protocol.errors import RequestError, from_ros, internal_error
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
 
-_LOG = logging.getLogger(__name__)
 #: A feed that fails is tried again after this time.
 _RETRY_S = 1.0
 _ALIGNED_S = 1.0
@@ -26,7 +24,6 @@ _ALIGNED_S = 1.0
 _REPORT_GAP_S = 0.2
 #: A feed of reports waits this many periods for the next report.
 _REPORT_PERIODS = 1.5
-_INTERNAL = "an internal error of the dashboard: see its output"
 
 
 class Feed(ABC):
@@ -190,8 +187,7 @@ class Feeds:
         except RosError as error:
             self._fail(running, from_ros(error))
         except Exception as error:  # an unexpected message must not end the other feeds
-            _LOG.exception("the channel %s failed", running.key)
-            self._fail(running, RequestError("internal", f"{_INTERNAL}: {error!r:.200}"))
+            self._fail(running, internal_error(f"the channel {running.key:.200}", error))
 
     def _plan(self, running: RunningFeed, *, has_report: bool) -> None:
         """Set when the next poll is due; after a report, the next report is awaited."""
@@ -229,8 +225,8 @@ class Feeds:
         running.last = None
         try:
             running.feed.close()
-        except Exception:
-            _LOG.exception("the channel %s could not be closed", running.key)
+        except Exception as error:
+            internal_error(f"the end of the channel {running.key:.200}", error)
 
 
 def _next_s(due_s: float, period_s: float) -> float:

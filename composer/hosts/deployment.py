@@ -8,12 +8,14 @@ failure of the network ends nothing.
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import asyncssh
 
@@ -29,6 +31,10 @@ _LONGEST_RETRY_S = 10.0
 #: A process that has run for so long is started again at once.
 _SETTLED_S = 30.0
 _ENDS_WITHIN_S = 20.0
+#: After the second request to end everything.
+_ENDS_AT_ONCE_S = 1.0
+#: Tools that forward signals send a second one along with the terminal's; no user is that fast.
+_SAME_REQUEST_S = 0.1
 #: Exit codes after which a process is not started again: it cannot work.
 _USAGE, _CONFIG = 2, 78
 _FINAL = (_USAGE, _CONFIG, NO_WORKSPACE, NO_SETUP, NO_PYTHON)
@@ -75,11 +81,17 @@ class Deployment:
         self._processes = processes
         self._options = options
         self._is_ending = asyncio.Event()
+        self._is_urgent = asyncio.Event()
+        self._requested_s = math.inf
         self._is_down = asyncio.Event()  # the coordinating process has ended
         self._problem: HostError | None = None
 
     def end(self) -> None:
-        """End everything in order."""
+        """End everything in order; after the second request, at once."""
+        now_s = time.monotonic()
+        if now_s - self._requested_s > _SAME_REQUEST_S:
+            self._is_urgent.set()
+        self._requested_s = min(now_s, self._requested_s)
         self._is_ending.set()
 
     async def run(self, connections: Mapping[str, asyncssh.SSHClientConnection]) -> int:
@@ -95,11 +107,11 @@ class Deployment:
         try:
             code = await self._coordinate()
         finally:
-            self.end()
+            self._is_ending.set()
             self._is_down.set()
-            _, left = await asyncio.wait(serving, timeout=_ENDS_WITHIN_S)
-            for task in left:
-                task.cancel()
+            all_ended = asyncio.gather(*serving, return_exceptions=True)
+            await self._until_urgent(all_ended, _ENDS_WITHIN_S)
+            all_ended.cancel()
             results = await asyncio.gather(*serving, return_exceptions=True)
         if self._problem is not None:
             raise self._problem
@@ -132,7 +144,21 @@ class Deployment:
             )
         stdin.close()  # the guard ends it
         ending.cancel()
+        await self._until_urgent(ended)
+        if not ended.done():
+            process.terminate()  # the guard passes it on
+            await asyncio.wait((ended,), timeout=_ENDS_AT_ONCE_S)
+        if not ended.done():
+            process.kill()
         return await ended
+
+    async def _until_urgent(
+        self, work: asyncio.Future[Any], timeout_s: float | None = None
+    ) -> None:
+        """Wait for ``work``, for a time, and until the second request to end everything."""
+        urgent = asyncio.create_task(self._is_urgent.wait())
+        await asyncio.wait((work, urgent), timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
+        urgent.cancel()
 
     async def _serve(self, host: Host, connection: asyncssh.SSHClientConnection) -> None:
         """Run the processes of one host; connect again whenever the connection is lost."""
@@ -156,11 +182,11 @@ class Deployment:
                 self._options.write(f"{host.name}: connection lost ({reason}); connecting again")
             except HostError as error:
                 self._problem = self._problem or error
-                self.end()
+                self._is_ending.set()
                 await asyncio.gather(*tasks, return_exceptions=True)
                 return
             except Exception:
-                self.end()
+                self._is_ending.set()
                 raise
             else:
                 return

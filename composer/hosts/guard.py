@@ -42,8 +42,8 @@ class Guard:
             os.set_blocking(end, False)
         signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, _ignore)
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda *_: self._end())
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+            signal.signal(number, lambda *_: self._end(again=True))
         self._process = subprocess.Popen(  # noqa: S603 - what this program is for
             command,
             stdin=subprocess.DEVNULL,
@@ -79,7 +79,10 @@ class Guard:
             else:
                 self._end()
 
-    def _end(self) -> None:
+    def _end(self, *, again: bool = False) -> None:
+        """End the command in order; ``again``, it ends at once: compose run takes no time then."""
+        if again and not self._is_asked:
+            self._send(signal.SIGINT)
         if self._is_asked:
             self._is_asked = False
             self._send(signal.SIGINT)

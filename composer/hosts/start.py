@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 
@@ -14,6 +13,7 @@ from composer.hosts.inventory import Question, take_inventory
 from composer.hosts.sync import SyncOptions, copy_project, prepare_workspace
 from composer.model import Host, System
 from composer.runtime.process.addresses import is_this_computer
+from composer.runtime.process.signals import STOP_SIGNALS
 
 
 def remote_processes(system: System) -> tuple[RemoteProcess, ...]:
@@ -43,7 +43,7 @@ def run_on_hosts(
             await compare_all(hosts, connections, question, here)
             deployment = Deployment(processes, options)
             loop = asyncio.get_running_loop()
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            for number in STOP_SIGNALS:
                 loop.add_signal_handler(number, deployment.end)
             try:
                 return await deployment.run(connections)

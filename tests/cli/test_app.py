@@ -12,6 +12,7 @@ import typer
 
 from composer import cli
 from composer.cli.app import application
+from composer.cli.program import INTERNAL
 from composer.cli.support.options import examples
 from tests.cli.compose import compose
 
@@ -211,7 +212,7 @@ def test_an_internal_error_prints_a_traceback_only_on_request(
     monkeypatch.setattr("composer.loading.load_files", fail)
     (tmp_path / "any.yaml").write_text("system: any\n")
     done = compose("validate", str(tmp_path / "any.yaml"))
-    assert done.code == cli.INTERNAL
+    assert done.code == INTERNAL
     assert done.err.startswith("compose: internal error: RuntimeError: out of\\x1b[2J\\npaper\n")
     assert "Traceback" not in done.err
     monkeypatch.setenv("COMPOSE_DEBUG", "1")

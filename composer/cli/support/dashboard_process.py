@@ -55,11 +55,14 @@ class DashboardProcess:
             os.close(writing)
 
     def url(self, within_s: float) -> str | None:
-        """Return the address with the token; None if the dashboard has not started in time."""
-        ready, _, _ = select.select([self._reading], [], [], within_s)
-        if not ready:
-            return None
-        return os.read(self._reading, 4096).decode("ascii", "replace").strip() or None
+        """Return the address with the token; None if the dashboard has not started in time.
+
+        Call it once. It returns as soon as the dashboard ends.
+        """
+        with os.fdopen(self._reading, "rb") as pipe:
+            ready, _, _ = select.select([pipe], [], [], within_s)
+            data = os.read(pipe.fileno(), 4096) if ready else b""
+        return data.decode("ascii", "replace").strip() or None
 
     def stop(self) -> None:
         """End the dashboard."""
@@ -69,7 +72,6 @@ class DashboardProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        os.close(self._reading)
 
 
 def foxglove_line(url: str) -> str:
@@ -97,10 +99,10 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
         url = process.url(_READY_WITHIN_S)
         if url is not None:
             found.append(url)
-        if not in_background:
+        if not in_background and not is_ending.is_set():
             say(address_lines(url) if url else "dashboard: it has not started, see above")
 
-    in_background = is_in_background()
+    in_background, is_ending = is_in_background(), threading.Event()
     thread = threading.Thread(target=announce, name="dashboard", daemon=True)
     thread.start()
 
@@ -111,7 +113,9 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
     try:
         yield address
     finally:
+        is_ending.set()
         process.stop()
+        thread.join(_ENDS_WITHIN_S)
 
 
 def follow_parent() -> int | None:

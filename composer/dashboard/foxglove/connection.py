@@ -18,7 +18,6 @@ from composer.dashboard.foxglove.catalog import (
 )
 from composer.dashboard.foxglove.frames import (
     CDR,
-    ERROR,
     WARNING,
     ClientMessage,
     message_data,
@@ -26,7 +25,7 @@ from composer.dashboard.foxglove.frames import (
     parse_text,
     time_frame,
 )
-from composer.dashboard.foxglove.link import Link, Running, error_text
+from composer.dashboard.foxglove.link import Link, Running
 from composer.dashboard.foxglove.messages import Publications, Subscriptions
 from composer.dashboard.foxglove.requests import Parameters, call_service
 from composer.dashboard.foxglove.schemas import Schemas
@@ -118,7 +117,8 @@ class FoxgloveConnection(Link):
             is_valid = True
             operation(values)
         except RequestError as error:
-            self.say(ERROR, error_text(error))
+            self._log_refused(error)
+            self._refuse(error)
         return is_valid
 
     def _send_info(self) -> None:
@@ -160,6 +160,7 @@ class FoxgloveConnection(Link):
             self.post({"op": "unadvertise", "channelIds": gone})
         if new:
             self.post({"op": "advertise", "channels": [item.as_data() for item in new]})
+        self._unknown &= self._known.unknown.keys()
         for type_name, user in self._known.unknown.items():
             if type_name not in self._unknown:
                 self._unknown.add(type_name)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import struct
 from typing import Any
 
 from composer.dashboard.protocol.errors import BadRequestError
-from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.messages import Values, check_characters, parse_object
 from composer.fast_dataclass import dataclass
 
 #: The names of the protocol, the one that is preferred first.
@@ -84,13 +83,11 @@ def parse_binary(frame: bytes) -> ClientMessage | ServiceCall:
 
 def parse_text(text: str) -> tuple[str, Values]:
     """Return the operation and the keys of a JSON message. Raises BadRequestError."""
-    try:
-        content = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BadRequestError(f"the message is not valid JSON: {error!s:.120}") from error
-    op = content.get("op") if isinstance(content, dict) else None
+    content = parse_object(text)
+    check_characters(text, content)
+    op = content.get("op")
     if not isinstance(op, str):
-        raise BadRequestError("the message is not a JSON object with a string 'op'")
+        raise BadRequestError("the message has no string 'op'")
     return op, Values(content, f"'{op:.40}'")
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import logging
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.dashboard.client import MAX_PENDING, POLICY_VIOLATION, Client
 from composer.dashboard.feeds import Feed, Receiver
-from composer.dashboard.foxglove.frames import WARNING, status
-from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.foxglove.frames import ERROR, WARNING, status
+from composer.dashboard.protocol.errors import RequestError, internal_error
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Outbox, Update
 from composer.fast_dataclass import dataclass
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from composer.remote.session import Deadline
 
 T = TypeVar("T")
-
-_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +54,10 @@ class Link(Client):
             self._outbox.reply(content if isinstance(content, bytes) else to_json(content))
         elif self._is_open:
             self._is_open = False
-            self._spawn(self._close(POLICY_VIOLATION, "messages are not read"))
+            self._spawn(partial(self._close, POLICY_VIOLATION, "messages are not read"))
+
+    def _refuse(self, error: RequestError) -> None:
+        self.say(ERROR, error_text(error))
 
     def say(self, level: int, message: str) -> None:
         """Send a message for the user of the client."""
@@ -102,11 +103,9 @@ class Link(Client):
             except RequestError as error:
                 fail(error)
             except Exception as error:  # the client gets an answer in any case
-                _LOG.exception("a request failed")
-                text = f"an internal error of the dashboard: {error!r:.200}"
-                fail(RequestError("internal", text))
+                fail(internal_error("a request", error))
 
-        self._spawn(answer())
+        self._spawn(answer, self._size)
 
 
 def error_text(error: RequestError) -> str:

@@ -108,9 +108,10 @@ class Publications:
                 raise BadRequestError(f"you have advertised channel {identifier} already")
             if len(self._running) >= _MAX_CHANNELS:
                 raise RequestError("too_many", f"{_MAX_CHANNELS} channels are the limit")
-            feed = PublishedFeed(
-                wanted.text("topic"), wanted.text("schemaName"), wanted.text("encoding")
-            )
+            topic, type_name = wanted.text("topic"), wanted.text("schemaName")
+            budget = self._link.outbox.budget
+            feed = PublishedFeed(topic, type_name, wanted.text("encoding"), budget)
+            budget.take(feed.size)
             running = self._link.start(f"publisher {identifier}", feed, self._link.say_error)
             self._running[identifier] = feed, running
 
@@ -118,9 +119,8 @@ class Publications:
         """Destroy publishers as a message requests. Raises RequestError."""
         for item in values.items("channelIds", _MAX_ITEMS):
             identifier = number(item, "channelIds")
-            _, running = self._find(identifier)
-            del self._running[identifier]
-            self._link.stop(running)
+            self._find(identifier)
+            self._end(identifier)
 
     def publish(self, message: ClientMessage) -> None:
         """Publish a message. Raises RequestError."""
@@ -131,9 +131,14 @@ class Publications:
 
     def end(self) -> None:
         """Destroy all publishers."""
-        for _, running in self._running.values():
-            self._link.stop(running)
-        self._running.clear()
+        for identifier in tuple(self._running):
+            self._end(identifier)
+
+    def _end(self, identifier: int) -> None:
+        feed, running = self._running.pop(identifier)
+        self._link.stop(running)
+        feed.forget()
+        self._link.outbox.budget.give(feed.size)
 
     def _find(self, identifier: int) -> tuple[PublishedFeed, Running]:
         found = self._running.get(identifier)

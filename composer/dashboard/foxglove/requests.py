@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from composer.dashboard.foxglove.catalog import OfferedService
@@ -54,6 +54,10 @@ def call_service(link: Link, call: ServiceCall, services: Mapping[int, OfferedSe
         fail(error)
 
 
+def _size(names: Iterable[str]) -> int:
+    return sum(map(len, names))
+
+
 class Parameters:
     """The parameters of all nodes, for one client."""
 
@@ -84,7 +88,9 @@ class Parameters:
         names = values.texts("parameterNames", _MAX_ITEMS)
         if len(self._names) + len(names) > _MAX_ITEMS:
             raise RequestError("too_many", f"{_MAX_ITEMS} parameters are the limit")
-        self._names.update(names)
+        new = set(names) - self._names
+        self._link.outbox.budget.take(_size(new))
+        self._names |= new
         self._has_all |= not names
         if self._events is None:
             self._events = self._link.start("parameters", ParameterEvents(), self._on_change)
@@ -92,10 +98,10 @@ class Parameters:
     def unsubscribe(self, values: Values) -> None:
         """Send parameters no longer, none at all without names. Raises RequestError."""
         names = values.texts("parameterNames", _MAX_ITEMS)
-        self._names.difference_update(names)
-        if not names:
-            self._names.clear()
-            self._has_all = False
+        gone = self._names & set(names) if names else self._names
+        self._link.outbox.budget.give(_size(gone))
+        self._names -= gone
+        self._has_all &= bool(names)
         if not self._names and not self._has_all:
             self.end()
 

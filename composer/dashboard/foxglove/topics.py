@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.catalog import Channel
 from composer.dashboard.observing.large_messages import LARGE_TYPES
+from composer.dashboard.protocol.budget import Budget
 from composer.dashboard.protocol.errors import BadRequestError, RequestError, from_ros
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
@@ -93,41 +94,66 @@ class PublishedFeed(Feed):
     is_shared = False
     changes = True
 
-    def __init__(self, topic: str, type_name: str, encoding: str) -> None:
-        """Raise BadRequestError for an encoding other than CDR."""
+    def __init__(self, topic: str, type_name: str, encoding: str, budget: Budget) -> None:
+        """Raise BadRequestError for an encoding other than CDR, and for a wrong type."""
         if encoding != "cdr":
             raise BadRequestError(
                 f"the encoding of '{topic:.80}' must be cdr, not '{encoding:.20}'"
             )
         self.topic = topic
-        package, *folder, name = type_name.split("/")
+        package, separator, name = type_name.partition("/")
+        if not package or not separator or not name:
+            raise BadRequestError(
+                f"'schemaName' must be a type such as std_msgs/msg/String, not '{type_name:.80}'"
+            )
         # Some clients write package/Name.
-        self._type_name = f"{package}/msg/{name}" if not folder else type_name
+        self._type_name = type_name if "/" in name else f"{package}/msg/{name}"
+        self._budget = budget
         self._waiting: deque[bytes] = deque()
         self._publisher: SerializedPublisher | None = None
+        self._problem = ""  # why there is no publisher
+
+    @property
+    def size(self) -> int:
+        """The size of its names in bytes."""
+        return len(self.topic) + len(self._type_name)
 
     def put(self, data: bytes) -> None:
-        """Add a message, on any thread. Raises RequestError if too many wait."""
+        """Add a message, on any thread. Raises RequestError if it cannot wait."""
+        if self._problem:
+            raise RequestError("failed", f"'{self.topic:.80}': {self._problem}")
         if len(self._waiting) >= _MAX_WAITING:
-            raise RequestError("busy", f"'{self.topic}': {_MAX_WAITING} messages wait already")
+            raise RequestError("busy", f"'{self.topic:.80}': {_MAX_WAITING} messages wait already")
+        self._budget.take(len(data))
         self._waiting.append(data)
 
+    def forget(self) -> None:
+        """Discard what waits, on any thread."""
+        while self._take() is not None:
+            pass
+
     def start(self, ros: RosGraphSide) -> None:
-        """Create the publisher."""
+        """Create the publisher; what waits is lost if that is not possible."""
         from composer.dashboard.publishing import suitable_profile
         from composer.remote.messages.serialized import SerializedPublisher
 
-        profile = suitable_profile(ros, self.topic)
-        self._publisher = SerializedPublisher(ros.session, self.topic, self._type_name, profile)
+        try:
+            profile = suitable_profile(ros, self.topic)
+            self._publisher = SerializedPublisher(ros.session, self.topic, self._type_name, profile)
+        except Exception as error:
+            self._problem = f"{error!s:.200}"
+            self.forget()
+            raise
+        self._problem = ""
 
     def poll(self) -> Iterator[Update]:
         """Publish what waits; yield errors."""
         from composer.remote.session import RosError
 
         assert self._publisher is not None  # noqa: S101 - set by start
-        while self._waiting:
+        while (data := self._take()) is not None:
             try:
-                self._publisher.publish(self._waiting.popleft())
+                self._publisher.publish(data)
             except RosError as error:
                 failed = from_ros(error)
                 message = to_json({**failed.as_data(), "message": f"'{self.topic}': {failed}"})
@@ -137,3 +163,11 @@ class PublishedFeed(Feed):
         """Destroy the publisher."""
         if self._publisher is not None:
             self._publisher.close()
+
+    def _take(self) -> bytes | None:
+        try:
+            data = self._waiting.popleft()
+        except IndexError:
+            return None
+        self._budget.give(len(data))
+        return data

@@ -17,7 +17,8 @@ export class RequestError extends Error {
 }
 
 /** `onstate` is called with {state: "open" | "waiting" | "refused", retryInMs}. */
-export function createConnection(url, { onhello, onstate }) {
+export function createConnection(key, { onhello, onstate }) {
+  const query = `?key=${encodeURIComponent(key)}`;
   const requests = new Map();
   const subscriptions = new Set();
   const bySub = new Map();
@@ -29,7 +30,7 @@ export function createConnection(url, { onhello, onstate }) {
   const early = [];
 
   function open() {
-    socket = new WebSocket(url);
+    socket = new WebSocket(`ws://${location.host}/ws${query}`);
     socket.binaryType = "arraybuffer";
     socket.addEventListener("message", ({ data }) => {
       if (typeof data === "string") receive(JSON.parse(data));
@@ -87,7 +88,7 @@ export function createConnection(url, { onhello, onstate }) {
   /** A socket does not say why it was refused; a plain request does. */
   async function isRefused() {
     try {
-      const response = await fetch("/page/icon.svg", { cache: "no-store" });
+      const response = await fetch(`/page/icon.svg${query}`, { cache: "no-store" });
       return response.status === 401;
     } catch {
       return false;

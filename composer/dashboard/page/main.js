@@ -3,6 +3,7 @@ import { createConnection } from "./connection.js";
 import { h } from "./dom.js";
 import { keepFocus } from "./focus.js";
 import { createFrame } from "./frame.js";
+import { takeKey } from "./key.js";
 import { createRouter } from "./router.js";
 
 /** View -> its module, loaded when it is first shown; actions are in the view of services. */
@@ -33,7 +34,7 @@ function main() {
   const router = createRouter(show);
   app.go = router.go;
   // First, so that it opens while the frame is made; it calls nothing before that.
-  app.connection = createConnection(`ws://${location.host}/ws`, {
+  app.connection = createConnection(takeKey(), {
     onhello: (hello) => {
       app.hello = hello;
       frame.showHello(hello);

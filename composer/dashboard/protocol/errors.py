@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from typing import TYPE_CHECKING, Any
+
+from composer.characters import escape_line
 
 if TYPE_CHECKING:
     from composer.remote.session import RosError
@@ -39,6 +43,17 @@ def from_ros(error: RosError) -> RequestError:
     names = {kind.__name__ for kind in type(error).__mro__}
     code = next((code for kind, code in _CODES.items() if kind in names), "failed")
     return RequestError(code, str(error), error.hint)
+
+
+def internal_error(what: str, error: Exception) -> RequestError:
+    """Return the error for a defect of the dashboard, and log it.
+
+    That takes one line, as a message may cause it; with COMPOSE_DEBUG, the traceback follows.
+    """
+    trace = error if os.environ.get("COMPOSE_DEBUG") else None
+    text = escape_line(f"{error!r:.200}")
+    logging.getLogger(__name__).error("%s failed: %s", escape_line(what), text, exc_info=trace)
+    return RequestError("internal", f"an internal error of the dashboard: {text}")
 
 
 class BadRequestError(RequestError):

@@ -18,32 +18,55 @@ T = TypeVar("T")
 _EXACT = 2**53
 _TYPE_NAMES = {str: "a string", bool: "true or false", dict: "an object", list: "an array"}
 _MAX_ID = 64
+#: How JSON writes a character beyond 16 bits, with another one after it.
+_SURROGATE = "\\ud"
 
 
 @dataclass(frozen=True, slots=True)
 class ClientRequest:
-    """A request: ``id`` is the browser's, ``op`` what to do, ``values`` everything else."""
+    """A request: ``id`` is the browser's, ``op`` what to do, ``values`` everything else.
+
+    Its characters are those of ``text``.
+    """
 
     id: int | str
     op: str
     values: Mapping[str, Any]
+    text: str
 
 
-def parse_request(text: str) -> ClientRequest:
+def parse_request(text: str | bytes) -> ClientRequest:
     """Return the request in a message of a browser. Raises BadRequestError."""
-    try:
-        content = json.loads(text, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        raise BadRequestError(f"the message is not valid JSON: {error!s:.120}") from error
-    if not isinstance(content, dict):
-        raise BadRequestError("the message is not a JSON object")
+    if isinstance(text, bytes):
+        raise BadRequestError("messages must be text, this one is binary")
+    content = parse_object(text)
     identifier, op = content.pop("id", None), content.pop("op", None)
     is_text = isinstance(identifier, str) and len(identifier) <= _MAX_ID
     if not is_text and type(identifier) is not int:
         raise BadRequestError("'id' must be an integer or a short string")
     if not isinstance(op, str):
         raise BadRequestError("'op' must be a string")
-    return ClientRequest(identifier, op, content)
+    return ClientRequest(identifier, op, content, text)
+
+
+def parse_object(text: str) -> dict[str, Any]:
+    """Return the JSON object in a message. Raises BadRequestError."""
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise BadRequestError(f"the message is not valid JSON: {error!s:.120}") from error
+    if not isinstance(content, dict):
+        raise BadRequestError("the message is not a JSON object")
+    return content
+
+
+def check_characters(text: str, content: Mapping[str, Any]) -> None:
+    """Raise BadRequestError if a text in an object, parsed from ``text``, is not Unicode."""
+    try:
+        if _SURROGATE in text.lower():
+            json.dumps(content, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise BadRequestError("the message has half of a surrogate pair in a text") from error
 
 
 def _refuse_constant(name: str) -> None:
@@ -84,8 +107,8 @@ class Values:
         self._known.append(key)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadRequestError(f"'{key}' must be a number")
-        if not math.isfinite(value) or not low <= value <= high:
-            raise BadRequestError(f"'{key}' must be from {low:g} to {high:g}, not {value:g}")
+        if not low <= value <= high:
+            raise BadRequestError(f"'{key}' must be from {low:g} to {high:g}, not {value!r:.40}")
         return float(value)
 
     def mapping(self, key: str) -> Mapping[str, Any]:

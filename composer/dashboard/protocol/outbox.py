@@ -13,11 +13,12 @@ from collections.abc import Callable
 from dataclasses import field
 from enum import StrEnum
 
+from composer.dashboard.protocol.budget import Budget
+from composer.dashboard.protocol.errors import RequestError
 from composer.fast_dataclass import dataclass
 
-#: Batches of messages that wait for each subscription, and bytes that wait for one browser.
+#: Batches of messages that wait for each subscription.
 MAX_BATCHES = 8
-MAX_BYTES = 16 * 1024 * 1024
 #: Bytes that wait for one subscription: of large messages only the latest are of use.
 MAX_QUEUED_BYTES = 2 * 1024 * 1024
 MAX_REPLIES = 256
@@ -78,20 +79,16 @@ class Outbox:
         self._max_batches = max_batches
         self._subscriptions: dict[int, Waiting] = {}
         self._replies: deque[str | bytes] = deque()
-        self._reply_size = 0
+        self._has_lost_replies = False
         self._due: dict[int, None] = {}  # subscriptions with updates, in the order of their turns
-        self._size = 0
+        #: The bytes of what waits here, and of all else that is kept for this browser.
+        self.budget = Budget()
         self._ready = asyncio.Event()
-
-    @property
-    def size(self) -> int:
-        """The number of bytes that wait."""
-        return self._size
 
     @property
     def is_full_of_replies(self) -> bool:
         """Whether the browser sends requests without reading the replies."""
-        return len(self._replies) >= MAX_REPLIES or self._reply_size >= MAX_BYTES
+        return self._has_lost_replies or len(self._replies) >= MAX_REPLIES
 
     def dropped(self, subscription: int) -> int:
         """Return how many messages of a subscription were dropped."""
@@ -107,13 +104,16 @@ class Outbox:
         waiting = self._subscriptions.pop(subscription, None)
         self._due.pop(subscription, None)
         if waiting is not None:
-            self._size -= waiting.size
+            self.budget.give(waiting.size)
 
     def reply(self, message: str | bytes) -> None:
         """Add the response to a request; responses are sent before updates."""
+        try:
+            self.budget.take(len(message))
+        except RequestError:
+            self._has_lost_replies = True
+            return
         self._replies.append(message)
-        self._size += len(message)
-        self._reply_size += len(message)
         self._ready.set()
 
     def put(self, subscription: int, update: Update) -> None:
@@ -126,15 +126,16 @@ class Outbox:
         while waiting.updates and (
             len(waiting.updates) >= limit
             or waiting.size + update.size > MAX_QUEUED_BYTES
-            or self._size + update.size > MAX_BYTES
+            or not self.budget.has(update.size)
         ):
             self._drop_oldest(waiting)
-        if self._size + update.size > MAX_BYTES:
+        try:
+            self.budget.take(update.size)
+        except RequestError:
             waiting.dropped += update.count
             return
         waiting.updates.append(update)
         waiting.size += update.size
-        self._size += update.size
         self._due[subscription] = None
         self._ready.set()
 
@@ -145,15 +146,14 @@ class Outbox:
             await self._ready.wait()
         if self._replies:
             reply = self._replies.popleft()
-            self._size -= len(reply)
-            self._reply_size -= len(reply)
+            self.budget.give(len(reply))
             return reply
         subscription = next(iter(self._due))
         del self._due[subscription]
         waiting = self._subscriptions[subscription]
         update = waiting.updates.popleft()
         waiting.size -= update.size
-        self._size -= update.size
+        self.budget.give(update.size)
         if waiting.updates:
             self._due[subscription] = None  # at the end: every subscription gets its turn
         return self._compose(subscription, waiting, update)
@@ -162,7 +162,7 @@ class Outbox:
         update = waiting.updates.popleft()
         waiting.dropped += update.count
         waiting.size -= update.size
-        self._size -= update.size
+        self.budget.give(update.size)
 
 
 def _message(subscription: int, waiting: Waiting, update: Update) -> str | bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import html
 import mimetypes
 from collections.abc import Awaitable, Callable, MutableMapping
@@ -22,6 +23,7 @@ from composer.dashboard.client import Client
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
+from composer.dashboard.protocol.budget import MAX_CONNECTIONS
 from composer.dashboard.web.connection import Connection
 from composer.dashboard.web.page_modules import file_of_page, index_of, style_sheet
 from composer.dashboard.web.preparation import prepare
@@ -30,8 +32,6 @@ Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 AsgiSend = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
-#: Browsers and programs that are connected at the same time.
-MAX_CONNECTIONS = 32
 _TRY_AGAIN_LATER = 1013
 _METHODS = ("GET", "HEAD")
 #: The addresses of the views; the page reads the rest of the path.
@@ -105,10 +105,13 @@ class AccessCheck:
         self._access = dashboard.access
         self._connections = connections
 
-    async def close(self) -> None:
-        """Close all connections."""
-        for connection in tuple(self._connections):
-            await connection.close()
+    async def close(self, within_s: float) -> None:
+        """Close all connections; those that do not read do not get to know why."""
+        closing = [asyncio.create_task(item.close()) for item in self._connections]
+        if closing:
+            _, waiting = await asyncio.wait(closing, timeout=within_s)
+            for task in waiting:
+                task.cancel()
 
     async def __call__(self, scope: Scope, receive: AsgiReceive, send: AsgiSend) -> None:
         """Answer one request."""
@@ -150,7 +153,7 @@ class AccessCheck:
             return refusal_page(Refusal(405, "only GET is possible"))
         if "token=" in request.query:
             # The address without the token, so that it is not in the history of the browser.
-            location = "/" + quote(request.path.lstrip("/"))
+            location = f"/{quote(request.path.lstrip('/'))}#key={self._access.key}"
             headers = {"Location": location, "Set-Cookie": self._access.cookie}
             return Response(status_code=303, headers=headers)
         return None

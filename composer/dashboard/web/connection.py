@@ -6,8 +6,8 @@ nothing else is affected.
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any
 
 from starlette.websockets import WebSocket
@@ -18,8 +18,14 @@ from composer.dashboard.client import MAX_PENDING, Client
 from composer.dashboard.context import Dashboard
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.operations import OPERATIONS
-from composer.dashboard.protocol.errors import BadRequestError, RequestError
-from composer.dashboard.protocol.messages import ClientRequest, Values, parse_request, to_json
+from composer.dashboard.protocol.errors import BadRequestError, RequestError, internal_error
+from composer.dashboard.protocol.messages import (
+    ClientRequest,
+    Values,
+    check_characters,
+    parse_request,
+    to_json,
+)
 from composer.dashboard.protocol.outbox import Outbox
 from composer.diagnostics import nearest
 from composer.fast_dataclass import dataclass
@@ -35,6 +41,7 @@ class _Subscription:
     key: str
     receiver: Receiver
     feed: Feed
+    size: int
 
 
 class Connection(Client):
@@ -55,17 +62,22 @@ class Connection(Client):
     def _take(self, message: str | bytes) -> bool:
         identifier: int | str | None = None
         try:
-            if isinstance(message, bytes):
-                raise BadRequestError("messages must be text, this one is binary")
             request = parse_request(message)
             identifier = request.id
             self._start(request)
         except RequestError as error:
-            self._outbox.reply(to_json({"id": identifier, "error": error.as_data()}))
+            self._log_refused(error)
+            self._refuse(error, identifier)
+        except Exception as error:  # the browser gets an answer in any case
+            self._refuse(internal_error("a request", error), identifier)
         return identifier is not None
+
+    def _refuse(self, error: RequestError, identifier: int | str | None = None) -> None:
+        self._outbox.reply(to_json({"id": identifier, "error": error.as_data()}))
 
     def _start(self, request: ClientRequest) -> None:
         """Answer a request at once, or start the task that does. Raises RequestError."""
+        check_characters(request.text, {"op": request.op, **request.values})
         values = Values(request.values, f"'{request.op:.40}'")
         if request.op in _OWN:
             result = getattr(self, f"_on_{request.op}")(values)
@@ -82,22 +94,22 @@ class Connection(Client):
             raise RequestError("busy", f"{MAX_PENDING} of your requests are running already")
         call, timeout_s = operation.prepare(values, self._dashboard)
         values.end()
-        self._spawn(self._call(request, self._dashboard.ros.call(call, timeout_s)))
+        run = partial(self._dashboard.ros.call, call, timeout_s)
+        self._spawn(partial(self._call, request, run), self._size)
 
     def _check_may_change(self, what: str) -> None:
         if self._dashboard.options.read_only:
             raise RequestError("read_only", f"'{what}' is not possible: the dashboard is read-only")
 
-    async def _call(self, request: ClientRequest, call: Coroutine[Any, Any, Any]) -> None:
+    async def _call(
+        self, request: ClientRequest, run: Callable[[], Coroutine[Any, Any, Any]]
+    ) -> None:
         try:
-            self._reply(request, await call)
+            self._reply(request, await run())
         except RequestError as error:
-            self._outbox.reply(to_json({"id": request.id, "error": error.as_data()}))
+            self._refuse(error, request.id)
         except Exception as error:  # the browser gets an answer in any case
-            logging.getLogger(__name__).exception("the request '%s' failed", request.op)
-            text = f"an internal error of the dashboard: {error!r:.200}"
-            data = RequestError("internal", text).as_data()
-            self._outbox.reply(to_json({"id": request.id, "error": data}))
+            self._refuse(internal_error(f"the request '{request.op}'", error), request.id)
 
     def _reply(self, request: ClientRequest, result: Any) -> None:
         self._outbox.reply(to_json({"id": request.id, "ok": result}))
@@ -113,8 +125,8 @@ class Connection(Client):
             raise RequestError("too_many", f"{_MAX_SUBSCRIPTIONS} subscriptions are the limit")
         feed = self._feed(channel, parameters)
         number, self._next_subscription = self._next_subscription, self._next_subscription + 1
-        self._outbox.open(number, channel, feed.delivery)
         self._subscriptions[number] = self._attach(number, channel, parameters, feed)
+        self._outbox.open(number, channel, feed.delivery)
         return {"sub": number}
 
     def _on_update(self, values: Values) -> dict[str, Any]:
@@ -124,7 +136,7 @@ class Connection(Client):
         feed = self._feed(before.channel, parameters)
         # The new feed is attached first, so that shared subscriptions continue.
         self._subscriptions[number] = self._attach(number, before.channel, parameters, feed)
-        self._dashboard.feeds.remove(before.key, before.receiver)
+        self._leave(before)
         return {}
 
     def _on_unsubscribe(self, values: Values) -> dict[str, Any]:
@@ -166,11 +178,17 @@ class Connection(Client):
         key = f"{channel} {to_json(parameters)}"
         if not feed.is_shared:
             key = f"{key} {id(self)} {number}"
+        size = 2 * len(key)  # its parameters are kept as values and as text
+        self._outbox.budget.take(size)
         receive = self._receiver(lambda update: self._outbox.put(number, update))
         self._dashboard.feeds.add(key, feed, receive)
-        return _Subscription(channel, key, receive, feed)
+        return _Subscription(channel, key, receive, feed, size)
 
     def _unsubscribe(self, number: int) -> None:
         subscription = self._subscriptions.pop(number)
         self._outbox.close(number)
+        self._leave(subscription)
+
+    def _leave(self, subscription: _Subscription) -> None:
         self._dashboard.feeds.remove(subscription.key, subscription.receiver)
+        self._outbox.budget.give(subscription.size)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import os
 import signal
 import socket
 from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
+from types import FrameType
 from typing import Any
 
 import uvicorn
@@ -21,13 +23,13 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.exceptions import InvalidState
 
 from composer.dashboard.access import Refusal
+from composer.dashboard.protocol.budget import MAX_MESSAGE
 from composer.dashboard.web.app import AccessCheck, refusal_page, security_headers
+from composer.runtime.process.signals import STOP_SIGNALS
 
 DEFAULT_PORT = 8800
 #: Ports that are tried if the default one is in use.
 _PORTS = 100
-#: Largest message of a browser, in bytes.
-MAX_MESSAGE = 1024 * 1024
 #: Connections, most of which are free again after the time that each has for a request.
 MAX_OPEN = 160
 REQUEST_WITHIN_S = 5.0
@@ -39,7 +41,12 @@ _MAX_HEADERS = 16 * 1024
 _PING_S = 20.0
 #: A browser that has not confirmed the end of its connection after this time is disconnected.
 _CLOSED_WITHIN_S = 2.0
+#: At the end, for all connections together; then they are aborted.
+_ENDED_WITHIN_S = 0.5
 _END_S = 1
+#: Tools that forward signals send a second one along with the terminal's; no user is that fast.
+_SAME_REQUEST_S = 0.1
+_SIGNAL_EXIT = 128
 
 
 class PortInUseError(Exception):
@@ -73,7 +80,7 @@ def listen(host: str, port: int | None) -> socket.socket:
 
 
 def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], None]) -> None:
-    """Serve until SIGINT, SIGTERM or SIGHUP."""
+    """Serve until a signal. A second one ends the process at once, also while it is ending."""
     config = uvicorn.Config(
         app,
         http=_GuardedProtocol,
@@ -96,7 +103,15 @@ def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], Non
         log_level="error",
     )
     server = _Server(config, app, on_ready)
-    asyncio.run(server.serve(sockets=[listening]))
+    try:
+        asyncio.run(server.serve(sockets=[listening]))
+    finally:
+        for number in STOP_SIGNALS:  # uvicorn has set them back
+            signal.signal(number, _end_at_once)
+
+
+def _end_at_once(number: int, _: FrameType | None) -> None:
+    os._exit(_SIGNAL_EXIT + number)
 
 
 class _Server(uvicorn.Server):
@@ -113,12 +128,19 @@ class _Server(uvicorn.Server):
         """Wait for a signal, then close all connections."""
         ended = asyncio.Event()
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in STOP_SIGNALS:
             loop.add_signal_handler(number, ended.set)
         self._on_ready()
         await ended.wait()
         self.should_exit = True
-        await self._app.close()
+        await asyncio.sleep(_SAME_REQUEST_S)
+        for number in STOP_SIGNALS:
+            loop.remove_signal_handler(number)
+            signal.signal(number, _end_at_once)
+        await self._app.close(_ENDED_WITHIN_S)
+        for connection in tuple(self.server_state.connections):
+            if connection.transport.get_write_buffer_size():
+                connection.transport.abort()
 
 
 class _WebSocketProtocol(WebSocketsSansIOProtocol):

@@ -93,7 +93,8 @@ class Launcher:
         self._wakeup_writer = wakeup
         signal.set_wakeup_fd(wakeup.fileno(), warn_on_full_buffer=False)
         # Handlers, not SIG_IGN: exec resets handlers, so that children start with the defaults.
-        for number in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        stop = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+        for number in (signal.SIGCHLD, *stop):
             signal.signal(number, _ignore)
 
     def run(self) -> None:

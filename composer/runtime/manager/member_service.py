@@ -50,7 +50,7 @@ class MemberCallbacks:
     ``publish_states()`` is called once nodes are shut down: the coordinating process waits for
     their last counters. ``expect_end()`` is called if the process ends after the steps of a
     request. ``keep_goals(text)`` receives the goals of the whole system. ``figures()`` returns the
-    timings of callbacks and chains as text. ``report_key`` is told to processes that ask for it,
+    timings of callbacks and chains as text. ``report_key`` answers processes that ask for it,
     unless it is empty.
     """
 
@@ -111,7 +111,7 @@ class MemberService:
         if PARTICIPANT in values and values[PARTICIPANT].string_value != self._participant:
             return  # for another process of the same name
         if REPORT_KEY in values:
-            self._tell_report_key(reply)
+            self._answer_report_key(reply)
             return
         if GOALS in values:
             self._callbacks.keep_goals(values[GOALS].string_value)
@@ -122,7 +122,7 @@ class MemberService:
             self._callbacks.expect_end()
         self._loop.run_task(self._change_states(values, reply))
 
-    def _tell_report_key(self, reply: Reply) -> None:
+    def _answer_report_key(self, reply: Reply) -> None:
         key = self._callbacks.report_key
         if key:
             result = SetParametersResult(successful=True, reason=key)

@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM and SIGHUP as requests to stop, and a pipe that wakes the main thread."""
+"""SIGINT, SIGTERM, SIGHUP and SIGQUIT as requests to stop, and a pipe that wakes the main thread."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ def _milliseconds_until(end_s: float) -> int:
     return math.ceil(min(left_ms, _LONGEST_MS))
 
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+#: SIGQUIT would leave sockets and shared memory behind.
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 @contextmanager
@@ -78,7 +79,7 @@ def stop_signals(
     def handle(number: int, _: FrameType | None) -> None:
         stop(signal.Signals(number).name)
 
-    before = {number: signal.signal(number, handle) for number in _SIGNALS}
+    before = {number: signal.signal(number, handle) for number in STOP_SIGNALS}
     fd_before = signal.set_wakeup_fd(wakeup.fd, warn_on_full_buffer=False)
     try:
         yield

@@ -51,11 +51,13 @@ def get(
 def test_the_token_becomes_a_cookie_and_leaves_the_address(server: Dashboard) -> None:
     address = server.address
     response = get(address, f"/topics?token={address.token}", Cookie="")
-    assert (response.status, response.getheader("Location")) == (303, "/topics")
+    key = address.websocket.partition("?")[2]
+    assert (response.status, response.getheader("Location")) == (303, f"/topics#{key}")
     cookie = response.getheader("Set-Cookie") or ""
     assert cookie == f"{address.cookie}; HttpOnly; SameSite=Strict; Path=/"
+    assert address.token not in cookie
     away = get(address, f"//attacker.example/%0d%0aX:%20y?token={address.token}", Cookie="")
-    assert away.getheader("Location") == "/attacker.example/%0D%0AX%3A%20y"
+    assert away.getheader("Location") == f"/attacker.example/%0D%0AX%3A%20y#{key}"
     assert away.getheader("X") is None
 
 
@@ -148,7 +150,7 @@ def test_websockets_of_others_are_refused(
     with (
         pytest.raises(InvalidStatus) as caught,
         connect(
-            f"ws://{address.host}/ws",
+            address.websocket,
             origin=address.origin if origin == "own" else origin,  # type: ignore[arg-type]
             additional_headers={"Cookie": address.cookie, **headers},
         ),
@@ -287,7 +289,8 @@ def test_the_browser_opens_the_page(
     monkeypatch.setenv("BROWSER", str(program))
     with dashboard("--open") as server:
         address = server.address
-        expected = f"{address.origin}/?token={address.token} 401 {address.origin}/"
+        key = address.websocket.partition("?")[2]
+        expected = f"{address.origin}/?token={address.token} 401 {address.origin}/#{key}"
         wait_until(lambda: seen.exists() and seen.read_text() == expected)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import signal
+import time
 from typing import Any
 
 import uvicorn
@@ -10,6 +12,9 @@ from uvicorn.server import ServerState
 from websockets.asyncio.client import connect
 
 from composer.dashboard.web.server import _WebSocketProtocol
+from tests.ros.dashboard.test_foxglove_limits import raw
+from tests.ros.support.commands import hand_written
+from tests.ros.support.dashboard import PATIENCE_S, Dashboard
 
 
 class EndsMeanwhile(_WebSocketProtocol):
@@ -44,3 +49,17 @@ def test_the_other_side_may_be_closing() -> None:
 
     asyncio.run(close())
     assert not failures
+
+
+def test_a_client_that_does_not_read_delays_no_end(ros_domain_id: int) -> None:
+    with hand_written("hand_written_camera.py"):
+        server = Dashboard()
+        with raw(server.address, max_queue=1, close_timeout=0) as client:
+            client.subscribe("/camera")
+            client.wait(lambda: client.frames)
+            time.sleep(2.0)  # until the buffers of the operating system are full
+            started_s = time.monotonic()
+            server.process.send_signal(signal.SIGINT)
+            assert server.process.wait(timeout=PATIENCE_S) == 0
+            assert time.monotonic() - started_s < 10.0
+            assert "Traceback" not in server.errors()

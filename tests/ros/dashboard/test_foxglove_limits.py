@@ -180,6 +180,12 @@ def test_malformed_messages_are_answered_with_a_reason(server: Dashboard) -> Non
             _advertise(3, "/a", "os/msg/System"),
             _advertise(4, "a b", "std_msgs/msg/String"),
             _advertise(5, "/a", "std_srvs/srv/SetBool"),
+            _advertise(6, "/a", "String"),
+            _advertise(7, "/a", "/String"),
+            _advertise(8, "/a", "std_msgs/"),
+            _advertise(9, "/a\ud800", "std_msgs/msg/String"),
+            '{"op": "advertise", "channels": [{"id": 1' + "0" * 400 + "}]}",
+            {"op": "getParameters", "parameterNames": ["/a\udfff.b"]},
             b"",
             b"\x07abc",
             b"\x01ab",
@@ -198,6 +204,29 @@ def test_malformed_messages_are_answered_with_a_reason(server: Dashboard) -> Non
 def _advertise(identifier: int, topic: str, name: str, encoding: str = "cdr") -> dict[str, Any]:
     channel = {"id": identifier, "topic": topic, "encoding": encoding, "schemaName": name}
     return {"op": "advertise", "channels": [channel]}
+
+
+def test_all_that_waits_for_a_client_has_one_limit_in_bytes(server: Dashboard) -> None:
+    """Messages on channels that fail or that are slow, and names."""
+    before_mb = server.memory_mb()
+    with raw(server.address, close_timeout=0) as client:
+        for number in range(3):
+            assert client.refused(_advertise(number, f"bad name {number}", "std_msgs/msg/String"))
+        with suppress(ConnectionClosed):
+            for _ in range(80):
+                for number in range(3):
+                    client.send(MESSAGE + struct.pack("<I", number) + b"x" * 1_000_000)
+    for content in (
+        lambda n: {"op": "subscribeParameterUpdates", "parameterNames": [f"{n}{'x' * 900_000}"]},
+        lambda n: _advertise(n, f"/t{n}{'x' * 900_000}", "std_msgs/msg/String"),
+    ):
+        with raw(server.address, close_timeout=0) as client, suppress(ConnectionClosed):
+            for number in range(40):
+                client.send(content(number))
+            client.wait(lambda client=client: any("MB are the limit" in x for x in client.said))
+    assert server.memory_mb() < before_mb + 80
+    with raw(server.address) as client:
+        assert client.is_served()
 
 
 def test_malformed_cdr_is_refused(server: Dashboard) -> None:

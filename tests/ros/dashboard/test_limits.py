@@ -11,7 +11,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from composer.dashboard.web.app import MAX_CONNECTIONS
+from composer.dashboard.protocol.budget import MAX_CONNECTIONS
 from composer.dashboard.web.server import BACKLOG, MAX_OPEN
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import (
@@ -56,7 +56,7 @@ def raw(address: Address, text: bytes = b"") -> socket.socket:
 
 def websocket(address: Address) -> ClientConnection:
     return connect(
-        f"ws://{address.host}/ws",
+        address.websocket,
         origin=address.origin,  # type: ignore[arg-type]
         additional_headers={"Cookie": address.cookie},
         compression=None,
@@ -106,7 +106,10 @@ def test_malformed_requests_are_answered_with_a_reason(page: Browser) -> None:
         ("subscribe", {"channel": "nodes", "params": {"a": 1}}),
         ("subscribe", {"channel": "echo", "params": {"topic": 5}}),
         ("subscribe", {"channel": "echo", "params": {"topic": "/a", "max_hz": 1e9}}),
+        ("subscribe", {"channel": "echo", "params": {"topic": "/a", "max_hz": 10**400}}),
         ("subscribe", {"channel": "graph", "params": {"view": "x"}}),
+        ("publish", {"topic": "/a\ud800", "type": "std_msgs/msg/String", "message": {}}),
+        ("subscribe", {"channel": "echo", "params": {"topic": "/\ud800"}}),
         ("unsubscribe", {"sub": 99}),
         ("update", {"sub": "x", "params": {}}),
         ("cancel", {"sub": [1]}),
@@ -148,7 +151,7 @@ def test_large_messages_end_only_their_connection(server: Dashboard, page: Brows
 
 def handshake(address: Address) -> bytes:
     lines = (
-        "GET /ws HTTP/1.1",
+        f"GET {address.websocket.partition(address.host)[2]} HTTP/1.1",
         f"Host: {address.host}",
         f"Origin: {address.origin}",
         f"Cookie: {address.cookie}",

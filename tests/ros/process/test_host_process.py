@@ -15,6 +15,7 @@ import pytest
 
 from composer.resources import systems_folder
 from composer.runtime.middleware.shared_memory import SHARED_MEMORY
+from composer.runtime.process.instance_lock import socket_path
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import end_limit_s
 
@@ -80,7 +81,7 @@ def pipeline() -> Path:
     return systems_folder() / "pipeline.yaml"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT])
 def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Signals) -> None:
     with compose_run(tmp_path, pipeline()) as run:
         run.wait_for("3 of 3 nodes active")
@@ -91,6 +92,9 @@ def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Sign
     assert took_s < end_limit_s()
     assert f"shutting down: {number.name}" in text
     assert "Traceback" not in text
+    path = socket_path("/pipeline")
+    assert path is not None
+    assert not path.exists()
     order = [
         "/control/motor_controller finalized",
         "/planning/planner finalized",

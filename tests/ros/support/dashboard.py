@@ -7,7 +7,9 @@ import re
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
+from functools import cached_property
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -30,7 +32,26 @@ class Address:
         self.host, self.token = found[1], found[2]
         self.port = urlsplit(f"//{self.host}").port or 0
         self.origin = f"http://{self.host}"
-        self.cookie = f"compose_dashboard_{self.port}={self.token}"
+
+    @cached_property
+    def _exchanged(self) -> tuple[str, str]:
+        """What a browser gets for the token."""
+        connection = HTTPConnection(self.host, timeout=PATIENCE_S)
+        with closing(connection):
+            connection.request("GET", f"/?token={self.token}")
+            response = connection.getresponse()
+        cookie = (response.getheader("Set-Cookie") or "").partition(";")[0]
+        return cookie, (response.getheader("Location") or "").partition("#key=")[2]
+
+    @property
+    def cookie(self) -> str:
+        """The cookie of a browser that has shown the token."""
+        return self._exchanged[0]
+
+    @property
+    def websocket(self) -> str:
+        """The address of the WebSocket, as the page opens it."""
+        return f"ws://{self.host}/ws?key={self._exchanged[1]}"
 
 
 class Dashboard:
@@ -87,7 +108,7 @@ class Browser:
     def __init__(self, address: Address) -> None:
         self._stack = ExitStack()
         opening = connect(
-            f"ws://{address.host}/ws",
+            address.websocket,
             origin=address.origin,  # type: ignore[arg-type]
             additional_headers={"Cookie": address.cookie},
             max_size=None,

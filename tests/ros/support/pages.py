@@ -36,6 +36,8 @@ def allowed(browser: Browser, address: Address) -> Iterator[BrowserContext]:
     with _new_context(browser, address, {}) as context:
         name, _, value = address.cookie.partition("=")
         context.add_cookies([{"name": name, "value": value, "url": address.origin}])
+        key = address.websocket.partition("=")[2]
+        context.add_init_script(f"localStorage.setItem('key', '{key}')")
         yield context
 
 

@@ -16,15 +16,18 @@ from composer.dashboard.access import (
 )
 
 TOKEN = "correct-horse-battery-staple"
-COOKIE = f"compose_dashboard_8800={TOKEN}"
 OWN = "127.0.0.1:8800"
 LOCAL = Access(TOKEN, "127.0.0.1", 8800)
 PUBLIC = Access(TOKEN, "0.0.0.0", 8800)
+OTHER = Access(TOKEN, "127.0.0.1", 8801)
+COOKIE = LOCAL.cookie.partition(";")[0]
 
 
 def status(access: Access = LOCAL, *, query: str = "", ws: bool = False, **headers: str) -> int:
     """Return the status of a request; a header given as empty text is not sent."""
-    given = {"host": OWN, "cookie": COOKIE, **headers}
+    given = {"host": OWN, "cookie": access.cookie.partition(";")[0], **headers}
+    if ws and not query:
+        query = f"key={access.key}"
     named = {name.replace("_", "-"): value for name, value in given.items() if value}
     refusal = access.refusal(Request("/", query, named, is_websocket=ws))
     return 200 if refusal is None else refusal.status
@@ -36,7 +39,8 @@ def status(access: Access = LOCAL, *, query: str = "", ws: bool = False, **heade
         ({}, 200),
         ({"cookie": ""}, 401),
         ({"cookie": "compose_dashboard_8800=wrong"}, 401),
-        ({"cookie": f"compose_dashboard_8801={TOKEN}"}, 401),  # of the dashboard at another port
+        ({"cookie": COOKIE.replace("8800", "8801")}, 401),  # of the dashboard at another port
+        ({"cookie": f"compose_dashboard_8800={TOKEN}"}, 401),
         ({"cookie": f"other=1; {COOKIE}; last=2"}, 200),
         ({"cookie": "\x00;;;=;"}, 401),
         ({"cookie": "", "authorization": f"Bearer {TOKEN}"}, 200),
@@ -117,7 +121,17 @@ def test_a_program_that_knows_the_token_needs_no_origin() -> None:
 
 
 def test_the_cookie_is_not_sent_for_other_sites_nor_read_by_scripts() -> None:
-    assert LOCAL.cookie == f"{COOKIE}; HttpOnly; SameSite=Strict; Path=/"
+    assert LOCAL.cookie.endswith("; HttpOnly; SameSite=Strict; Path=/")
+    assert TOKEN not in LOCAL.cookie
+
+
+def test_the_cookie_alone_opens_no_websocket() -> None:
+    """Browsers send it to the servers of other users on this computer as well."""
+    for query in ("key=", "key=wrong", f"key={OTHER.key}", f"key={LOCAL.key}&key={LOCAL.key}"):
+        assert status(ws=True, query=query, origin=f"http://{OWN}") == 401
+    assert status(query="key=wrong") == 401  # how the page learns that its key is old
+    assert status(ws=True, cookie="", origin=f"http://{OWN}") == 401
+    assert status(ws=True, origin=f"http://{OWN}") == 200
 
 
 def test_tokens_are_random_and_long() -> None:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.dashboard.protocol.outbox import MAX_BATCHES, MAX_BYTES, Delivery, Outbox, Update
+from composer.dashboard.protocol.budget import CONNECTION_BYTES
+from composer.dashboard.protocol.outbox import MAX_BATCHES, Delivery, Outbox, Update
 
 
 def next_message(outbox: Outbox) -> str | bytes:
@@ -36,7 +37,7 @@ def test_a_state_is_replaced_by_a_newer_one() -> None:
         outbox.put(1, Update(str(number)))
     expected = {"sub": 1, "seq": 0, "dropped": 99, "channel": "nodes", "data": 99}
     assert received(outbox) == expected
-    assert outbox.size == 0
+    assert outbox.budget.used == 0
 
 
 def test_messages_wait_in_order_and_the_oldest_are_dropped() -> None:
@@ -70,7 +71,7 @@ def test_nothing_is_kept_for_a_closed_subscription() -> None:
     outbox.put(1, Update("2"))
     outbox.reply("{}")
     assert received(outbox) == {}
-    assert outbox.size == 0
+    assert outbox.budget.used == 0
 
 
 def test_a_picture_has_its_header_in_front() -> None:
@@ -87,7 +88,8 @@ def test_a_picture_has_its_header_in_front() -> None:
 
 @given(
     st.lists(
-        st.tuples(st.integers(1, 5), st.integers(0, MAX_BYTES // 3), st.booleans()), max_size=60
+        st.tuples(st.integers(1, 5), st.integers(0, CONNECTION_BYTES // 3), st.booleans()),
+        max_size=60,
     )
 )
 def test_the_size_has_a_limit_and_every_message_is_counted(
@@ -96,15 +98,23 @@ def test_the_size_has_a_limit_and_every_message_is_counted(
     outbox = Outbox()
     for number in range(1, 6):
         outbox.open(number, "echo", Delivery.QUEUE if number % 2 else Delivery.LATEST)
-    content = bytes(MAX_BYTES // 3)
+    content = bytes(CONNECTION_BYTES // 3)
     put, taken = 0, 0
     for number, size, is_taken in updates:
         outbox.put(number, Update(content[:size], header="{}"))
         put += 1
-        assert outbox.size <= MAX_BYTES
-        if is_taken and outbox.size:
+        assert outbox.budget.used <= CONNECTION_BYTES
+        if is_taken and outbox.budget.used:
             next_message(outbox)
             taken += 1
     waiting = sum(len(item.updates) for item in outbox._subscriptions.values())
     dropped = sum(item.dropped for item in outbox._subscriptions.values())
     assert put == taken + waiting + dropped
+
+
+def test_replies_that_are_not_read_are_limited_in_bytes() -> None:
+    outbox = Outbox()
+    for _ in range(20):
+        outbox.reply("x" * 1_000_000)
+    assert outbox.is_full_of_replies
+    assert outbox.budget.used <= CONNECTION_BYTES

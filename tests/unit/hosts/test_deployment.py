@@ -28,9 +28,25 @@ def deployment(folder: Path, write: Callable[[str], None]) -> tuple[Deployment, 
     host = Host(located("jetson"), SPAN, located("10.0.0.5"), workspace=located("~/robot"))
     process = Process(located("vision"), SPAN, host=host.name)
     item = RemoteProcess(process, host)
-    wait = ("/bin/sh", "-c", "sleep 60", "--")
+    wait = ("/bin/sh", "-c", "trap '' INT; exec sleep 60", "--")
     options = DeploymentOptions(folder, "robot.yaml", (), wait, write, lambda *_: None)
     return Deployment([item], options), item
+
+
+def test_the_second_request_ends_everything_at_once(tmp_path: Path) -> None:
+    deployed, _ = deployment(tmp_path, lambda _: None)
+
+    async def silent(*_: object, **__: object) -> None:
+        await asyncio.sleep(60.0)
+
+    async def run() -> None:
+        connections: Any = {"jetson": SimpleNamespace(create_process=silent, abort=lambda: None)}
+        loop = asyncio.get_running_loop()
+        for delay_s in (0.5, 0.8):
+            loop.call_later(delay_s, deployed.end)
+        await asyncio.wait_for(deployed.run(connections), 8.0)
+
+    asyncio.run(run())
 
 
 async def refused(*_: object, **__: object) -> None:
