@@ -13,7 +13,7 @@ import asyncssh
 
 from composer.doctor import CheckResult, Level, error
 from composer.hosts.check import connect_all
-from composer.hosts.connection import HostError, failure_of
+from composer.hosts.connection import HostError, failure_of, run_command, shown
 from composer.hosts.remote_command import python_command
 from composer.model import Host
 
@@ -48,10 +48,10 @@ def read_results(host: Host, text: str) -> Iterable[CheckResult]:
     """Return the results in the JSON of a doctor. Raises ValueError, KeyError, TypeError."""
     return [
         CheckResult(
-            str(item["area"]),
+            shown(str(item["area"])),
             Level(item["level"]),
-            f"{host.name}: {item['message']}",
-            None if item["remedy"] is None else str(item["remedy"]),
+            shown(f"{host.name}: {item['message']}"),
+            None if item["remedy"] is None else shown(str(item["remedy"])),
         )
         for item in json.loads(text)
     ]
@@ -63,14 +63,14 @@ async def _check(
     words = ("-m", "composer", "doctor", "--json", "--timeout", f"{timeout_s:g}", "--", str(system))
     command = python_command(host, words, os.environ)
     try:
-        done = await connection.run(command, timeout=timeout_s + _STARTS_WITHIN_S)
-        output, errors = str(done.stdout or ""), str(done.stderr or "")
-        if done.exit_status not in _REPORTED or not output.startswith("["):
-            raise failure_of(host, done.exit_status, output + errors)
-        return read_results(host, output)
+        within_s = timeout_s + _STARTS_WITHIN_S
+        done = await run_command(host, connection, command, within_s=within_s)
+        if done.status not in _REPORTED or not done.text.startswith("["):
+            raise failure_of(host, done.status, done.text + done.errors)
+        return read_results(host, done.text)
     except HostError as problem:
         remedy = problem.hint or f"run 'compose doctor {system}' there"
         return [error(AREA, str(problem), remedy)]
-    except (asyncssh.Error, OSError, ValueError, KeyError, TypeError) as problem:
-        message = f"{host.name} ({host.login}): the doctor there has not reported: {problem}"
+    except (ValueError, KeyError, TypeError, RecursionError) as problem:
+        message = f"{host.name} ({host.login}): the doctor there has not reported: {problem!s:.200}"
         return [error(AREA, message, f"run 'compose doctor {system}' there")]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import asyncssh
 
 from composer.hosts.comparison import Kind, differences
-from composer.hosts.connection import HostError, connect, failure_of, load_keys
+from composer.hosts.connection import HostError, connect, failure_of, load_keys, run_command, shown
 from composer.hosts.inventory import Inventory, Question, read_answer, written_question
 from composer.hosts.remote_command import python_command
 from composer.model import Host
@@ -71,22 +71,12 @@ async def _ask(
     host: Host, connection: asyncssh.SSHClientConnection, question: Question
 ) -> Inventory:
     command = python_command(host, ("-m", "composer.hosts.inventory"), os.environ)
+    stdin = written_question(question)
+    done = await run_command(host, connection, command, stdin=stdin, within_s=_INVENTORY_WITHIN_S)
+    if done.status != 0:
+        raise failure_of(host, done.status, done.text + done.errors)
     try:
-        process = await connection.create_process(command, errors="replace")
-        with suppress(BrokenPipeError):  # it has ended already; its exit code says why
-            process.stdin.write(written_question(question))
-            process.stdin.write_eof()
-        done = await process.wait(timeout=_INVENTORY_WITHIN_S)
-    except asyncssh.TimeoutError as error:
-        reason = f"has not reported its versions within {_INVENTORY_WITHIN_S:g} s"
-        raise HostError(host, reason) from error
-    except (asyncssh.Error, OSError) as error:
-        raise HostError(host, f"connection lost: {error}") from error
-    output = str(done.stdout or "")
-    if done.exit_status != 0:
-        raise failure_of(host, done.exit_status, output + str(done.stderr or ""))
-    try:
-        return read_answer(output)
+        return read_answer(done.text)
     except ValueError as error:
         raise HostError(
             host,
@@ -99,7 +89,8 @@ def _described(host: Host, here: Inventory, there: Inventory) -> list[tuple[str,
     found = differences(here, there)
     described: list[tuple[str, str | None]] = []
     for kind in Kind:
-        lines = [f"{host.name} ({host.login}): {item.text}" for item in found if item.kind is kind]
+        texts = [shown(item.text) for item in found if item.kind is kind]
+        lines = [f"{host.name} ({host.login}): {text}" for text in texts]
         more = len(lines) - _MOST_LINES
         if more > 0:
             lines[_MOST_LINES:] = [f"{host.name} ({host.login}): and {more} more like this"]

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
+from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import asyncssh
 
+from composer.characters import escape_line
 from composer.hosts.remote_command import NO_PYTHON, NO_SETUP, NO_WORKSPACE, workspace
 from composer.model import Host
 from composer.model.hosts import key_file
 
 _CONNECT_WITHIN_S = 10.0
+_READ = 65_536
 #: A connection over which nothing is received for their product is lost; see ``SILENCE_S``.
 _KEEPALIVE_S, _KEEPALIVE_COUNT = 5.0, 6
 #: A command of a host ends after this time without a word from here.
@@ -20,12 +25,33 @@ _NOT_FOUND = 127
 _INSTALL = "install this version of ros2-composer there, or set 'python' of the host"
 
 
+#: What a host may send back as the output of a command, in characters, and what is shown of it.
+MOST_OUTPUT = 4_000_000
+_LONGEST_REASON = 500
+
+
 class HostError(Exception):
-    """A host cannot be used; the text says why, and ``hint`` what to do."""
+    """A host cannot be used; the text says why, and ``hint`` what to do.
+
+    The text is one line, though a host has sent parts of it.
+    """
 
     def __init__(self, host: Host, reason: str, hint: str | None = None) -> None:
-        super().__init__(f"{host.name} ({host.login}): {reason}")
+        super().__init__(f"{host.name} ({host.login}): {shown(reason)}")
         self.hint = hint
+
+
+class Output(NamedTuple):
+    """What a command has written, and its exit code, if it has one."""
+
+    status: int | None
+    text: str
+    errors: str
+
+
+def shown(text: str) -> str:
+    """Return the beginning of what a host has sent, as a part of one line."""
+    return escape_line(text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]} ...")
 
 
 async def connect(host: Host, root: Path) -> asyncssh.SSHClientConnection:
@@ -62,6 +88,46 @@ async def connect(host: Host, root: Path) -> asyncssh.SSHClientConnection:
     except ValueError as error:  # of a file that asyncssh reads
         reason = f"cannot read the configuration, keys or known hosts of ssh: {error}"
         raise HostError(host, reason, "check the files in ~/.ssh") from error
+
+
+async def run_command(
+    host: Host,
+    connection: asyncssh.SSHClientConnection,
+    command: str,
+    *,
+    stdin: str = "",
+    within_s: float,
+) -> Output:
+    """Run a command there.
+
+    Raises HostError if it takes longer or writes too much, or if the connection is lost.
+    """
+
+    async def read(stream: asyncssh.SSHReader[str]) -> str:
+        parts, size = list[str](), 0
+        while part := await stream.read(_READ):
+            parts.append(part)
+            size += len(part)
+            if size > MOST_OUTPUT:
+                raise HostError(host, f"it sends more than {MOST_OUTPUT // 10**6} MB as an answer")
+        return "".join(parts)
+
+    try:
+        async with asyncio.timeout(within_s):
+            process = await connection.create_process(command, errors="replace")
+            try:
+                with suppress(BrokenPipeError):  # it has ended already; its exit code says why
+                    process.stdin.write(stdin)
+                    process.stdin.write_eof()
+                text, errors = await asyncio.gather(read(process.stdout), read(process.stderr))
+                await process.wait_closed()
+            finally:
+                process.close()
+    except TimeoutError as error:
+        raise HostError(host, f"it has not answered within {within_s:g} s") from error
+    except (asyncssh.Error, OSError) as error:
+        raise HostError(host, f"connection lost: {error}") from error
+    return Output(process.exit_status, text, errors)
 
 
 def _options(host: Host, root: Path) -> asyncssh.SSHClientConnectionOptions:

@@ -20,7 +20,7 @@ from typing import Any
 import asyncssh
 
 from composer.fast_dataclass import dataclass
-from composer.hosts.connection import SILENCE_S, HostError, connect, failure_of
+from composer.hosts.connection import SILENCE_S, HostError, connect, failure_of, shown
 from composer.hosts.remote_command import NO_PYTHON, NO_SETUP, NO_WORKSPACE, python_command
 from composer.model import Host, LogLevel, Process
 from composer.runtime.children.output import OutputLines, parse_line
@@ -179,7 +179,9 @@ class Deployment:
                     )
                     return
                 reason = getattr(error, "reason", "") or str(error) or "it was closed"
-                self._options.write(f"{host.name}: connection lost ({reason}); connecting again")
+                self._options.write(
+                    f"{host.name}: connection lost ({shown(reason)}); connecting again"
+                )
             except HostError as error:
                 self._problem = self._problem or error
                 self._is_ending.set()

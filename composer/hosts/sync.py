@@ -5,19 +5,26 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
+import time
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 import asyncssh
 
 from composer.fast_dataclass import dataclass
-from composer.hosts.connection import HostError
+from composer.hosts.connection import MOST_OUTPUT, HostError, run_command
 from composer.hosts.remote_command import quoted_path, workspace
 from composer.model import Host
 from composer.model.hosts import key_file
 from composer.project.copied_files import MARK
 
-_NOT_OURS, _NOT_WRITABLE = 74, 75
+_NOT_OURS, _NOT_WRITABLE, _NOT_FOUND = 74, 75, 127
+#: How often to look how much a host has written.
+_LOOK_S = 0.5
 _FOLDER = "compose-workspace:"
+_PREPARED_WITHIN_S = 60.0
 _COPY_WITHIN_S = 3600.0
 
 
@@ -57,21 +64,18 @@ async def prepare_workspace(
     lines += [f"cd {folder}", f'[ -e {MARK} ] || [ -z "$(ls -A)" ] || exit {_NOT_OURS}']
     lines += [] if dry_run else [f"touch {MARK}"]
     script = " && ".join(f"{{ {line}; }}" for line in lines) + f" || exit {_NOT_WRITABLE}"
-    try:
-        done = await connection.run(f"exec sh -c {shlex.quote(script)}", errors="replace")
-    except (asyncssh.Error, OSError) as error:
-        raise HostError(host, f"connection lost: {error}") from error
+    command = f"exec sh -c {shlex.quote(script)}"
+    done = await run_command(host, connection, command, within_s=_PREPARED_WITHIN_S)
     name = workspace(host)
-    if done.exit_status == _NOT_OURS:
+    if done.status == _NOT_OURS:
         raise HostError(
             host,
             f"the workspace '{name}' holds other files, which were not copied by 'compose sync'",
             f"choose another folder; or permit it: ssh {host.login} touch {name}/{MARK}",
         )
-    output = str(done.stdout or "")
-    path = folder_in(output)
-    if done.exit_status != 0 or path is None:
-        lines = (output + str(done.stderr or "")).splitlines()
+    path = folder_in(done.text)
+    if done.status != 0 or path is None:
+        lines = (done.text + done.errors).splitlines()
         raise HostError(host, f"cannot write to '{name}': {lines[-1] if lines else 'no reason'}")
     return path
 
@@ -91,26 +95,46 @@ def copy_project(host: Host, target: str, options: SyncOptions) -> tuple[str, ..
     Raises HostError.
     """
     command = rsync_command(host, target, options)
-    try:
-        done = subprocess.run(  # noqa: S603 - the words are checked by the rule invalid-host
-            command,
-            check=False,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            input="".join(f"{pattern}\0" for pattern in options.excluded),
-            timeout=_COPY_WITHIN_S,
+    with TemporaryFile() as written, TemporaryFile() as problems:
+        process = subprocess.Popen(  # noqa: S603 - the words are checked by the rule invalid-host
+            command, stdin=subprocess.PIPE, stdout=written, stderr=problems
         )
-    except subprocess.TimeoutExpired as error:
-        raise HostError(host, f"rsync has not ended within {_COPY_WITHIN_S:g} s") from error
-    if done.returncode != 0:
-        lines = [line for line in done.stderr.splitlines() if line.strip()]
-        reason = lines[0] if lines else f"exit code {done.returncode}"
-        hint = None
-        if "command not found" in done.stderr or done.returncode == 127:
-            hint = "install rsync there"
-        raise HostError(host, f"rsync failed: {reason}", hint)
-    return tuple(line for line in done.stdout.splitlines() if not line.endswith("/"))
+        excluded = "".join(f"{pattern}\0" for pattern in options.excluded).encode()
+        _wait_for_copy(host, process, excluded, problems)
+        problems.seek(0)
+        text = problems.read(MOST_OUTPUT).decode(errors="replace")
+        if process.returncode != 0:
+            lines = [line for line in text.splitlines() if line.strip()]
+            reason = lines[0] if lines else f"exit code {process.returncode}"
+            is_missing = "command not found" in text or process.returncode == _NOT_FOUND
+            hint = "install rsync there" if is_missing else None
+            raise HostError(host, f"rsync failed: {reason}", hint)
+        written.seek(0)
+        copied = written.read().decode(errors="replace").splitlines()
+    return tuple(line for line in copied if not line.endswith("/"))
+
+
+def _wait_for_copy(
+    host: Host, process: subprocess.Popen[bytes], excluded: bytes, problems: IO[bytes]
+) -> None:
+    """Wait for rsync. Raises HostError if it takes too long, or the host writes too much."""
+    end_s = time.monotonic() + _COPY_WITHIN_S
+    given: bytes | None = excluded
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            process.communicate(given, timeout=_LOOK_S)
+            return
+        given = None  # what is left of it is written by the next call
+        is_late = time.monotonic() > end_s
+        if is_late or os.fstat(problems.fileno()).st_size > MOST_OUTPUT:
+            process.kill()
+            process.wait()
+            reason = f"has not ended within {_COPY_WITHIN_S:g} s"
+            if not is_late:
+                reason = (
+                    f"was ended: the host sends more than {MOST_OUTPUT // 10**6} MB of messages"
+                )
+            raise HostError(host, f"rsync {reason}")
 
 
 def rsync_command(host: Host, target: str, options: SyncOptions) -> list[str]:

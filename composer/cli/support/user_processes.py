@@ -21,9 +21,10 @@ _OWN_EXCEPTION = re.compile(r"^composer\.[\w.]+: ")
 def run_user_process(what: str, module: str, arguments: Sequence[str], timeout_s: float) -> str:
     """Run a module of the composer; return what it writes to the file that is its first argument.
 
-    ``what`` describes it in errors, as in "constructing 'driver:Driver'". Raises CommandError with
-    the last line of its output if it fails or takes too long.
+    ``what`` describes it, as in "constructing 'driver:Driver'". The user reads before it runs that
+    it will. Raises CommandError with the last line of its output if it fails or takes too long.
     """
+    say(f"{what}: this runs its code, with all that you may do")
     with tempfile.TemporaryDirectory(prefix="compose-") as folder:
         report = Path(folder, "report")
         process = subprocess.Popen(  # noqa: S603 - a module of this very program
