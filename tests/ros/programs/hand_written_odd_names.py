@@ -14,9 +14,16 @@ from std_srvs.srv import Trigger
 
 from tests.ros.support.raw_rmw import NodeNames, create, own_prefix
 
-TOPICS = ("rt/", "rt/a b", "rt/1st", "rt//twice", "rt/red\x1b[31m")
-SERVICES = ("rq/manager/is_activeRequest", "rq/lab x/manager/is_activeRequest")
-NODES = (("/", ""), ("", ""), ("/lab", "with space"), ("/lab/", "end"), ("/lab\x1b[31m", "red"))
+MARKUP = "'\"><img src=x onerror=window.pwned=1>"
+TOPICS = ("rt/", "rt/a b", "rt/1st", "rt//twice", "rt/red\x1b[31m", f"rt/{MARKUP}")
+SERVICES = (
+    *("rq/manager/is_activeRequest", "rq/lab x/manager/is_activeRequest"),
+    f"rq/{MARKUP}/manager/is_activeRequest",
+)
+NODES = (
+    *(("/", ""), ("", ""), ("/lab", "with space"), ("/lab/", "end"), ("/lab\x1b[31m", "red")),
+    *(("/lab", MARKUP), (f"/{MARKUP}", "node")),
+)
 PERIOD_S = 0.2
 
 
