@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM, SIGHUP and SIGQUIT as requests to stop, and a pipe that wakes the main thread."""
+"""SIGINT, SIGTERM, SIGHUP and SIGQUIT as requests to stop, and a pipe that wakes the main loop."""
 
 from __future__ import annotations
 

@@ -6,8 +6,6 @@ class Robot:
         self.clock.sleep(0.01)
         response = self.clients.reset.call(Trigger.Request())
         self.log.info(response.message)
-        text = self._text()
-        self.log.info(f"{text}")
 
     def on_tock(self):
         self._text()

@@ -171,7 +171,7 @@ LARGE = 3_000_000
         ([FoundParameter("numbers", "integer_array", [1] * 300_000)], ["numbers"]),
         ([FoundParameter("broken", "string", "a\x1b[2J")], ["broken"]),
         ([FoundParameter("broken", "double_array", [1.0, math.nan])], ["broken"]),
-        ([FoundParameter("told", "bool", True, {"description": "\u202e"})], []),
+        ([FoundParameter("described", "bool", True, {"description": "\u202e"})], []),
         ([FoundParameter(f"p{i}", "string", "x" * 9_000) for i in range(300)], None),
     ],
 )

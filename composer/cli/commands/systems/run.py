@@ -39,7 +39,6 @@ from composer.cli.support.ros import (
 )
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.typings import update_typings
-from composer.runtime.process.library_loading import loading_libraries
 
 if TYPE_CHECKING:
     from composer.model import Process, System
@@ -178,6 +177,7 @@ def run(
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
     warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
     import composer.loading  # noqa: F401 - importing its extension modules would wait for the thread
+    from composer.runtime.process.library_loading import loading_libraries
 
     # A process of a system may have environment variables of its own, which have to be set first.
     is_loading_ros = process is None and not dry_run and not wait
