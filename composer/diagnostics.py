@@ -152,11 +152,11 @@ def nearest(name: str, candidates: Iterable[str]) -> str | None:
 
 
 def suggestion(name: str, candidates: Iterable[str], *, limit: int = 8) -> str | None:
-    """Return a hint with the nearest candidate, else a short list of all, else None."""
+    """Return a hint with the nearest candidate, else a list of at most ``limit``, else None."""
     known = vocabulary(tuple(candidates))
     for close in known.close(name):
         return f"did you mean '{close}'?"
-    if not known.names:
+    if not (known.names and limit):
         return None
     listed = ", ".join(map(shown, known.names[:limit]))
     return f"valid here: {listed}" + (", ..." if len(known.names) > limit else "")

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import field
 
-from composer.diagnostics import nearest
+from composer.diagnostics import nearest, suggestion
 from composer.fast_dataclass import dataclass
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.owners import Owners
@@ -362,8 +362,7 @@ def _meant(message: str) -> str | None:
 
 
 def _did_you_mean(name: str, names: Iterable[str]) -> str | None:
-    close = nearest(name, [other for other in names if other != name])
-    return f"did you mean '{close}'?" if close is not None else None
+    return suggestion(name, [other for other in names if other != name], limit=0)
 
 
 def _is_near(name: str, other: str) -> bool:

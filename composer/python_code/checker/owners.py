@@ -7,7 +7,7 @@ from dataclasses import field
 from functools import cached_property
 
 from composer import behavior
-from composer.diagnostics import nearest, suggestion
+from composer.diagnostics import suggestion
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces, Message
 from composer.interfaces.definitions import parts
@@ -44,9 +44,8 @@ class Owner:
             return f"did you mean '{other}'?"
         if name in self.elsewhere:
             return f"'{name}' is in '{self.elsewhere[name]}'"
-        if self.what == "attribute":
-            close = nearest(name, self.members)
-            return f"did you mean '{close}'?" if close is not None else None
+        if self.what == "attribute":  # there are many
+            return suggestion(name, self.members, limit=0)
         return suggestion(name, self.members)
 
 
