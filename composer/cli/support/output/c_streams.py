@@ -1,8 +1,8 @@
 """Output of C code that does not wait until it can be written.
 
 rcl and the middleware print with the GIL or locks of their own held: a wait would stop all nodes.
-Their ``stdout`` and ``stderr`` (FILE) get file descriptors of their own that do not block; what
-cannot be written at once is dropped. The descriptors 1 and 2, which processes that user code starts
+C gets other streams as ``stdout`` and ``stderr``, whose file descriptors do not block; what cannot
+be written at once is dropped. The descriptors 1 and 2, which processes that user code starts
 inherit, remain as they are. See docs/decisions/0043-console-output.md.
 """
 
@@ -11,49 +11,50 @@ from __future__ import annotations
 import ctypes
 import os
 import stat
+import sys
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 
-#: The place of ``_fileno`` in glibc's ``struct _IO_FILE``, which is part of its binary interface:
-#: flags, eleven pointers of buffers, and those of the markers and the next file come first.
-_FILENO_OFFSET = 14 * ctypes.sizeof(ctypes.c_void_p)
 _NAMES = {1: "stdout", 2: "stderr"}
+_LINE_BUFFERED = 1  # _IOLBF of <stdio.h>
 _READ_BYTES = 65_536
 _READ_WITHIN_S = 0.25
 
-#: Receives what C code prints to descriptor 1 or 2, if it cannot be written there directly.
-Forward = Callable[[int, str], object]
-
 
 class CStream:
-    """``stdout`` or ``stderr`` of C code. Without glibc, it cannot be redirected."""
+    """``stdout`` or ``stderr`` of C code: a variable, which programs may assign with glibc."""
 
     def __init__(self, number: int) -> None:
         """Find the stream whose usual descriptor is ``number``."""
         self._libc = ctypes.CDLL(None)
+        self._libc.fdopen.restype = ctypes.c_void_p
         self._file = None
-        with suppress(ValueError):  # no such variable
-            self._file = ctypes.c_void_p(ctypes.c_void_p.in_dll(self._libc, _NAMES[number]).value)
+        if hasattr(self._libc, "gnu_get_libc_version"):  # it is a constant in other C libraries
+            self._file = ctypes.c_void_p.in_dll(self._libc, _NAMES[number])
+        self._usual = None if self._file is None else self._file.value
 
     @property
     def fd(self) -> int | None:
-        """The descriptor that it writes to now; None if there is no such stream."""
+        """The descriptor that it writes to now; None if it cannot be redirected."""
         return None if self._file is None else int(self._libc.fileno(self._file))
 
     def redirect(self, fd: int) -> bool:
-        """Write to ``fd`` from now on; return False if that is not possible."""
-        if self._file is None:
+        """Write to ``fd`` from now on; return False if that is not possible.
+
+        Libraries that copy the variable when they are loaded have to be loaded after that.
+        """
+        stream = None if self._file is None else self._libc.fdopen(fd, b"w")
+        if self._file is None or stream is None:
             return False
-        place = ctypes.c_int.from_address((self._file.value or 0) + _FILENO_OFFSET)
-        if place.value != self.fd:
-            return False
-        self._libc.flockfile(self._file)
         self._libc.fflush(self._file)
-        self._libc["__fpurge"](self._file)  # what the descriptor does not accept
-        place.value = fd
-        self._libc.funlockfile(self._file)
-        return self.fd == fd
+        self._libc.setvbuf(ctypes.c_void_p(stream), None, _LINE_BUFFERED, 0)
+        self._file.value = stream
+        return True
+
+    def restore(self) -> None:
+        """Write to the usual descriptor again."""
+        if self._file is not None:
+            self._file.value = self._usual
 
 
 def crash_fd() -> int:
@@ -70,11 +71,18 @@ def crash_fd() -> int:
 class CStreams:
     """Both streams of C code, redirected to descriptors that do not block."""
 
-    def __init__(self, forward: Forward) -> None:
-        """Redirect streams to pipes and terminals, and let ``forward`` write those to sockets."""
-        self._forward = forward
-        self._redirected: list[int] = []  # the usual descriptors
+    def __init__(self) -> None:
+        self._streams: dict[int, CStream] = {}  # by the usual descriptors
         self._readers: dict[int, threading.Thread] = {}  # those of pipes, by the descriptors
+
+    def redirect(self) -> None:
+        """Redirect streams to pipes and terminals, and forward those to sockets.
+
+        Call it before libraries of ROS are loaded. Another call has no effect.
+        """
+        if self._streams:
+            return
+        self._streams = {number: CStream(number) for number in _NAMES}
         for number in _NAMES:
             with suppress(OSError):  # the terminal of another user
                 self._redirect(number)
@@ -94,8 +102,8 @@ class CStreams:
 
         Their own descriptors stay open, for the last words of a process that hangs.
         """
-        for number in self._redirected:
-            CStream(number).redirect(number)
+        for stream in self._streams.values():
+            stream.restore()
 
     def _redirect(self, number: int) -> None:
         mode = os.fstat(number).st_mode
@@ -107,9 +115,7 @@ class CStreams:
             fd = os.open(f"/proc/self/fd/{number}", flags)
         else:
             return
-        if CStream(number).redirect(fd):
-            self._redirected.append(number)
-        else:
+        if not self._streams[number].redirect(fd):
             os.close(fd)
 
     def _pipe(self, number: int) -> int:
@@ -125,4 +131,8 @@ class CStreams:
     def _read(self, number: int, fd: int) -> None:
         with os.fdopen(fd, "rb", buffering=0) as pipe:
             while data := pipe.read(_READ_BYTES):
-                self._forward(number, data.decode(errors="replace"))
+                (sys.stdout, sys.stderr)[number - 1].write(data.decode(errors="replace"))
+
+
+#: Those of this process.
+C_STREAMS = CStreams()

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Protocol, TextIO
 
-from composer.cli.support.output.c_streams import CStreams
+from composer.cli.support.output.c_streams import C_STREAMS
 from composer.cli.support.output.terminal import WrappedStream
 
 #: Text that may wait; beyond that, the oldest is dropped.
@@ -220,20 +220,19 @@ def queued_output() -> Iterator[None]:
     """
     before = sys.stdout, sys.stderr
     queues: list[OutputQueue] = []
-    now = _queued(*before, queues)
-    c_streams = CStreams(lambda fd, text: now[fd - 1].write(text))
-    sys.stdout, sys.stderr = now
+    sys.stdout, sys.stderr = _queued(*before, queues)
+    C_STREAMS.redirect()
     try:
         os.register_at_fork(after_in_child=partial(_restore, *before))  # it has no thread
         yield
     finally:
-        c_streams.finish()
+        C_STREAMS.finish()
         sys.stdout.flush()
         sys.stderr.flush()
         _restore(*before)
         is_written = [queue.close() for queue in queues]
         if all(is_written):  # otherwise C code would wait at the exit
-            c_streams.restore()
+            C_STREAMS.restore()
 
 
 def _queued(stdout: TextIO, stderr: TextIO, queues: list[OutputQueue]) -> tuple[TextIO, TextIO]:
