@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from rclpy.node import Node
-
 from composer.runtime.middleware.dds_participants import count_participants
 from composer.runtime.process.query_socket import KINDS, GraphView
 from composer.runtime.ros_graph.changes import PolledGraphChanges
@@ -32,31 +30,29 @@ class GraphObserver:
     and if they have been known for a while or nothing changes anymore.
     """
 
-    def __init__(self, node: Node, own_participant: bytes) -> None:
-        """``own_participant`` is the prefix of the ids of the endpoints of ``node``."""
-        self._node = node
+    def __init__(self, changes: PolledGraphChanges, own_participant: bytes) -> None:
+        """``own_participant`` is the prefix of the ids of the endpoints of the node."""
+        self._node = node = changes.node
         self._own_host = own_participant[_HOST]
         self._domain_id = node.context.get_domain_id()
         self._recent: frozenset[bytes] = frozenset()
         self._settled: frozenset[bytes] = frozenset()
-        self._changes = PolledGraphChanges(node)
+        self._changes = changes
         #: The last answer about all endpoints, and the change of the graph before it.
         self._endpoints: dict[str, Any] | None = None
         self._change = -1
         self._noted_change = -1
 
-    def note_participants(self) -> bool:
-        """Note which participants are known; return whether the graph may have changed.
+    def note_participants(self) -> None:
+        """Note which participants are known. Call it every second.
 
-        Call it every second. In a large system, a query takes milliseconds.
+        In a large system, a query takes milliseconds.
         """
         change = self._changes.number()
-        has_changed = change != self._noted_change
         self._settled = self._recent
-        if has_changed:
+        if change != self._noted_change:
             self._noted_change = change
             self._recent = RosGraph(self._node).participants()
-        return has_changed
 
     def view(self) -> GraphView | None:
         """Return the graph, None if it may be incomplete. Any thread may call."""

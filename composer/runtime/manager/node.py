@@ -72,6 +72,7 @@ from composer.runtime.ros.manager_protocol import (
     STATE_QOS,
     STATE_TOPIC,
 )
+from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.transforms.listener import TransformListeners
@@ -181,8 +182,9 @@ class ManagerNode:
             self._add_service(Trigger, command, partial(self._on_command, command))
         self._add_service(Trigger, IS_ACTIVE, self._on_is_active)
         self._add_service(SetParametersAtomically, RESTART, self._on_restart)
+        changes = PolledGraphChanges(self._node)
         self._instances = OtherInstances(
-            self._node,
+            changes,
             self._loop,
             self._instance,
             on_older=host.on_older_instance,
@@ -207,7 +209,7 @@ class ManagerNode:
             )
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
-        self._graph = GraphObserver(self._node, own_participant)
+        self._graph = GraphObserver(changes, own_participant)
         queries = ManagerQueries(
             self._loop,
             self._graph,
@@ -292,7 +294,8 @@ class ManagerNode:
 
     def _tick(self) -> None:
         self._host.update_status()
-        self._instances.check(graph_has_changed=self._graph.note_participants())
+        self._instances.check()
+        self._graph.note_participants()
         if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
             self._publish()
         elif self._member is not None:

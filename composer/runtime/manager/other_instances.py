@@ -25,6 +25,7 @@ from composer.fast_dataclass import dataclass
 from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.loop import Loop
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
+from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.ros_graph.graph import participant, servers_of
 
 #: Discovery of another participant takes up to three seconds; later, this system is not refused.
@@ -78,7 +79,7 @@ class OtherInstances:
 
     def __init__(
         self,
-        node: Node,
+        changes: PolledGraphChanges,
         loop: Loop,
         own: Callable[[], Instance],
         *,
@@ -87,10 +88,11 @@ class OtherInstances:
     ) -> None:
         """Add the service to the manager node, which ``loop`` serves, and start to check.
 
+        ``changes`` are those of the ROS graph that the manager node discovers.
         ``on_older(instance)`` is called while this system starts, for an instance that started
         before; ``on_permanent(instance)`` once for each instance that has passed that time.
         """
-        self._node = node
+        self._node = node = changes.node
         self._loop = loop
         self._own = own
         self._on_older = on_older
@@ -99,6 +101,8 @@ class OtherInstances:
         self._known_name = node.resolve_service_name(f"~/{IS_ACTIVE}")
         self._prefix = node.resolve_service_name(f"~/{INSTANCE_PREFIX}")
         self._calls: dict[str, _Call] = {}
+        self._changes = changes
+        self._checked_change = -1
         self._has_others = False
         self._reported: set[str] = set()  # the services of instances that were reported
         self._add_service()
@@ -109,10 +113,12 @@ class OtherInstances:
         """The prefix of the ids of all endpoints of this process: no other has this service."""
         return b"".join(map(participant, servers_of(self._node, self._name)))
 
-    def check(self, *, graph_has_changed: bool = True) -> None:
+    def check(self) -> None:
         """Look for other instances, and ask those that are not known."""
         self._end_calls()
-        if graph_has_changed:
+        change = self._changes.number()
+        if change != self._checked_change:
+            self._checked_change = change
             # Every manager has this service, and counting is cheaper than listing all services.
             self._has_others = self._node.count_services(self._known_name) > 1
         if not self._has_others:

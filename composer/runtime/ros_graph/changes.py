@@ -83,16 +83,17 @@ class PolledGraphChanges:
     """
 
     def __init__(self, node: Node) -> None:
-        self._node = node
+        #: The node whose view of the graph it is.
+        self.node = node
         self._wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 0, 0, node.context.handle)
         self._number = 0
         self._looking = threading.Lock()
 
     def number(self) -> int:
         """Return another number than the last time if the graph may have changed since then."""
-        with self._looking, self._node.handle:
+        with self._looking, self.node.handle:
             self._wait_set.clear_entities()
-            index = _add_to(self._wait_set, self._node)
+            index = _add_to(self._wait_set, self.node)
             self._wait_set.wait(0)
             if index is None or self._wait_set.is_ready("guard_condition", index):
                 self._number += 1
