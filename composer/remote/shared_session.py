@@ -20,8 +20,8 @@ from composer.fast_dataclass import dataclass
 from composer.qos import QosProfile
 from composer.remote.messages.values import class_of
 from composer.remote.session import Deadline, Session
-from composer.runtime.executors.entities.sources import Taken
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Taken
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.ros_graph.changes import GraphChanges
 

@@ -23,8 +23,8 @@ from rclpy.time import Time
 from rclpy.time_source import CLOCK_TOPIC
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from composer.runtime.executors.entities.sources import Taken
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Taken
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 NANOSECONDS = 1_000_000_000

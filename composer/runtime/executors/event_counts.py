@@ -15,8 +15,8 @@ from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from composer.runtime.executors.entities.readiness import EVENT, Signal, SourceGroup
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.readiness import EVENT, Signal, SourceGroup
 
 
 class EventCounts:

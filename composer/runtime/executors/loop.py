@@ -18,9 +18,11 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future as RclpyFuture
 
 from composer.model import ExecutorKind
-from composer.runtime.executors.entities.actions import ActionSource, contain_exceptions
-from composer.runtime.executors.entities.readiness import EntitySource, SourceGroup
-from composer.runtime.executors.entities.sources import (
+from composer.runtime.executors.actions import ActionSource, contain_exceptions
+from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.readiness import EntitySource, SourceGroup
+from composer.runtime.executors.scheduler import Scheduler
+from composer.runtime.executors.sources import (
     ClientSource,
     Reply,
     ServiceSource,
@@ -29,8 +31,6 @@ from composer.runtime.executors.entities.sources import (
     is_implicit,
     source_of,
 )
-from composer.runtime.executors.exceptions import log_exception
-from composer.runtime.executors.scheduler import Scheduler
 from composer.runtime.executors.tasks import Report, TaskRunner, name_of
 
 

@@ -24,8 +24,8 @@ from rclpy.timer import Timer
 from rclpy.waitable import Waitable
 
 from composer.model import PortKind
-from composer.runtime.executors.entities.sources import Taken, rclpy_callback
 from composer.runtime.executors.futures import Future
+from composer.runtime.executors.sources import Taken, rclpy_callback
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.actions import HostedActionClient, HostedActionServer

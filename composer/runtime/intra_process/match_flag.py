@@ -16,7 +16,7 @@ from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.publisher import Publisher
 
-from composer.runtime.executors.entities.readiness import EVENT
+from composer.runtime.executors.readiness import EVENT
 
 T = TypeVar("T")
 

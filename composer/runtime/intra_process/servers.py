@@ -16,9 +16,9 @@ from unique_identifier_msgs.msg import UUID
 
 from composer.fast_dataclass import dataclass
 from composer.model import Isolation, Port
-from composer.runtime.executors.entities import actions
-from composer.runtime.executors.entities.goal_server import GoalServer
+from composer.runtime.executors import actions
 from composer.runtime.executors.futures import Future
+from composer.runtime.executors.goal_server import GoalServer
 from composer.runtime.intra_process.copying import copy_of
 
 CallSoon = Callable[[Callable[[], object]], None]

@@ -13,9 +13,9 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 
 from composer.fast_dataclass import dataclass
-from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
 from composer.runtime.metrics.repeat_limit import RepeatLimit

@@ -36,10 +36,10 @@ from composer.model import LogLevel
 from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.clock.clock import NodeTime
 from composer.runtime.clock.sim_time import SimTimeSource
-from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.manager.other_instances import Instance, OtherInstances

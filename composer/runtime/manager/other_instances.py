@@ -22,8 +22,8 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from composer.fast_dataclass import dataclass
-from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
 from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.ros_graph.graph import participant, servers_of

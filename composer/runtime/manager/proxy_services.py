@@ -25,8 +25,8 @@ from rcl_interfaces.msg import (
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.node import Node
 
-from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.node.managed_node import InProcessNode, ManagedNode
 from composer.runtime.node.parameter_services import (
     NodeParameterStore,

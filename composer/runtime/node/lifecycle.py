@@ -24,7 +24,6 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from composer.behavior import TransitionFailed
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.exceptions import (
     describe,
     internal_report_of,
@@ -33,6 +32,7 @@ from composer.runtime.executors.exceptions import (
     text_of,
 )
 from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.tasks import within
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import TransitionOutcome

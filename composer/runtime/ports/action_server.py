@@ -15,9 +15,9 @@ from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.executors.entities.goal_server import GoalServer
 from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.goal_server import GoalServer
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.intra_process.servers import LocalActionServer

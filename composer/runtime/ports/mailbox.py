@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from composer.model import Port
 from composer.runtime.callbacks.callback import Callback
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.entities.sources import Taken
+from composer.runtime.executors.sources import Taken
 from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.metrics.statistics import CallbackStatistics
 

@@ -13,9 +13,9 @@ from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.executors.entities.sources import Reply, unused_callback
 from composer.runtime.executors.exceptions import describe, is_closing, shown
 from composer.runtime.executors.futures import Cancelled
+from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.ros.messages import interface_class

@@ -18,8 +18,8 @@ from rclpy.time import Time
 from composer.fast_dataclass import dataclass
 from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
 from composer.runtime.clock.sim_time import SimTimeSource
-from composer.runtime.executors.entities.sources import Taken
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Taken
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.ros.messages import interface_class

@@ -16,7 +16,7 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from composer.runtime.executors.entities import actions
+from composer.runtime.executors import actions
 from composer.runtime.executors.tasks import sleep
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line

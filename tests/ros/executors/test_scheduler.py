@@ -16,10 +16,10 @@ from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 
 from composer.model import ExecutorKind
-from composer.runtime.executors.entities import readiness
-from composer.runtime.executors.entities.readiness import EntitySource, SourceGroup
+from composer.runtime.executors import readiness
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.loops import Bench, bench, peer
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from action_msgs.srv import CancelGoal
 
-from composer.runtime.executors.entities import goal_server
+from composer.runtime.executors import goal_server
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 TEXT = """

@@ -16,7 +16,7 @@ from rcl_interfaces.srv import SetParameters
 
 from composer.model import ExecutorKind
 from composer.runtime.children.child_processes import Child, ChildProcesses
-from composer.runtime.executors.entities.sources import Reply
+from composer.runtime.executors.sources import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests

@@ -11,7 +11,7 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from composer_interfaces.action import Navigate
 from rclpy.qos import qos_profile_action_status_default
 
-from composer.runtime.executors.entities import goal_server
+from composer.runtime.executors import goal_server
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SERVER = """

@@ -14,9 +14,9 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
 from composer.model import ExecutorKind
-from composer.runtime.executors.entities.sources import Taken
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Taken
 from composer.runtime.executors.tasks import Report
 from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.leaving import leave

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from composer.model import Port, PortKind
-from composer.runtime.executors.entities.sources import Taken
+from composer.runtime.executors.sources import Taken
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.ports.qos_events import HostedQosEvents, PendingQosEvents
 from composer.runtime.hosting.user_code import UserFunction

@@ -6,7 +6,8 @@ a deadlock, observed within a second under load. So the callback handed to rcl i
 ``eventfd_write``, whose two arguments (a file descriptor, a count) have the calling convention of
 ``void (*)(const void * user_data, size_t count)`` on x86-64 and arm64. No Python runs there.
 
-All knowledge of rcl's and rclpy's internals (rclpy 7.1, ROS 2 Jazzy) is in this package.
+All knowledge of rcl's and rclpy's internals (rclpy 7.1, ROS 2 Jazzy) is here, in ``sources`` and in
+``actions``.
 
 A loop serves sources, in groups that share one eventfd.
 """

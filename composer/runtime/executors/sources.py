@@ -16,8 +16,8 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.time_source import TimeSource
 
-from composer.runtime.executors.entities import readiness
-from composer.runtime.executors.entities.readiness import EntitySource, Signal
+from composer.runtime.executors import readiness
+from composer.runtime.executors.readiness import EntitySource, Signal
 from composer.runtime.executors.tasks import name_of
 
 RunTask = Callable[[Coroutine[Any, Any, Any]], object]

@@ -25,10 +25,10 @@ from rclpy.task import Future as RclpyFuture
 from unique_identifier_msgs.msg import UUID
 
 from composer.fast_dataclass import dataclass
-from composer.runtime.executors.entities import readiness
-from composer.runtime.executors.entities.readiness import Handle, SetCallback, Signal
+from composer.runtime.executors import readiness
 from composer.runtime.executors.exceptions import is_closing
 from composer.runtime.executors.futures import Cancelled
+from composer.runtime.executors.readiness import Handle, SetCallback, Signal
 from composer.runtime.executors.tasks import Report, TaskRunner, name_of
 
 

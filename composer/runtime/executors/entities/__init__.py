@@ -1,1 +1,0 @@
-"""Sources: watch, take from and dispatch each kind of ROS entity, with rcl and rclpy internals."""
