@@ -1,0 +1,161 @@
+"""Restarts leave nothing behind: no zombie, no descriptor, no thread, no memory."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
+
+from composer.runtime.ros.manager_protocol import RESTART, RESTART_NODES
+from tests.ros.support.in_process import Peer
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem
+
+PROGRAMS = Path(__file__).parents[1] / "programs"
+SYSTEM = """
+system: robot
+nodes:
+  driver:
+    executable: {command: [PYTHON, PROGRAMS/driver.py]}
+    publishers: {words: {type: std_msgs/msg/String, external: true, qos: command}}
+  talker: {class: talker:Talker}
+  other:
+    timers: {tick: {period_ms: 50}}
+    lifecycle:
+      on_failure: restart
+      restart: {max_attempts: 1000, window_ms: 3600000, backoff_ms: 20, backoff_max_ms: 20}
+processes:
+  second: {nodes: [other]}
+"""
+TALKER = """
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.publisher = self.create_publisher(String, "chatter", 10)
+        self.create_timer(0.05, lambda: self.publisher.publish(String(data="x")))
+"""
+MEMORY_MB = 8.0
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a system takes: of all of its processes, but memory only of the first one."""
+
+    processes: int
+    zombies: int
+    descriptors: int
+    threads: int
+    memory_mb: float
+
+
+def usage(pid: int) -> Usage:
+    pids = children(pid)
+    states = [status(child) for child in pids]
+    memory_kb = int(states[0]["VmRSS"].split()[0])
+    return Usage(
+        len(pids),
+        sum(state["State"].startswith("Z") for state in states),
+        sum(len([*Path(f"/proc/{child}/fd").iterdir()]) for child in pids),
+        sum(int(state["Threads"]) for state in states),
+        memory_kb / 1024,
+    )
+
+
+def process_of(name: str, pid: int) -> int:
+    """Return the child process with a process of the system."""
+    mark = f"--process\0{name}\0".encode()
+    return next(child for child in children(pid) if mark in read(child, "cmdline"))
+
+
+def children(pid: int) -> list[int]:
+    """Return a process and all of its descendants."""
+    pids = [pid]
+    for parent in pids:  # grows
+        for task in Path(f"/proc/{parent}/task").iterdir():
+            pids += map(int, (task / "children").read_text(encoding="ascii").split())
+    return pids
+
+
+def read(pid: int, name: str) -> bytes:
+    return Path(f"/proc/{pid}/{name}").read_bytes()
+
+
+def status(pid: int) -> dict[str, str]:
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    return {key: text.strip() for key, _, text in (line.partition(":") for line in lines)}
+
+
+def settled(measure: Callable[[], Usage], expected: Usage) -> Usage:
+    """Return the usage once it is as expected, or at the end of all patience."""
+    end_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            found = measure()
+        except OSError:  # a process ends just now
+            continue
+        same = (found.processes, found.zombies, found.descriptors, found.threads) == (
+            expected.processes, expected.zombies, expected.descriptors, expected.threads
+        )  # fmt: skip
+        if same or time.monotonic() > end_s:
+            return found
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    "restarts",
+    [
+        pytest.param(3, marks=pytest.mark.slow),
+        pytest.param(200, marks=[pytest.mark.soak, pytest.mark.timeout(3600)]),
+    ],
+)
+def test_restarts(restarts: int, peer: Peer, tmp_path: Path) -> None:
+    text = SYSTEM.replace("PYTHON", sys.executable).replace("PROGRAMS", str(PROGRAMS))
+    (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "talker.py").write_text(TALKER, encoding="utf-8")
+
+    def restart(node: str) -> None:
+        names = ParameterValue(
+            type=ParameterType.PARAMETER_STRING_ARRAY, string_array_value=[f"/{node}"]
+        )
+        request = SetParametersAtomically.Request(
+            parameters=[Parameter(name=RESTART_NODES, value=names)]
+        )
+        service = f"/robot/manager/{RESTART}"
+        result = peer.call(SetParametersAtomically, service, request).result
+        assert result.successful, result.reason
+
+    with RunningSystem(str(tmp_path / "robot.yaml")) as system:
+        system.wait_for("3 of 3 nodes active")
+        pid = system.process.pid
+
+        def restart_all(number: int) -> None:
+            """Restart an executable, a class, and a process, by a kill."""
+            restart("driver")
+            restart("talker")
+            os.kill(process_of("second", pid), signal.SIGKILL)
+            system.wait_for(rf"/other is up again after restart {number}\b")
+
+        restart_all(1)  # the first time loads what stays
+        first = usage(pid)
+        for number in range(restarts):
+            restart_all(number + 2)
+            if number % 20 == 0:
+                print(number, usage(pid))
+        last = settled(lambda: usage(pid), first)
+        print(first, last)
+        assert last.zombies == 0
+        assert (last.processes, last.descriptors, last.threads) == (
+            first.processes, first.descriptors, first.threads
+        )  # fmt: skip
+        assert last.memory_mb - first.memory_mb < MEMORY_MB
+        system.stop()
