@@ -156,13 +156,13 @@ class _Imports:
             names = _API_NAMES if module == _API else frozenset({"behavior", "typed"})
             is_known = folder in ("", "behavior")
             return _Contents(names, is_closed=module == _API) if is_known else None
-        if module == "rclpy":
-            stubs = (path.stem for path in (LIBRARIES / module).iterdir())
-            return _Contents(frozenset(stubs), is_closed=False)
         try:
             own = self._read_own(module)
         except Unreadable:
             return None
+        if own is None and module == "rclpy":
+            stubs = (path.stem for path in (LIBRARIES / module).iterdir())
+            return _Contents(frozenset(stubs), is_closed=False)
         packages = frozenset(self.interfaces.packages())
         if not module:
             names = own.names if own is not None else frozenset()

@@ -55,6 +55,8 @@ FAIL = [
     ("from std_srvs.msg import Trigger", "Trigger", "import it from 'std_srvs.srv'"),
     ("import geometry_msg.msg", "geometry_msg", "did you mean 'geometry_msgs'?"),
     ("from composer.behavior import CallCanceled", "CallCanceled", "did you mean 'CallCancelled'?"),
+    ("from rclpy.nod import Node", "nod", "did you mean 'node'?"),
+    ("import rclpy.qso", "qso", "did you mean 'qos'?"),
     ("from composer.behavor import Goal", "behavor", "did you mean 'behavior'?"),
 ]  # fmt: skip
 
@@ -109,6 +111,7 @@ def test_an_internal_module(tmp_path: Path) -> None:
         "from .motor import start",
         "from arms import LEFT, __doc__",
         "import rclpy, numpy.linalg, tf2_ros",
+        "from rclpy import init, qos, shutdwn\nimport rclpy.action.client",  # names: type checker
         "from std_srvs.srv import Trigger, Trigger_Request",
         "from std_msgs.msg import *",
         "from composer.behavior import Goal, Changes",
