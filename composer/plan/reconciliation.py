@@ -144,8 +144,8 @@ def _reachable(
 
     A dependency that a user keeps down takes no node down, but no node is activated without it, nor
     before one without a state, which is in a transition or has failed. Nor is a class configured
-    before a dependency is where it is to be: its constructor may wait for it. A node whose failure
-    is ignored is not brought up again.
+    before, unless the system leaves both inactive: its constructor may wait for the dependency. A
+    node whose failure is ignored is not brought up again.
     """
     reachable = dict(desired_states(system, desired))
     for name, needs in _needs(system, desired):
@@ -159,9 +159,11 @@ def _reachable(
         ]
         if missing and reachable.get(name) is PrimaryState.ACTIVE:
             reachable[name] = max(states[name], PrimaryState.INACTIVE, key=rank)
-        late = [edge.on for edge in missing if reachable.get(edge.on) != desired.goals.get(edge.on)]
+        is_awaited = desired.goals.get(name) is PrimaryState.ACTIVE or any(
+            reachable.get(edge.on) != desired.goals.get(edge.on) for edge in missing
+        )
         node = system.node(name)
-        if late and node is not None and node.hosted_class is not None:
+        if missing and is_awaited and node is not None and node.hosted_class is not None:
             reachable[name] = min(reachable.get(name, states[name]), states[name], key=rank)
     return reachable
 

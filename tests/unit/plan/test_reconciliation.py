@@ -138,6 +138,7 @@ def test_no_node_is_activated_before_a_dependency_that_a_user_deactivated() -> N
         ("ui", "aa", []),
         ("uu", "aa", []),
         ("au", "aa", ["configure viewer", "activate viewer"]),
+        ("iu", "ia", []),
         ("iu", "ii", ["configure viewer"]),
     ],
 )
