@@ -59,11 +59,22 @@ class Label:
 Subject: TypeAlias = tuple[str, str]
 
 
+def line_subject(span: Span) -> Subject:
+    """Return the line of a place: all that is reported there."""
+    return ("line", f"{span.file.path}:{span.line}")
+
+
+def errors_subject(span: Span) -> Subject:
+    """Return the errors in the file of a place."""
+    return ("errors", span.file.path)
+
+
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
     """A problem at a location. ``hint`` says how to fix it, in the imperative.
 
-    ``subjects`` are the things that it is about, the most important one first.
+    ``subjects`` are the things that it says are wrong, the most important one first; ``relies_on``
+    are those that it takes for right (see :mod:`composer.analysis.subjects`).
     """
 
     rule: Rule
@@ -72,6 +83,7 @@ class Diagnostic:
     related: tuple[Label, ...] = ()
     hint: str | None = None
     subjects: tuple[Subject, ...] = ()
+    relies_on: tuple[Subject, ...] = ()
 
     @property
     def severity(self) -> Severity:
@@ -97,18 +109,17 @@ def register(rule: Rule) -> Rule:
     return rule
 
 
-# Until the texts of all rules are pages, declarations may still have them: ``_texts``.
-def error(code: str, name: str, **_texts: str) -> Rule:
+def error(code: str, name: str) -> Rule:
     """Register a rule about what keeps a system from running."""
     return register(Rule(code, name, Severity.ERROR))
 
 
-def warning(code: str, name: str, **_texts: str) -> Rule:
+def warning(code: str, name: str) -> Rule:
     """Register a rule about what is probably wrong."""
     return register(Rule(code, name, Severity.WARNING))
 
 
-def info(code: str, name: str, **_texts: str) -> Rule:
+def info(code: str, name: str) -> Rule:
     """Register a rule about what is only worth knowing."""
     return register(Rule(code, name, Severity.INFO))
 

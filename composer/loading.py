@@ -16,7 +16,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TypeAlias
 
-from composer.analysis.follow_ups import without_follow_ups
+from composer.analysis.subjects import joined, without_consequences
 from composer.assembly import NodeTypeFile, assemble, inherit
 from composer.assembly.deduplication import add_include_labels, deduplicate
 from composer.diagnostics import (
@@ -302,8 +302,8 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
     follow_ups: frozenset[_Identity] = frozenset()
     if context is not None:
         diagnostics += reported(context, types.diagnostics(context, diagnostics))
-        diagnostics = deduplicate(diagnostics, context.system.nodes)
-        kept = without_follow_ups(diagnostics, context, project.diagnostics)
+        kept = without_consequences(diagnostics, project.diagnostics)
+        kept = joined(deduplicate(kept, context.system.nodes))
         follow_ups = frozenset(map(_identity, diagnostics)).difference(map(_identity, kept))
         diagnostics = kept
 

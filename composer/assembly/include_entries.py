@@ -143,7 +143,7 @@ def _prefix(entry: Mapping, diagnostics: list[Diagnostic]) -> str:
 def _namespace(entry: Mapping, diagnostics: list[Diagnostic]) -> Located[str] | None:
     namespace = _text(entry.get("namespace"))
     if namespace is None or _is_opaque(namespace.value):
-        return None
+        return namespace  # names with an unknown variable are not checked
     absolute = namespace.value if namespace.value.startswith("/") else f"/{namespace.value}"
     problem = namespace_problem(absolute)
     if problem is None:

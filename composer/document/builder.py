@@ -7,7 +7,7 @@ from dataclasses import field
 
 import yaml
 
-from composer.diagnostics import Diagnostic, Label, Rule, shown
+from composer.diagnostics import Diagnostic, Label, Rule, line_subject, shown
 from composer.document import rules
 from composer.document.error_limit import LimitedDiagnostics
 from composer.document.events import Mark, collection_span, scalar_span, span_at
@@ -272,7 +272,9 @@ class TreeBuilder:
             raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
 
     def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
-        self.diagnostics.append(Diagnostic(rule, message, span, hint=hint))
+        # What else is reported on the line of a key without its value may follow from it.
+        lines = (line_subject(span),) if rule is rules.KEY_WITHOUT_VALUE else ()
+        self.diagnostics.append(Diagnostic(rule, message, span, hint=hint, subjects=lines))
 
 
 def _follows_colon(line: str, end: int) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Map
 
-from composer.diagnostics import Diagnostic, Label, shown
+from composer.diagnostics import Diagnostic, Label, errors_subject, shown
 from composer.document.error_limit import TooManyErrors
 from composer.expand import rules
 from composer.expand.copies import COPYING
@@ -153,4 +153,6 @@ def _unused(scope: Scope) -> Iterator[Diagnostic]:
         if name not in scope.used:
             message = f"variable '{shown(name)}' is never used"
             hint = f"use it as '${{{shown(name)}}}', or remove it"
-            yield Diagnostic(rules.UNUSED_DECLARATION, message, variable.key.span, hint=hint)
+            span = variable.key.span
+            errors = (errors_subject(span),)
+            yield Diagnostic(rules.UNUSED_DECLARATION, message, span, hint=hint, relies_on=errors)

@@ -230,7 +230,11 @@ class Substitution:
             self.unknown.add(name)
             message = f"there is no variable '{shown(name)}'"
             hint = self.scope.hint(name) or "declare it under 'variables'"
-            self._report(rules.UNKNOWN_VARIABLE, message, reference, scalar, hint)
+            subject = ("variable", f"{scalar.span.file.path}: {name}")
+            span = scalar.part(reference.start, len(reference.written))
+            self.diagnostics.append(
+                Diagnostic(rules.UNKNOWN_VARIABLE, message, span, hint=hint, subjects=(subject,))
+            )
         return found
 
     def _too_large(

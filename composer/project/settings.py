@@ -129,7 +129,10 @@ def _folders(
         else:
             message = f"'{shown(text.value)}' {problem}"
             hint = "use a folder below the folder of this file"
-            diagnostics.append(Diagnostic(BAD_SETTING, message, text.span, hint=hint))
+            subjects = (("folder", name),)
+            diagnostics.append(
+                Diagnostic(BAD_SETTING, message, text.span, hint=hint, subjects=subjects)
+            )
     return tuple(found)
 
 

@@ -28,7 +28,7 @@ def run_checks(context: Context) -> list[Diagnostic]:
         found += reported(context, (item for check in all_checks() for item in check(context)))
     except TooManyErrors as stopped:
         found = stopped.diagnostics
-    return in_order(_without_repeats(found))
+    return in_order(found)
 
 
 def reported(context: Context, diagnostics: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
@@ -40,16 +40,6 @@ def reported(context: Context, diagnostics: Iterable[Diagnostic]) -> Iterator[Di
         is_error = diagnostic.severity is Severity.ERROR
         if place not in refused and (is_error or place[:2] not in refused_lines):
             yield with_short_values(diagnostic)
-
-
-def _without_repeats(found: list[Diagnostic]) -> list[Diagnostic]:
-    """Leave out ports that are connected twice because a connection has the wrong ones."""
-    wrong = {location(item.primary) for item in found if item.rule.name == "wrong-port-kind"}
-    return [
-        item
-        for item in found
-        if item.rule.name != "port-connected-twice" or location(item.primary) not in wrong
-    ]
 
 
 @cache

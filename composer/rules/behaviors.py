@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.formatting import a
 from composer.analysis.python_nodes import behaviors, distinct_behaviors
+from composer.analysis.subjects import wiring
 from composer.diagnostics import Diagnostic, Label, error, nearest, suggestion, warning
 from composer.model import Node, PortKind
 from composer.python_code.lookup import BehaviorSource
@@ -62,17 +63,24 @@ def _unbound(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     unbound = {method.name: method for method in unbound_handlers(node, source)}
     missing = [item for item in bound if item.needed and source.method(item.name) is None]
     for handler in missing:
-        yield _missing(source, handler, unbound)
+        yield _missing(node, source, handler, unbound)
     for method in unbound.values():
         if nearest(method.name, {handler.name for handler in missing}) is not None:
             continue  # shown by the diagnostic about the missing handler
         message = f"handler '{method.name}' of '{source.reference.class_name}' matches no port or"
         label = Label(source.reference.text.span, "the behavior of this node")
         hint = _hint(node, method.name, [handler.name for handler in bound])
-        yield Diagnostic(HANDLER_WITHOUT_PORT, f"{message} timer", method.span, (label,), hint)
+        given = (("port", f"{node.name}.{_stem(method.name)}"),)
+        message = f"{message} timer"
+        yield Diagnostic(
+            HANDLER_WITHOUT_PORT, message, method.span, (label,), hint, relies_on=given
+        )
 
 
-def _missing(source: BehaviorSource, handler: Handler, unbound: dict[str, Method]) -> Diagnostic:
+def _missing(
+    node: Node, source: BehaviorSource, handler: Handler, unbound: dict[str, Method]
+) -> Diagnostic:
+    given = (("port", f"{node.name}.{handler.of}"), ("behavior", node.name.value))
     close = nearest(handler.name, unbound)
     message = (
         f"{handler.kind} '{handler.of}' has no handler: "
@@ -81,15 +89,20 @@ def _missing(source: BehaviorSource, handler: Handler, unbound: dict[str, Method
     if close is not None:  # a misspelled reference to the port
         label = Label(handler.of.span, f"the {handler.kind}")
         hint = f"rename '{close}' to '{handler.name}'"
-        return Diagnostic(MISSING_HANDLER, message, unbound[close].span, (label,), hint)
+        place = unbound[close].span
+        return Diagnostic(MISSING_HANDLER, message, place, (label,), hint, relies_on=given)
     span = source.class_span
     related = (Label(span, "the behavior class"),) if span is not None else ()
     hint = f"add 'def {handler.name}({', '.join(('self', *handler.signature.names))})'"
-    return Diagnostic(MISSING_HANDLER, message, handler.of.span, related, hint)
+    return Diagnostic(MISSING_HANDLER, message, handler.of.span, related, hint, relies_on=given)
+
+
+def _stem(handler: str) -> str:
+    return handler.removeprefix("on_").removeprefix("accept_")
 
 
 def _hint(node: Node, name: str, bound: list[str]) -> str | None:
-    stem = name.removeprefix("on_").removeprefix("accept_")
+    stem = _stem(name)
     port = node.port(stem)
     if port is not None:
         return f"'{stem}' is {a(port.kind)}, which has no such handler"
@@ -125,7 +138,8 @@ def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
             message = f"'{name}' gets a {type_}, not a {annotated}"
             label = Label(source.reference.text.span, "the behavior of this node")
             span = span_of(annotation, scope.source)
-            yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,))
+            given = (("type", f"{node.name}.{_stem(name)}"),)
+            yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,), relies_on=given)
 
 
 _BLOCKING = re.compile(
@@ -247,7 +261,7 @@ def check_behaviors(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         if node.behavior is not None:
             yield from unnamed(node.behavior, "behavior", CLASS_MISSING)
-    for _, source in behaviors(context):
+    for node, source in behaviors(context):
         yield from missing(source, MODULE_MISSING, CLASS_MISSING, MODULE_MISSING)
         if source.class_span is not None and source.is_rclpy_node:
             yield Diagnostic(
@@ -256,4 +270,9 @@ def check_behaviors(context: Context) -> Iterator[Diagnostic]:
                 source.reference.text.span,
                 (Label(source.class_span, "here"),),
                 "write 'class' instead of 'behavior'",
+                (
+                    ("file", source.class_span.file.path),
+                    ("behavior", node.name.value),
+                    *(subject for port in node.ports for subject in wiring(node, port)),
+                ),
             )

@@ -8,9 +8,10 @@ from itertools import pairwise
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
 from composer.analysis.rates import causes
-from composer.diagnostics import Diagnostic, Label, error, warning
+from composer.analysis.subjects import NODES_OF_PROCESSES, wiring
+from composer.diagnostics import Diagnostic, Label, Subject, error, warning
 from composer.fast_dataclass import dataclass
-from composer.model import Chain, Node, Port, PortKind, Timer
+from composer.model import Chain, Node, Port, PortKind, System, Timer
 from composer.source import Span
 
 IMPOSSIBLE_CHAIN = error("RC415", "impossible-chain")
@@ -74,6 +75,12 @@ def _budget_delay(name: str, callback: Port | Timer) -> Iterator[ChainDelay]:
         yield ChainDelay(f"{name} may take", budget_ms.value, budget_ms.span)
 
 
+def _wiring_of_chain(system: System, chain: Chain) -> tuple[Subject, ...]:
+    ends = [(system.node(end.node), system.port(end)) for end in chain.through]
+    known = [(node, port) for node, port in ends if node is not None and port is not None]
+    return tuple(subject for node, port in known for subject in wiring(node, port))
+
+
 def check_broken_chain(context: Context) -> Iterator[Diagnostic]:
     """Check each pair of consecutive ports in every chain."""
     system = context.system
@@ -95,6 +102,7 @@ def check_broken_chain(context: Context) -> Iterator[Diagnostic]:
                     after.text.span,
                     (Label(before.text.span, "the previous publisher"),),
                     f"subscribe '{node.name}' to it, or add the missing publishers to the chain",
+                    relies_on=_wiring_of_chain(system, chain),
                 )
                 break  # further gaps often follow from the first one
 
@@ -144,5 +152,9 @@ def check_unmeasured_chain(context: Context) -> Iterator[Diagnostic]:
                 f"the latency of chain '{chain.name}' is not measured: '{node.name}' runs in "
                 "another process",
                 endpoint.text.span,
+                relies_on=(
+                    NODES_OF_PROCESSES,
+                    *(("process", str(item.process)) for _, item in known if item.process),
+                ),
             )
             break

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.class_ports import CreatedPort, all_created_ports, created_ports
 from composer.analysis.context import Context
 from composer.analysis.python_nodes import hosted_classes
+from composer.analysis.subjects import type_subject
 from composer.diagnostics import Diagnostic, Label, error, info, nearest, warning
 from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
 from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
@@ -53,7 +54,10 @@ def _missing_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
         close = nearest(name, others)
         listed = " and ".join(f"'{other}'" for other in others)
         hint = f"did you mean '{close}'?" if close is not None else f"it creates {listed}"
-        yield Diagnostic(CLASS_PORT_MISSING, message, port.ros_name.span, (), hint)
+        # Connections may name a port as the class does.
+        meant = sorted({port.name.value, *others})
+        subjects = tuple(("port", f"{item.node.name}.{other}") for other in meant)
+        yield Diagnostic(CLASS_PORT_MISSING, message, port.ros_name.span, (), hint, subjects)
 
 
 def _last(name: str) -> str:
@@ -75,7 +79,8 @@ def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic
             message = f"{what} with type {types[0].interface}, not {port.interface}"
             label = Label(types[0].span, "created here")
             rule = as_warning(CLASS_PORT_TYPE, unless=item.is_certain(types[0].span))
-            yield Diagnostic(rule, message, port.interface.span, (label,))
+            subjects = (type_subject(port),)
+            yield Diagnostic(rule, message, port.interface.span, (label,), subjects=subjects)
         elif len(same) == 1 and port.qos.known and port.qos.explicit:
             yield from _different_qos(port, same[0], what, context)
 
@@ -145,4 +150,10 @@ def _undeclared(
     if is_reported:
         message = f"class '{item.hosted.reference.class_name}' declares no parameter '{name}'"
         hint = f"did you mean '{close}'?" if close is not None else None
-        yield Diagnostic(CLASS_PARAMETER, message, parameter.name.span, hint=hint)
+        yield Diagnostic(
+            CLASS_PARAMETER,
+            message,
+            parameter.name.span,
+            hint=hint,
+            relies_on=(("undeclared parameter", name),),
+        )

@@ -5,16 +5,15 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import field
 from typing import TypeAlias
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import port_name
+from composer.analysis.subjects import wiring
 from composer.diagnostics import Diagnostic, Label, error, info, warning
-from composer.fast_dataclass import dataclass
-from composer.model import ChannelKind, Connection, Node, PortKind, PortOfNode
-from composer.rules.remappings import matched_ports, own_name
+from composer.model import ChannelKind, PortKind, PortOfNode
+from composer.names import join
 from composer.source import Span
 from composer.spelling import vocabulary
 
@@ -54,24 +53,21 @@ def unconnected_ports(context: Context, kind: PortKind) -> Iterator[PortOfNode]:
 
     Ports with ``external: true`` or ``required: false`` are left out, and so are sources named by a
     connection (``from`` without ``to`` is deliberate). So are ports that may lack a counterpart due
-    to another error: an earlier error, an unknown node type, a connection to an unknown port, or a
-    remapping that matches no port.
+    to an earlier error or an unknown node type.
     """
     if not _is_fully_known(context):
         return
-    uncertain = context.once(_uncertain)
+    connected, affected = context.once(_connected), context.once(_names_of_affected)
     is_source = kind in _SOURCES.values()
     for channel in context.channels:
         others = channel.sinks if is_source else channel.sources
-        if others or channel.name in _EXTERNAL_TOPICS or channel.name in uncertain.names:
+        if others or channel.name in _EXTERNAL_TOPICS or channel.name in affected:
             continue
         for endpoint in channel.ends:
             port = endpoint.port
             if port.kind is not kind or port.external or port.required is False:
                 continue
-            if is_source and _key(endpoint) in uncertain.connected:
-                continue
-            if not uncertain.includes(endpoint):
+            if not (is_source and _key(endpoint) in connected):
                 yield endpoint
 
 
@@ -111,22 +107,6 @@ def external_hint(endpoint: PortOfNode) -> str:
     return f"set '{key}' if an external node does"
 
 
-@dataclass(slots=True)
-class _Uncertain:
-    """Ports and names that may be unconnected due to an error that is reported elsewhere."""
-
-    ports: set[tuple[str, str]] = field(default_factory=set)
-    port_names: set[str] = field(default_factory=set)  # of unknown nodes
-    names: set[str] = field(default_factory=set)
-    connected: set[tuple[str, str]] = field(default_factory=set)  # named by any connection
-
-    def includes(self, endpoint: PortOfNode) -> bool:
-        return _key(endpoint) in self.ports or endpoint.port.name.value in self.port_names
-
-    def add_ports_of(self, node: Node) -> None:
-        self.ports.update((node.name.value, port.name.value) for port in node.ports)
-
-
 def _is_fully_known(context: Context) -> bool:
     system = context.system
     return (
@@ -137,43 +117,21 @@ def _is_fully_known(context: Context) -> bool:
     )
 
 
-def _uncertain(context: Context) -> _Uncertain:
-    uncertain = _Uncertain()
-    for connection in context.system.connections:
-        _add_connection(context, connection, uncertain)
-    affected = context.once(earlier_errors).nodes
-    for node in context.system.nodes:
-        if node.name.value in affected:
-            uncertain.add_ports_of(node)
-            uncertain.names.update(port.full_name for port in node.ports)
-        for remapping in () if node.gets_undeclared else node.remappings:
-            if not any(matched_ports(node, remapping)):
-                uncertain.add_ports_of(node)
-                uncertain.names.add(own_name(node, remapping.target.value))
-    return uncertain
-
-
-def _add_connection(context: Context, connection: Connection, uncertain: _Uncertain) -> None:
+def _connected(context: Context) -> frozenset[tuple[str, str]]:
+    """Return the ports that connections name, as node and port."""
     system = context.system
-    references = [(reference, _SOURCES[connection.kind]) for reference in connection.sources]
-    references += [(reference, _SINKS[connection.kind]) for reference in connection.sinks]
-    invalid = []
-    renamed = False
-    for reference, kind in references:
-        port = system.port(reference)
-        if port is None or port.kind is not kind:
-            invalid.append(reference)
-        elif port.full_name.lstrip("/") != connection.name.value.lstrip("/"):
-            renamed = renamed or not port.full_name.endswith(f"/{connection.name}")
-        uncertain.connected.add((reference.node, reference.port))
-    if invalid or renamed:
-        uncertain.ports.update((reference.node, reference.port) for reference, _ in references)
-    for reference in invalid:
-        node = system.node(reference.node)
-        if node is None:
-            uncertain.port_names.add(reference.port)
-        else:
-            uncertain.add_ports_of(node)
+    return frozenset((end.node, end.port) for item in system.connections for end in item.ends)
+
+
+def _names_of_affected(context: Context) -> frozenset[str]:
+    """Return the names of the ports of nodes with earlier errors, which may have other ports."""
+    system, affected = context.system, context.once(earlier_errors).nodes
+    nodes = (node for node in system.nodes if node.name.value in affected)
+    names = {port.full_name for node in nodes for port in node.ports}
+    for connection in system.connections if affected else ():
+        if any(end.node in affected for end in connection.ends):
+            names.add(join(system.namespace, connection.name.value))
+    return frozenset(names)
 
 
 def _key(endpoint: PortOfNode) -> tuple[str, str]:
@@ -256,6 +214,7 @@ def check_client_without_server(context: Context) -> Iterator[Diagnostic]:
                     place,
                     labels,
                     nearest_channel(context, endpoint) or external_hint(endpoint),
+                    relies_on=wiring(endpoint.node, endpoint.port),
                 )
 
 
@@ -271,6 +230,7 @@ def check_subscription_without_publisher(context: Context) -> Iterator[Diagnosti
                 place,
                 labels,
                 nearest_channel(context, endpoint) or external_hint(endpoint),
+                relies_on=wiring(endpoint.node, endpoint.port),
             )
 
 
@@ -286,6 +246,7 @@ def check_publisher_without_subscription(context: Context) -> Iterator[Diagnosti
                 place,
                 labels,
                 external_hint(endpoint),
+                relies_on=wiring(endpoint.node, endpoint.port),
             )
 
 
@@ -301,4 +262,5 @@ def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
                     endpoint.node.name.span,
                     (Label(endpoint.port.name.span, "declared as required"),),
                     nearest_channel(context, endpoint),
+                    relies_on=wiring(endpoint.node, endpoint.port),
                 )

@@ -9,7 +9,18 @@ from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import number
 from composer.analysis.rates import Cause, Rates, rates
-from composer.diagnostics import Diagnostic, Label, Severity, error, info, suggestion, warning
+from composer.analysis.subjects import unknown_subjects, used_parameters
+from composer.diagnostics import (
+    Diagnostic,
+    Label,
+    Severity,
+    Subject,
+    error,
+    errors_subject,
+    info,
+    suggestion,
+    warning,
+)
 from composer.expand.rules import UNUSED_DECLARATION
 from composer.fast_dataclass import dataclass
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
@@ -38,7 +49,7 @@ def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
             f"node '{node.name}' runs on '{name}', which is not an executor of this system",
             name.span,
             hint=suggestion(name.value, known),
-            subjects=(("executor", name.value),),
+            subjects=unknown_subjects("executor", name.value, known),
         )
 
 
@@ -53,7 +64,10 @@ def check_unused_executor(context: Context) -> Iterator[Diagnostic]:
     for executor in context.system.executors:
         if executor.name.value not in used:
             yield Diagnostic(
-                UNUSED_DECLARATION, f"no node runs on '{executor.name}'", executor.name.span
+                UNUSED_DECLARATION,
+                f"no node runs on '{executor.name}'",
+                executor.name.span,
+                relies_on=(errors_subject(executor.name.span),),
             )
 
 
@@ -102,6 +116,12 @@ def check_split_executor(context: Context) -> Iterator[Diagnostic]:
             f"and another one in {_process_text(other)}",
             node.executor.span,
             (Label(at, f"in {_process_text(other)}"),),
+            relies_on=tuple(
+                (kind, item.process.value)
+                for item in (node, other)
+                if item.process is not None
+                for kind in ("process", "nodes of process")
+            ),
         )
 
 
@@ -154,6 +174,7 @@ class CallbackLoad:
     rate_hz: float
     budget_ms: Located[float]
     reentrant: bool
+    parameters: tuple[Subject, ...]
 
     @property
     def load(self) -> float:
@@ -202,6 +223,11 @@ class ExecutorLoad:
             for share in self._ordered()[:SHOWN]
         )
 
+    @property
+    def parameters(self) -> tuple[Subject, ...]:
+        """The parameters that the rates depend on."""
+        return tuple(item for share in self.shares for item in share.parameters)
+
     def _ordered(self) -> list[CallbackLoad]:
         return sorted(self.shares, key=lambda share: (-share.load, share.name))
 
@@ -248,9 +274,10 @@ def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
         budget_ms = callback.budget_ms
         rate_hz = known.callback_hz(node, cause) if budget_ms is not None else None
         if budget_ms is not None and rate_hz is not None:
-            yield CallbackLoad(
-                f"{node.name}.{callback.name}", rate_hz, budget_ms, callback.reentrant
-            )
+            period = callback.period.value if isinstance(callback, Timer) else None
+            name = f"{node.name}.{callback.name}"
+            used = used_parameters(period)
+            yield CallbackLoad(name, rate_hz, budget_ms, callback.reentrant, used)
 
 
 def check_executor_load(context: Context) -> Iterator[Diagnostic]:
@@ -263,6 +290,7 @@ def check_executor_load(context: Context) -> Iterator[Diagnostic]:
                 load.primary,
                 load.labels,
                 "lower a rate or a budget, or move nodes to another executor",
+                relies_on=load.parameters,
             )
         elif load.ratio > _BUSY:
             yield Diagnostic(
@@ -270,4 +298,5 @@ def check_executor_load(context: Context) -> Iterator[Diagnostic]:
                 f"callbacks of {load.what} may use most of its time: {load.formula}",
                 load.span,
                 load.labels,
+                relies_on=load.parameters,
             )

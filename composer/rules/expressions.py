@@ -104,4 +104,5 @@ def _out_of_range(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]
             part_of_path(site.span, site.expression, path, 2),
             (Label(parameter.value.span, "its value"),),
             f"indices count from 0, so the last one is {len(value) - 1}" if value else None,
+            relies_on=(("parameter", name),),
         )

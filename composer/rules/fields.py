@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from composer.analysis.context import Context
@@ -21,14 +22,27 @@ def check_unknown_field(context: Context) -> Iterator[Diagnostic]:
     """Report the fields in YAML that do not exist."""
     for problem in certain_field_problems(context):
         if problem.missing:
-            yield Diagnostic(UNKNOWN_FIELD, problem.message, problem.span, hint=problem.hint)
+            yield Diagnostic(
+                UNKNOWN_FIELD,
+                problem.message,
+                problem.span,
+                hint=problem.hint,
+                subjects=(("field", problem.message),),
+            )
 
 
 def check_invalid_value(context: Context) -> Iterator[Diagnostic]:
     """Report the values in YAML that do not fit."""
     for problem in certain_field_problems(context):
         if not problem.missing:
-            yield Diagnostic(INVALID_VALUE, problem.message, problem.span, hint=problem.hint)
+            names = re.findall(r"\bparameters\.(\w+)", problem.span.text)
+            yield Diagnostic(
+                INVALID_VALUE,
+                problem.message,
+                problem.span,
+                hint=problem.hint,
+                relies_on=tuple(("parameter", name) for name in names),
+            )
 
 
 def check_unknown_enumerator(context: Context) -> Iterator[Diagnostic]:

@@ -39,7 +39,6 @@ def check_unknown_host(context: Context) -> Iterator[Diagnostic]:
             f"process '{process.name}' runs on '{name}', which is not a host of this system",
             name.span,
             hint=suggestion(name.value, hosts) or "declare it under 'hosts:'",
-            subjects=(("host", name.value),),
         )
 
 

@@ -162,4 +162,5 @@ def _idle_ports(node: Node) -> Iterator[Diagnostic]:
         if handler.needed and handler.kind in _MISSING_REACTIONS:
             message = f"{handler.kind} '{handler.of}' does nothing"
             hint = _MISSING_REACTIONS[handler.kind]
-            yield Diagnostic(IDLE_PORT, message, handler.of.span, hint=hint)
+            given = (("port", f"{node.name}.{handler.of}"),)
+            yield Diagnostic(IDLE_PORT, message, handler.of.span, hint=hint, relies_on=given)

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import a
+from composer.analysis.subjects import package_subjects
 from composer.diagnostics import Diagnostic, Label, error, nearest, shown
 from composer.interfaces import Action, Interfaces, InvalidDefinition, Message, Service
 from composer.interfaces.building import how_to_build
@@ -38,6 +39,8 @@ def check_unknown_interface(context: Context) -> Iterator[Diagnostic]:
                 f"there is no {_type_word(port)} type '{name}'",
                 name.span,
                 hint=hints[key],
+                subjects=package_subjects(context.interfaces, name.value),
+                relies_on=(("folder", "interfaces"),),
             )
 
 

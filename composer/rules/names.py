@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
+from composer.analysis.context import Context, is_unresolved, location
 from composer.analysis.formatting import a, free_name, safe_name
+from composer.analysis.subjects import connection_subjects, namespace_subjects
 from composer.diagnostics import Diagnostic, Label, error, info, warning
 from composer.expand.rules import DUPLICATE_NAME
-from composer.model import Node, Port, System
+from composer.model import Connection, Node, Port, System
 from composer.names import (
     is_hidden,
     join,
@@ -57,18 +58,30 @@ def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
     namespaces = [node.namespace for node in system.nodes]
     if system.namespace_span is not None:
         namespaces.append(Located(system.namespace, system.namespace_span))
-    found = [namespace for namespace in namespaces if _is_invalid(namespace.value)]
-    invalid = {namespace.value for namespace in found}
-    for namespace in found:
+    found = {
+        location(namespace.span): namespace
+        for namespace in namespaces
+        if _is_invalid(namespace.value)
+    }
+    invalid = {namespace.value for namespace in found.values()}
+    for namespace in found.values():
         if not any(outer in invalid for outer in _outer(namespace.value)):
             problem = namespace_problem(namespace.value)
+            inside = [node for node in system.nodes if _is_inside(node, namespace.value)]
             yield Diagnostic(
-                INVALID_NAMESPACE, f"namespace '{namespace}' {problem}", namespace.span
+                INVALID_NAMESPACE,
+                f"namespace '{namespace}' {problem}",
+                namespace.span,
+                subjects=tuple(namespace_subjects(inside)),
             )
 
 
 def _is_invalid(namespace: str) -> bool:
     return namespace_problem(namespace) is not None and not is_unresolved(namespace)
+
+
+def _is_inside(node: Node, outer: str) -> bool:
+    return f"{node.namespace.value}/".startswith(f"{outer.rstrip('/')}/")
 
 
 def _outer(namespace: str) -> Iterator[str]:
@@ -92,23 +105,31 @@ def _invalid_system_name(system: System) -> Iterator[Diagnostic]:
 
 def check_invalid_ros_name(context: Context) -> Iterator[Diagnostic]:
     """Check the names of ports, of connections, and in remappings."""
-    for kind, name in _ros_names(context):
+    for kind, name, connection in _ros_names(context):
         problem = topic_name_problem(name.value)
         if problem is not None and not is_unresolved(name.value):
-            yield Diagnostic(INVALID_NAME, f"{kind} name '{name}' {problem}", name.span)
+            yield Diagnostic(
+                INVALID_NAME,
+                f"{kind} name '{name}' {problem}",
+                name.span,
+                subjects=()
+                if connection is None
+                else connection_subjects(context.system, connection),
+            )
 
 
-def _ros_names(context: Context) -> Iterator[tuple[str, Located[str]]]:
+def _ros_names(context: Context) -> Iterator[tuple[str, Located[str], Connection | None]]:
     for node in context.system.nodes:
         for port in node.ports:
-            yield port.kind.channel.value, port.ros_name
+            yield port.kind.channel.value, port.ros_name, None
         is_rule_of_rcl = not node.implementation.declares_everything
         for remapping in node.remappings:
-            yield "remapped", remapping.source.map(remapped_name if is_rule_of_rcl else str)
-            yield "remapped", remapping.target
+            source = remapping.source.map(remapped_name if is_rule_of_rcl else str)
+            yield "remapped", source, None
+            yield "remapped", remapping.target, None
     for connection in context.system.connections:
         if not connection.name.value.startswith("~"):
-            yield connection.kind.value, connection.name
+            yield connection.kind.value, connection.name, connection
 
 
 def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
@@ -156,6 +177,7 @@ def check_duplicate_full_name(context: Context) -> Iterator[Diagnostic]:
                     span,
                     (Label(place, "the other node"),),
                     hint="set another 'name' or 'namespace'",
+                    subjects=(("same node", node.name.value), ("same node", other.name.value)),
                 )
 
 

@@ -38,6 +38,7 @@ def check_unknown_node_type(context: Context) -> Iterator[Diagnostic]:
             f"node '{node.name}' has type '{name}', which does not exist",
             name.span,
             hint=suggestion(name.value, context.node_types.names()),
+            relies_on=(("folder", "nodes"),),
         )
 
 

@@ -41,6 +41,7 @@ def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
             f"parameter '{parameter.name}' must be of type {parameter.type}, not {problem}",
             value.span,
             labels,
+            subjects=(("parameter", parameter.name.value),),
         )
 
 
@@ -57,6 +58,7 @@ def check_parameter_range(context: Context) -> Iterator[Diagnostic]:
                 f"parameter '{parameter.name}': {problem.message}",
                 value.span,
                 (Label(problem.limit.span, "the limit"),),
+                subjects=(("parameter", parameter.name.value),),
             )
 
 
@@ -82,6 +84,7 @@ def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
             value.span,
             (Label(choices.span, "the valid choices"),),
             suggestion(str(invalid), [str(choice) for choice in choices.value]),
+            (("parameter", parameter.name.value),),
         )
 
 

@@ -15,6 +15,7 @@ from composer.diagnostics import (
     Diagnostic,
     Label,
     Severity,
+    Subject,
     error,
     nearest,
     shown,
@@ -23,6 +24,7 @@ from composer.diagnostics import (
 )
 from composer.model import Node, Parameter, UnmatchedParameters
 from composer.names import namespace_problem, split_node_name
+from composer.resolve.parameter_files import PARAMETER_FILES
 from composer.source import Located, Span
 from composer.spelling import is_typo
 
@@ -95,6 +97,7 @@ def _of_another_node(node: Node, first: Mapping[str, Node]) -> Diagnostic | None
         unknown[0].name.span,
         tuple(labels),
         f"node '{other.name}' has them",
+        relies_on=(("same node", node.name.value),),
     )
 
 
@@ -118,6 +121,7 @@ def _unknown_values(node: Node) -> Iterator[Diagnostic]:
                 f"node '{node.name}' has no parameter '{name}'",
                 unknown.name.span,
                 hint=suggestion(name, unknown.known),
+                relies_on=(("same node", node.name.value),),
             )
 
 
@@ -138,7 +142,8 @@ def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
         return
     errors = context.once(earlier_errors)
     for node in context.system.nodes:
-        if errors.may_declare(node.name.value, "parameters"):
+        is_named = not is_unresolved(node.name.value)
+        if not is_named or errors.may_declare(node.name.value, "parameters"):
             continue
         unknown = [item.name.value for item in node.unknown if item.section == "parameters"]
         for parameter in node.parameters:
@@ -151,6 +156,7 @@ def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
                     node.name.span,
                     (Label(parameter.name.span, "declared without a default"),),
                     f"add 'parameters: {{{parameter.name}: ...}}' to the node",
+                    relies_on=(PARAMETER_FILES,),
                 )
 
 
@@ -236,6 +242,7 @@ def check_unmatched_parameters(context: Context) -> Iterator[Diagnostic]:
                 _section_message(unmatched),
                 unmatched.section.span,
                 hint=_section_hint(unmatched),
+                relies_on=_node_of_section(unmatched.section.value),
             )
     for first, *others in of_programs.values():
         yield Diagnostic(
@@ -245,6 +252,11 @@ def check_unmatched_parameters(context: Context) -> Iterator[Diagnostic]:
             tuple(Label(other.span, "nor this one") for other in others[:_SHOWN_SECTIONS]),
             "if a program creates it, list it under 'nodes' of its executable",
         )
+
+
+def _node_of_section(section: str) -> tuple[Subject, ...]:
+    name = split_node_name(section)[1]
+    return (("section", name), ("node", name))
 
 
 def _is_misspelled_section(unmatched: UnmatchedParameters) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
+from composer.analysis.subjects import NODES_OF_PROCESSES, unknown_subjects
 from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.model import Channel
 from composer.names import topic_name_problem
@@ -33,7 +34,7 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
             f"node '{node.name}' runs in '{name}', which is not a process of this system",
             name.span,
             hint=suggestion(name.value, processes),
-            subjects=(("process", name.value),),
+            subjects=unknown_subjects("process", name.value, processes),
         )
     nodes = [node.name.value for node in system.nodes]
     known = frozenset(nodes)
@@ -46,7 +47,11 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
                 f"process '{process.name}' names '{node_name}', which is not a node of this system",
                 node_name.span,
                 hint=suggestion(node_name.value, nodes),
-                subjects=(("node", node_name.value), ("process", process.name.value)),
+                subjects=(
+                    *unknown_subjects("node", node_name.value, nodes),
+                    ("nodes of process", process.name.value),
+                    NODES_OF_PROCESSES,
+                ),
             )
 
 
@@ -75,6 +80,11 @@ def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
                 node_name.span,
                 related=(Label(where, f"in '{text}'"),),
                 hint="name it in one of them",
+                relies_on=tuple(
+                    (kind, name)
+                    for name in (text, process.name.value)
+                    for kind in ("process", "nodes of process")
+                ),
             )
     used = {process.value for process in named.values()}
     known_names = {process.name.value for process in system.processes}
@@ -91,7 +101,10 @@ def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
             and not context.once(earlier_errors).any
         ):
             yield Diagnostic(
-                CONFLICTING_PROCESS, f"process '{process.name}' has no nodes", process.name.span
+                CONFLICTING_PROCESS,
+                f"process '{process.name}' has no nodes",
+                process.name.span,
+                relies_on=(("process", process.name.value),),
             )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
@@ -12,17 +13,20 @@ from typing import Literal, TypeAlias
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.python_nodes import distinct_behaviors, distinct_classes
 from composer.analysis.spans import class_name_hint, part_of
+from composer.analysis.subjects import package_subjects
 from composer.diagnostics import (
     Diagnostic,
     Label,
     Rule,
     Severity,
+    Subject,
     error,
     info,
     registered_rules,
     suggestion,
     warning,
 )
+from composer.interfaces import Interfaces
 from composer.model import BehaviorReference, Node
 from composer.project import Project
 from composer.python_code.checks import code_problems
@@ -30,9 +34,8 @@ from composer.python_code.checks.imports import import_problems
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.modules import nearby_modules
 from composer.python_code.problems import Family, Problem
-from composer.python_code.syntax import Module
+from composer.python_code.syntax import Method, Module
 from composer.python_code.trees import start_span, walk
-from composer.source import Span
 
 UNKNOWN_IMPORT = error("RC444", "unknown-import")
 MODULE_NOT_INSTALLED = info("RC445", "module-not-installed")
@@ -64,8 +67,22 @@ def as_warning(rule: Rule, *, unless: bool = False) -> Rule:
     return rule if unless else replace(rule, severity=Severity.WARNING)
 
 
-def diagnostic(problem: Problem, place: Span, what: What) -> Diagnostic:
-    """Return the diagnostic of a problem; ``place`` is where the YAML file names the code.
+#: What a family takes for right: the ports and parameters of YAML, or a folder of the project.
+_RELIES_ON: Mapping[Family, tuple[str, ...]] = {
+    Family.PORT: ("port",),
+    Family.FIELD: ("type",),
+    Family.VALUE: ("parameter", "type"),
+    Family.MESSAGE_TYPE: ("type",),
+    Family.INDEX: ("parameter",),
+    Family.IMPORT: ("folder",),
+    Family.NOT_INSTALLED: ("folder",),
+}
+
+
+def diagnostic(
+    problem: Problem, node: Node | None, source: BehaviorSource, what: What, interfaces: Interfaces
+) -> Diagnostic:
+    """Return the diagnostic of a problem in the code of ``node``; None if it is of any node.
 
     In a class nothing but its syntax is an error: it may run as it does today.
     """
@@ -73,8 +90,45 @@ def diagnostic(problem: Problem, place: Span, what: What) -> Diagnostic:
     is_error = (what == "behavior" and problem.is_certain) or problem.family is Family.SYNTAX
     if rule.severity is Severity.ERROR and not is_error:
         rule = as_warning(rule)
-    label = Label(place, f"the {what} of this node")
-    return Diagnostic(rule, problem.message, problem.span, (label,), problem.hint)
+    label = Label(source.reference.text.span, f"the {what} of this node")
+    subjects = tuple(_subjects(problem, interfaces))
+    given = tuple(_relies_on(problem, node, source))
+    return Diagnostic(rule, problem.message, problem.span, (label,), problem.hint, subjects, given)
+
+
+def _subjects(problem: Problem, interfaces: Interfaces) -> Iterator[Subject]:
+    """Yield what a problem says is wrong."""
+    match problem.family:
+        case Family.FIELD:
+            yield ("field", problem.message)
+        case Family.IMPORT | Family.NOT_INSTALLED:
+            yield from package_subjects(interfaces, problem.span.text)
+        case Family.PARAMETER:
+            yield ("undeclared parameter", problem.span.text.strip("\"'"))
+        case _:
+            return
+
+
+def _relies_on(problem: Problem, node: Node | None, source: BehaviorSource) -> Iterator[Subject]:
+    """Yield what a problem takes for right: ports and parameters of its line and its handler."""
+    kinds = _RELIES_ON.get(problem.family, ())
+    if "folder" in kinds:
+        yield ("folder", "interfaces")
+    if node is None or not kinds:
+        return
+    span = problem.span
+    names = set(re.findall(r"\w+", span.file.line(span.line)))
+    for method in source.methods:
+        if method.span.file == span.file and _contains(method, span.line):
+            names.add(method.name.removeprefix("on_").removeprefix("accept_"))
+    for name in sorted(names):
+        for kind in kinds:
+            yield (kind, name if kind == "parameter" else f"{node.name}.{name}")
+
+
+def _contains(method: Method, line: int) -> bool:
+    node = method.node
+    return node is not None and node.lineno <= line <= (node.end_lineno or node.lineno)
 
 
 @cache
@@ -86,10 +140,10 @@ def _rules() -> Mapping[str, Rule]:
 def check_python(context: Context) -> Iterator[Diagnostic]:
     """Report the problems of the files of behaviors and classes, each once."""
     for source, what, problem in _import_problems(context):
-        yield diagnostic(problem, source.reference.text.span, what)
+        yield diagnostic(problem, None, source, what, context.interfaces)
     for node, source, what in sources(context):
         for problem in code_problems(node, source, context.interfaces):
-            yield diagnostic(problem, source.reference.text.span, what)
+            yield diagnostic(problem, node, source, what, context.interfaces)
 
 
 def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:

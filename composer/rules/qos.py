@@ -151,6 +151,7 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
             for sink in sinks
         ),
         hint,
+        relies_on=(("topic qos", port.full_name),),
     )
 
 
@@ -169,6 +170,7 @@ def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:
                     f"'{port.full_name}' carries commands, but is best effort and may lose them",
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: command'",
+                    relies_on=(("topic qos", port.full_name),),
                 )
 
 

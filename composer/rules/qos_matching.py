@@ -232,6 +232,7 @@ def _own_qos(node: Node, port: Port) -> Iterator[Diagnostic]:
             port.qos.span,
             (Label(declared.span, "its own QoS"),),
             "use the QoS of that port for the connection",
+            (("topic qos", port.full_name),),
         )
 
 

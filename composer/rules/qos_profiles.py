@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic, Label, info, suggestion
+from composer.analysis.subjects import unknown_subjects
+from composer.diagnostics import Diagnostic, Label, errors_subject, info, suggestion
 from composer.expand.rules import CYCLE, UNUSED_DECLARATION
 from composer.model import ChannelKind, NamedQos
 from composer.qos import PRESETS
@@ -52,7 +53,7 @@ def check_unknown_qos_profile(context: Context) -> Iterator[Diagnostic]:
             f"there is no QoS profile '{name}'",
             name.span,
             hint=hint,
-            subjects=(("QoS profile", name.value),),
+            subjects=unknown_subjects("QoS profile", name.value, known_profiles(context)),
         )
 
 
@@ -68,7 +69,10 @@ def check_unused_qos_profile(context: Context) -> Iterator[Diagnostic]:
     for profile in context.system.qos_profiles:
         if profile.name.value not in used:
             yield Diagnostic(
-                UNUSED_DECLARATION, f"QoS profile '{profile.name}' is never used", profile.name.span
+                UNUSED_DECLARATION,
+                f"QoS profile '{profile.name}' is never used",
+                profile.name.span,
+                relies_on=(errors_subject(profile.name.span),),
             )
 
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from composer.analysis.context import Context, is_unresolved, location
 from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.analysis.expressions import sends
 from composer.analysis.formatting import a, either
 from composer.analysis.spans import part_of
-from composer.diagnostics import Diagnostic, Label, error, suggestion
+from composer.analysis.subjects import (
+    NAMESPACES,
+    connection_subjects,
+    port_subject,
+    unknown_subjects,
+)
+from composer.diagnostics import Diagnostic, Label, Subject, error, suggestion
 from composer.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
 
@@ -20,21 +26,25 @@ WRONG_PORT_KIND = error("RC211", "wrong-port-kind")
 PORT_CONNECTED_TWICE = error("RC212", "port-connected-twice")
 
 
-def endpoints(system: System) -> Iterator[Endpoint]:
-    """Yield the ports that connections and chains refer to."""
+def endpoints(system: System) -> Iterator[tuple[Endpoint, Connection | None]]:
+    """Yield the ports that connections and chains refer to, with their connection."""
     for connection in system.connections:
-        yield from connection.sources
-        yield from connection.sinks
+        yield from ((end, connection) for end in connection.ends)
     for chain in system.chains:
-        yield from chain.through
+        yield from ((end, None) for end in chain.through)
+
+
+def _names_given(context: Context, connection: Connection | None) -> tuple[Subject, ...]:
+    """Return what is not known of a connection that names the wrong port."""
+    return () if connection is None else connection_subjects(context.system, connection)
 
 
 def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
     """Check the endpoints of connections, the dependencies of nodes, and the command line."""
     if context.is_partial:
         return
-    for endpoint in endpoints(context.system):
-        yield from _node_of_endpoint(context, endpoint)
+    for endpoint, connection in endpoints(context.system):
+        yield from _node_of_endpoint(context, endpoint, connection)
     for node in context.system.nodes:
         yield from _unknown_dependencies(context, node)
     for unknown in context.system.unknown:
@@ -43,24 +53,27 @@ def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
             f"'{unknown.name}' is not a node of this system",
             unknown.name.span,
             hint=suggestion(unknown.name.value, unknown.known),
-            subjects=(("node", unknown.name.value),),
+            subjects=unknown_subjects("node", unknown.name.value, unknown.known),
         )
 
 
-def _node_of_endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
+def _node_of_endpoint(
+    context: Context, endpoint: Endpoint, connection: Connection | None
+) -> Iterator[Diagnostic]:
     name = endpoint.node
     if is_unresolved(endpoint.text.value) or context.system.node(name) is not None:
         return
+    names = _names_given(context, connection)
     if not name:
         message = f"'{endpoint.text}' is not of the form 'node.port'"
-        yield Diagnostic(UNKNOWN_NODE, message, endpoint.text.span)
+        yield Diagnostic(UNKNOWN_NODE, message, endpoint.text.span, subjects=names)
         return
     yield Diagnostic(
         UNKNOWN_NODE,
         f"'{endpoint.text}' names node '{name}', which is not a node of this system",
         part_of(endpoint.text, 0, len(name)),
         hint=suggestion(name, context.once(_node_names)),
-        subjects=(("node", name),),
+        subjects=(*unknown_subjects("node", name, context.once(_node_names)), *names),
     )
 
 
@@ -74,7 +87,7 @@ def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
             f"node '{node.name}' depends on '{name}', which is not a node of this system",
             name.span,
             hint=suggestion(name.value, context.once(_node_names)),
-            subjects=(("node", name.value),),
+            subjects=unknown_subjects("node", name.value, context.once(_node_names)),
         )
 
 
@@ -92,9 +105,9 @@ _SENDERS = {
 def check_unknown_port(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that connections, chains, reactions and overrides refer to."""
     errors = context.once(earlier_errors)
-    for endpoint in endpoints(context.system):
+    for endpoint, connection in endpoints(context.system):
         if not errors.may_declare(endpoint.node, *PORT_SECTIONS):
-            yield from _port_of_endpoint(context, endpoint)
+            yield from _port_of_endpoint(context, endpoint, connection)
     for site, key, send in sends(context.system):
         name = send.port
         if not site.node.complete or is_unresolved(name.value):
@@ -109,23 +122,37 @@ def check_unknown_port(context: Context) -> Iterator[Diagnostic]:
             f"'{key}' names port '{name}', which the node does not have",
             name.span,
             hint=suggestion(name.value, candidates),
+            subjects=_renamed(site.node, name.value, candidates),
         )
     for node in context.system.nodes:
         yield from _overridden_ports(node)
 
 
-def _port_of_endpoint(context: Context, endpoint: Endpoint) -> Iterator[Diagnostic]:
+def _renamed(node: Node, name: str, candidates: Iterable[str]) -> tuple[Subject, ...]:
+    """Return a port that does not exist: other nodes of the type may name it, too."""
+    return (("renamed port", f"{name} {' '.join(candidates)}"), ("port", f"{node.name}.{name}"))
+
+
+def _port_of_endpoint(
+    context: Context, endpoint: Endpoint, connection: Connection | None
+) -> Iterator[Diagnostic]:
     node = context.system.node(endpoint.node)
     if node is None or not node.complete or node.port(endpoint.port) is not None:
         return
     name = endpoint.port
     if is_unresolved(endpoint.text.value):
         return
+    candidates = [port.name.value for port in node.ports]
+    names = _names_given(context, connection)
+    is_in_loop = "${" in endpoint.text.span.text
     yield Diagnostic(
         UNKNOWN_PORT,
         f"node '{node.name}' has no port '{name}'",
         part_of(endpoint.text, len(endpoint.node) + 1, len(name)),
-        hint=suggestion(name, [port.name.value for port in node.ports]),
+        hint=suggestion(name, candidates),
+        subjects=(*_renamed(node, name, candidates), *names),
+        # One wrong value of a loop gives an unknown node and an unknown port.
+        relies_on=(("port", f"{node.name}.{name}"), *(names if is_in_loop else ())),
     )
 
 
@@ -145,6 +172,7 @@ def _overridden_ports(node: Node) -> Iterator[Diagnostic]:
             f"node type '{node.type_name}' has no port '{name}' under '{unknown.section}'",
             name.span,
             hint=hint,
+            subjects=_renamed(node, name.value, unknown.known),
         )
 
 
@@ -168,6 +196,8 @@ def check_port_connected_twice(context: Context) -> Iterator[Diagnostic]:
                     endpoint.text.span,
                     (Label(place.text.span, "here too"),),
                     "did you mean another port?",
+                    connection_subjects(context.system, connection, endpoint),
+                    _twice(endpoint),
                 )
             elif difference is not None and later not in reported:
                 reported.add(later)
@@ -177,7 +207,18 @@ def check_port_connected_twice(context: Context) -> Iterator[Diagnostic]:
                     endpoint.text.span,
                     (Label(place.text.span, f"connected to '{earlier.name}' here"),),
                     "put all ports that share a name into one connection",
+                    (
+                        *connection_subjects(context.system, earlier),
+                        *connection_subjects(context.system, connection, endpoint),
+                    ),
+                    _twice(endpoint),
                 )
+
+
+def _twice(endpoint: Endpoint) -> tuple[Subject, ...]:
+    """Return what a port that is connected twice relies on: that this port is meant."""
+    name = endpoint.text.value
+    return (*NAMESPACES, ("port", name), ("type", name))
 
 
 def _is_named_twice(first: Endpoint, second: Endpoint, connection: Connection) -> bool:
@@ -222,6 +263,7 @@ def check_wrong_port_kind(context: Context) -> Iterator[Diagnostic]:
                 send.port.span,
                 (Label(port.name.span, f"declared as {a(port.kind)}"),),
                 _sending_hint(port.kind),
+                (port_subject(site.node, port),),
             )
 
 
@@ -257,7 +299,7 @@ def _wrong_ports_of_connection(context: Context, connection: Connection) -> Iter
     wrong = [slot for slot in slots if slot.port.kind is not slot.expected]
     kinds = {slot.port.kind.channel for slot in wrong}
     if len(wrong) > 1 and len(wrong) == len(slots) and len(kinds) == 1:
-        yield _all_wrong(connection, wrong, kinds.pop())
+        yield _all_wrong(context, connection, wrong, kinds.pop())
         return
     for slot in wrong:
         actual = slot.port.kind
@@ -268,6 +310,7 @@ def _wrong_ports_of_connection(context: Context, connection: Connection) -> Iter
             slot.endpoint.text.span,
             (Label(slot.port.name.span, f"declared as {a(actual)}"),),
             _belongs(connection, actual),
+            (("port", slot.endpoint.text.value), *connection_subjects(context.system, connection)),
         )
 
 
@@ -280,7 +323,9 @@ def _slots(context: Context, connection: Connection) -> Iterator[_Slot]:
                 yield _Slot(endpoint, key, kind, port)
 
 
-def _all_wrong(connection: Connection, slots: list[_Slot], kind: ChannelKind) -> Diagnostic:
+def _all_wrong(
+    context: Context, connection: Connection, slots: list[_Slot], kind: ChannelKind
+) -> Diagnostic:
     """Report one diagnostic for a connection whose endpoints are all wrong."""
     (source_key, _), (sink_key, _) = _ENDS[connection.kind]
     if kind is connection.kind:
@@ -294,7 +339,8 @@ def _all_wrong(connection: Connection, slots: list[_Slot], kind: ChannelKind) ->
         (source_key, _), (sink_key, _) = _ENDS[kind]
         hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
     labels = tuple(slot.label for slot in slots)
-    return Diagnostic(WRONG_PORT_KIND, message, connection.span, labels, hint)
+    subjects = connection_subjects(context.system, connection)
+    return Diagnostic(WRONG_PORT_KIND, message, connection.span, labels, hint, subjects)
 
 
 def _belongs(connection: Connection, actual: PortKind) -> str:

@@ -7,7 +7,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, Label, Severity, error, shown, suggestion, warning
+from composer.analysis.subjects import wiring
+from composer.diagnostics import (
+    Diagnostic,
+    Label,
+    Severity,
+    Subject,
+    error,
+    shown,
+    suggestion,
+    warning,
+)
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
 from composer.names import expand_name, remapped_name, topic_name_problem
 from composer.source import Located
@@ -70,7 +80,15 @@ def check_unknown_remapping(context: Context) -> Iterator[Diagnostic]:
                 f"node '{node.name}' has no port named '{source}' to remap",
                 source.span,
                 hint=_remapping_hint(node, source.value),
+                subjects=() if node.gets_undeclared else tuple(_names_meant(node, remapping)),
             )
+
+
+def _names_meant(node: Node, remapping: Remapping) -> Iterator[Subject]:
+    """Yield what is not known if a remapping names no port: any port of the node may be meant."""
+    yield ("name", own_name(node, remapping.target.value))
+    for port in node.ports:
+        yield from wiring(node, port)
 
 
 def _is_misspelled(node: Node, source: Located[str]) -> bool:
@@ -157,6 +175,7 @@ def _overridden_name(node: Node, port: Port) -> Iterator[Diagnostic]:
             f"'{node.name}.{port.name}' the name '{port.full_name}'",
             name.span,
             hint=f"remove '{word}' here, or the port from the connection",
+            relies_on=wiring(node, port),
         )
 
 
@@ -175,4 +194,5 @@ def _overridden_remapping(node: Node, remapping: Remapping) -> Iterator[Diagnost
         f"the final name is '{actual[0]}'",
         remapping.source.span,
         hint="remove the remapping, or remove the port from its connection",
+        relies_on=tuple(subject for port in ports for subject in wiring(node, port)),
     )

@@ -87,6 +87,7 @@ def check_unused_restart(context: Context) -> Iterator[Diagnostic]:
                 "the restart settings have no effect",
                 span,
                 hint="add 'on_failure: restart'",
+                relies_on=(("key", "on_failure"),),
             )
 
 

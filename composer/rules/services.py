@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from composer.analysis.context import Context
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import number, port_name
+from composer.analysis.subjects import NAMESPACES, port_subject, wiring
 from composer.diagnostics import Diagnostic, Label, error, info
 from composer.model import Channel, ChannelKind, ImplementationKind, PortKind, PortOfNode
 from composer.model.dependencies import dependency_cycles, in_dependency_order
@@ -31,6 +32,13 @@ def check_duplicate_server(context: Context) -> Iterator[Diagnostic]:
                 _named_at(other),
                 (Label(_named_at(first), "the other server"),),
                 _other_name_hint(channel, other),
+                relies_on=(
+                    *NAMESPACES,
+                    port_subject(first.node, first.port),
+                    port_subject(other.node, other.port),
+                    *wiring(first.node, first.port),
+                    *wiring(other.node, other.port),
+                ),
             )
 
 

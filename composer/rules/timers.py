@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from composer.analysis.context import Context
 from composer.analysis.formatting import number
+from composer.analysis.subjects import used_parameters
 from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.expressions import Expression
 from composer.model import Node, Parameter, PeriodError, PeriodUnit, Timer
@@ -28,7 +29,6 @@ def check_unknown_timer(context: Context) -> Iterator[Diagnostic]:
                     f"node type '{node.type_name}' has no timer '{unknown.name}'",
                     unknown.name.span,
                     hint=suggestion(unknown.name.value, unknown.known),
-                    subjects=(("timer", f"{node.name}.{unknown.name}"),),
                 )
 
 
@@ -47,6 +47,7 @@ def check_timer_period(context: Context) -> Iterator[Diagnostic]:
                     f"timer '{timer.name}' {problem}{_origin_text(timer)}",
                     timer.period.span,
                     hint="use a period between 0.1 ms and one day",
+                    relies_on=used_parameters(timer.period.value),
                 )
 
 
@@ -161,4 +162,5 @@ def _unusual_rate(
         f"timer '{timer.name}' of a {word} node runs at {number(rate_hz)} Hz; "
         f"{number(low_hz)} to {number(high_hz)} Hz is usual",
         timer.period.span,
+        relies_on=used_parameters(timer.period.value),
     )

@@ -6,6 +6,7 @@ from collections.abc import Container, Iterator
 
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.formatting import port_name
+from composer.analysis.subjects import wiring
 from composer.diagnostics import Diagnostic, Label, warning
 from composer.model import ChannelKind, Event, Port, PortKind, PortOfNode, PrimaryState
 from composer.rules.connections import diagnostic_location, name_location
@@ -112,6 +113,7 @@ def check_own_publisher(context: Context) -> Iterator[Diagnostic]:
                 place,
                 (*labels, published),
                 "give one of the two ports another topic",
+                relies_on=(*wiring(sink.node, sink.port), *wiring(source.node, source.port)),
             )
 
 
@@ -161,4 +163,5 @@ def check_competing_commands(context: Context) -> Iterator[Diagnostic]:
                 other.port.name.span,
                 (Label(first.port.name.span, "the other publisher"),),
                 "use one topic for each, and a node that selects one of them",
+                relies_on=(*wiring(first.node, first.port), *wiring(other.node, other.port)),
             )

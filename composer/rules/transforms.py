@@ -57,7 +57,9 @@ def _by_code(
     if node.implementation is ImplementationKind.DECLARATIVE:
         child = declared.child
         message = f"nothing broadcasts the frame '{child}': node '{node.name}' has no code"
-        yield Diagnostic(TRANSFORM_SOURCE, message, child.span, hint=hint)
+        keys = ("from", "from_code", "translation_m", "rotation_deg", "rotation_rad", "quaternion")
+        given = tuple(("key", key) for key in keys)
+        yield Diagnostic(TRANSFORM_SOURCE, message, child.span, hint=hint, relies_on=given)
 
 
 def _from_subscription(node: Node, declared: DynamicTransform, source: str) -> Iterator[Diagnostic]:

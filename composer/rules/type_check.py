@@ -63,7 +63,7 @@ class TypeCheck:
         if self._problems is None:
             self._problems = self._collected()
         found = [
-            (node, problem, diagnostic(problem, source.reference.text.span, what))
+            (node, problem, diagnostic(problem, node, source, what, context.interfaces))
             for node, source, what in sources(context)
             for problem in self._problems.get(use_of(node, source), ())
         ]

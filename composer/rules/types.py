@@ -9,11 +9,13 @@ from dataclasses import replace
 from composer.analysis.context import Context
 from composer.analysis.fields import field_problems
 from composer.analysis.formatting import port_name
-from composer.diagnostics import Diagnostic, Label, error
+from composer.analysis.subjects import connection_subjects, port_subject, type_subject
+from composer.diagnostics import Diagnostic, Label, Subject, error
 from composer.fast_dataclass import dataclass
 from composer.field_types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
 from composer.names import join
+from composer.source import Span
 
 TYPE_MISMATCH = error("RC303", "type-mismatch")
 
@@ -212,13 +214,13 @@ def check_type_mismatch(context: Context) -> Iterator[Diagnostic]:
     for mismatch in context.once(type_mismatches):
         misnamed = misnamed_port(context, mismatch)
         if misnamed is not None:
-            yield _wrong_port(mismatch, *misnamed)
+            yield _wrong_port(context, mismatch, *misnamed)
             continue
         for name, endpoints in mismatch.others.items():
             yield _wrong_type(context, mismatch, name, endpoints)
 
 
-def _wrong_port(mismatch: TypeMismatch, end: Endpoint, meant: str) -> Diagnostic:
+def _wrong_port(context: Context, mismatch: TypeMismatch, end: Endpoint, meant: str) -> Diagnostic:
     """Report a connection that names the wrong port of a node."""
     channel = mismatch.channel
     wrong = next(
@@ -235,6 +237,23 @@ def _wrong_port(mismatch: TypeMismatch, end: Endpoint, meant: str) -> Diagnostic
         end.text.span,
         (Label(other.port.interface.span, f"the type of {other.port.kind} '{port_name(other)}'"),),
         f"did you mean '{meant}'?",
+        (*_types(channel), *_names_given_at(context, end.text.span)),
+    )
+
+
+def _types(channel: Channel) -> Iterator[Subject]:
+    """Yield the types of all ports of a channel: any of them may be the wrong one."""
+    return (port_subject(end.node, end.port, "type") for end in channel.ends)
+
+
+def _names_given_at(context: Context, place: Span) -> tuple[Subject, ...]:
+    """Return the names that a connection gives, if one of its ends or its name is at a place."""
+    return tuple(
+        subject
+        for connection in context.system.connections
+        for end in connection.ends
+        if place in (end.text.span, connection.name.span)
+        for subject in connection_subjects(context.system, connection, end)
     )
 
 
@@ -269,4 +288,9 @@ def _wrong_type(
         primary,
         tuple(labels),
         hint,
+        (
+            *_types(channel),
+            *_names_given_at(context, primary),
+        ),
+        tuple(type_subject(end.port) for end in channel.ends),
     )

@@ -181,10 +181,13 @@ def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
             continue
         message = f"'{shown(name)}' is not a key of {error.owner}"
         hint = advice(name, error.schema.get("title", ""), unused)
+        meant = _intended_key(error, name)
         needed = misspelled.missing.get(error.path)
         if needed is not None and f"'{needed}'" not in str(hint):
             hint = f"it needs the key '{needed}'"
-        yield Diagnostic(rules.UNKNOWN_KEY, message, entries[name].key.span, hint=hint)
+        subjects = () if meant is None else (("key", meant),)
+        span = entries[name].key.span
+        yield Diagnostic(rules.UNKNOWN_KEY, message, span, hint=hint, subjects=subjects)
 
 
 def _has_other_ends(error: _SchemaError) -> bool:

@@ -7,16 +7,20 @@ their names may be nested maps.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic, shown
+from composer.diagnostics import Diagnostic, Severity, Subject, shown
 from composer.project import OUTSIDE_HINT, Project
 from composer.resolve.parameter_files.reader import PARAMETER_FILE, read_parameter_file
 from composer.resolve.parameter_files.sections import ParameterFiles
 from composer.resolve.tree_values import is_opaque, texts
 from composer.tree import Tree
 
-__all__ = ["ParameterFiles", "read_parameter_file", "read_parameter_files"]
+__all__ = ["PARAMETER_FILES", "ParameterFiles", "read_parameter_file", "read_parameter_files"]
+
+#: The values of all parameter files, of which some may be missing.
+PARAMETER_FILES: Subject = ("parameter files", "")
 
 
 def read_parameter_files(
@@ -30,10 +34,15 @@ def read_parameter_files(
         path = folder / name.value
         if not project.holds(path):
             message = f"parameter file '{shown(name.value)}' is outside the project"
-            diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span, hint=OUTSIDE_HINT))
+            found = [Diagnostic(PARAMETER_FILE, message, name.span, hint=OUTSIDE_HINT)]
         elif not path.exists():
             message = f"there is no parameter file '{shown(name.value)}'"
-            diagnostics.append(Diagnostic(PARAMETER_FILE, message, name.span))
+            found = [Diagnostic(PARAMETER_FILE, message, name.span)]
         else:
-            diagnostics.extend(read_parameter_file(path, files, name.span.file))
+            found = read_parameter_file(path, files, name.span.file)
+        # What is not read may be what a node needs.
+        diagnostics += (
+            replace(item, subjects=(PARAMETER_FILES,)) if item.severity is Severity.ERROR else item
+            for item in found
+        )
     return files
