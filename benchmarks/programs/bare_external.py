@@ -18,7 +18,7 @@ from benchmarks.programs.hand_written import QUEUE_DEPTH
 from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import places, task_from_arguments
 from benchmarks.programs.work import COUNTS, measure, needs_kick, print_result
-from composer.runtime.executors.entities.readiness import MESSAGE, Signal
+from composer.runtime.executors.readiness import MESSAGE, Signal
 from composer.runtime.middleware.dds_profiles import use_discovery_profile
 
 
