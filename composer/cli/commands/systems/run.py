@@ -30,7 +30,6 @@ from composer.cli.support.options import (
     finite,
     options_of_run,
 )
-from composer.cli.support.output.c_streams import C_STREAMS
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import (
     announce_discovery,
@@ -176,6 +175,8 @@ def run(
     """
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
+    from composer.cli.support.output.c_streams import C_STREAMS
+
     C_STREAMS.redirect()  # before libraries of ROS are loaded
     warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
     import composer.loading  # noqa: F401 - importing its extension modules would wait for the thread
