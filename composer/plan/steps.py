@@ -97,14 +97,15 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
     """
     steps: list[Step] = []
     latest: dict[str, int] = {}
+    activated: dict[str, int] = {}
     for phase in phases:
+        earlier = {"configure": latest, "activate": activated}.get(phase.transition, {})
         numbers: dict[str, int] = {}
         needed: dict[str, list[str]] = {}
         for waiting, other in phase.waits:
             needed.setdefault(waiting, []).append(other)
         for node in phase.nodes:
             name = node.name.value
-            earlier = latest if phase.transition == "configure" else {}
             numbered = (numbers.get(other, earlier.get(other)) for other in needed.get(name, ()))
             after = {number for number in numbered if number is not None}
             numbers[name] = len(steps) + 1
@@ -120,6 +121,7 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
                 )
             )
         latest |= numbers
+        activated |= numbers if phase.transition == "activate" else {}
     return Plan(tuple(steps))
 
 

@@ -248,7 +248,7 @@ class World:
     def on_step(self, name: str, transition: str) -> None:
         assert name in self.may_move, f"'{transition}' of {name} undoes an external transition"
         if transition == "configure" and name == "teleop":  # a class, which is constructed now
-            assert not self.nodes[EXTERNAL].is_absent
+            assert self.nodes[EXTERNAL].state not in ("activating", "configuring")
         if transition == "activate":  # what follows a failure is decided before
             edges = [edge for edge in dependency_edges(SYSTEM) if edge.node == name]
             missing = [edge.on for edge in edges if edge.on in self.broken]

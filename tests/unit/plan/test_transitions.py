@@ -113,3 +113,7 @@ def test_a_class_is_configured_once_what_it_depends_on_is_active() -> None:
     waits = {f"{step.transition} {step.node}": step.after for step in plan.steps}
     activated = {step.node: step.number for step in plan.steps if step.transition == "activate"}
     assert waits["configure planner"] == (activated["filter"],)
+    here["planner"] = PrimaryState.INACTIVE
+    plan = plan_transitions(system, here, goals, dict.fromkeys(here, "asked for"))
+    activated = {step.node: step for step in plan.steps if step.transition == "activate"}
+    assert activated["planner"].after == (activated["filter"].number,)
