@@ -9,8 +9,8 @@ import os
 import re
 import shlex
 import shutil
-import signal
 import subprocess
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack
@@ -149,10 +149,10 @@ DIFFERENCES = {
     "node list  # 2": MANAGER,
     f"{NO_TRANSITION}  # 1": "an unknown transition is refused; a node of rclpy ends with it",
 }
-#: They measure until Ctrl-C.
+#: They measure until Ctrl-C, and print a line with one of these from time to time.
 ENDLESS = ("topic hz", "topic bw", "topic delay")
-MEASURES_FOR_S = 6.0
-ENDS_WITHIN_S = 40.0
+MEASUREMENT = ("average rate:", "/s from", "average delay:")
+ENDS_WITHIN_S = 60.0
 #: A process that is not scheduled for a moment discovers the others late.
 NOT_DISCOVERED = (
     "Node not found",
@@ -203,20 +203,30 @@ def _answer(line: str, environment: Mapping[str, str]) -> str:
 
 
 def _output(words: Sequence[str], environment: Mapping[str, str], *, is_endless: bool) -> str:
-    process = subprocess.Popen(
+    with subprocess.Popen(
         ("ros2", *words),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env=environment,
-    )
-    try:
-        output, _ = process.communicate(timeout=MEASURES_FOR_S if is_endless else ENDS_WITHIN_S)
-    except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=ENDS_WITHIN_S)
-        return f"{output}stopped"
+        env={**environment, "PYTHONUNBUFFERED": "1"},
+    ) as process:
+        limit = threading.Timer(ENDS_WITHIN_S, process.kill)
+        limit.start()
+        try:
+            if is_endless:
+                return _first_measurement(process)
+            output, _ = process.communicate()
+        finally:
+            limit.cancel()
     return f"{output}exit code {process.returncode}"
+
+
+def _first_measurement(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    lines = (text for line in process.stdout for text in MEASUREMENT if text in line)
+    found = next(lines, "no measurement")
+    process.kill()
+    return found
 
 
 def _without_chance(text: str) -> str:
@@ -225,6 +235,6 @@ def _without_chance(text: str) -> str:
     text = re.sub(r"(GID|ID): [\w.]+|(_ros2cli_)\d+", r"\1\2", text)
     text = re.sub(r"-?\d+\.\d+(e-?\d+)?|\d{15,}|(?<=sec[:=])\s*\d+", "#", text)
     text = re.sub(r"(publication_sequence_number:) \d+", r"\1 #", text)
-    text = re.sub(r"(Feedback:\n(?:.+\n)+\n)\1+", r"\1", text)
-    # The measurements until the signal, and what follows it.
-    return re.sub(r"^(average|.*/s from|\s+min:|\s+Message size).*\n", "", text, flags=re.MULTILINE)
+    # The first feedback may arrive before the response that accepts the goal.
+    feedback = re.compile(r"Feedback:\n(?:.+\n)+\n")
+    return feedback.sub("", text) + "".join(feedback.findall(text)[:1])
