@@ -1,16 +1,22 @@
-"""What all connections of one dashboard share."""
+"""What all connections of one dashboard share, and what their operations are."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.access import Access
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
+from composer.dashboard.protocol.messages import Values
 from composer.dashboard.ros_side import RosSide
 from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
+
+if TYPE_CHECKING:
+    from composer.dashboard.ros_side import RosGraphSide
+    from composer.remote.session import Deadline
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,3 +39,21 @@ class Dashboard:
     feeds: Feeds
     interfaces: Interfaces
     hello: dict[str, Any] = field(default_factory=dict)
+
+
+#: Runs on a worker thread, and returns what the browser gets. Raises RequestError or RosError.
+Run = Callable[["RosGraphSide", "Deadline"], Any]
+#: What to run, and its time limit in seconds.
+Prepared = tuple[Run, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """What a browser can request.
+
+    ``prepare`` reads the request; it raises BadRequestError and must not block. ``changes`` is
+    whether it changes something, which a read-only dashboard refuses.
+    """
+
+    prepare: Callable[[Values, Dashboard], Prepared]
+    changes: bool = False

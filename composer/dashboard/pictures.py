@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import threading
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +24,8 @@ RATE_PLACEHOLDER_HZ = 1111.0
 #: Stands where the page writes the process of an executor.
 PROCESS_PLACEHOLDER = "pid 4194304 · 10 restarts"
 _NODE = "node:"
+#: Those of the last views are kept.
+_MAX_DIAGRAMS = 4
 #: Views without a direction of their own.
 _TURNED = (View.NODES, View.CONNECTIONS, View.DEPLOYMENT)
 
@@ -131,3 +134,21 @@ def _declared(details: dict[str, Any]) -> dict[str, Any]:
     if isinstance(ports := found.get("ports"), list):
         found["ports"] = [_declared(port) for port in ports]
     return found
+
+
+class Diagrams:
+    """Diagrams by what they depend on, laid out once for all pages. Use it on worker threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._known: dict[Hashable, Diagram] = {}
+
+    def of(self, key: Hashable, lay_out: Callable[[], Diagram]) -> Diagram:
+        """Return the diagram with this key; the first call lays it out, and others wait for it."""
+        # One at a time: layouts are Python code, of which only one thread runs at any time.
+        with self._lock:
+            diagram = self._known.pop(key, None) or lay_out()
+            self._known[key] = diagram
+            while len(self._known) > _MAX_DIAGRAMS:
+                del self._known[next(iter(self._known))]
+            return diagram

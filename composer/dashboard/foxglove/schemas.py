@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from typing import Any
 
 from composer.interfaces import FieldType, Interfaces, Message, Service
 from composer.tree import Plain
 
 _SEPARATOR = "=" * 80
+_MAX_SCHEMAS = 10_000
 
 
 class Schemas:
@@ -22,6 +24,7 @@ class Schemas:
     def message(self, name: str) -> str | None:
         """Return the schema of a message; None if a definition is not known."""
         if name not in self._messages:
+            _make_room(self._messages)
             found = self._interfaces.message(name)
             self._messages[name] = None if found is None else self._text(found)
         return self._messages[name]
@@ -29,6 +32,7 @@ class Schemas:
     def service(self, name: str) -> tuple[str, str] | None:
         """Return the schemas of the request and the response of a service, or None."""
         if name not in self._services:
+            _make_room(self._services)
             self._services[name] = self._service(name)
         return self._services[name]
 
@@ -55,6 +59,12 @@ class Schemas:
         parts = [_definition(message)]
         parts += [f"MSG: {_short(name)}\n{_definition(found)}" for name, found in inner.items()]
         return f"{_SEPARATOR}\n".join(parts)
+
+
+def _make_room(schemas: dict[str, Any]) -> None:
+    """Forget schemas if there are too many: any node can announce names of types."""
+    if len(schemas) >= _MAX_SCHEMAS:
+        schemas.clear()
 
 
 def _definition(message: Message) -> str:

@@ -31,6 +31,8 @@ _MAX_TAKEN = 500
 #: Of each log file, as much as has about that many lines.
 _MAX_BYTES = 500_000
 _MAX_LENGTH = 4000
+#: Of the names in a line, which any node can publish.
+_MAX_NAME = 500
 SEVERITIES_BY_NAME = {level.value: number for level, number in SEVERITIES.items()}
 
 
@@ -144,14 +146,14 @@ def _lines_of_runs() -> list[LogLine]:
 
 
 def _line(message: Any) -> LogLine:
-    logger = str(message.name)
+    logger = str(message.name)[:_MAX_NAME]
     return LogLine(
         at_s=message.stamp.sec + message.stamp.nanosec * 1e-9,
         severity=int(message.level),
         node=f"/{logger.replace('.', '/')}",
         logger=logger,
         text=message.msg[:_MAX_LENGTH],
-        file=message.file,
+        file=message.file[:_MAX_NAME],
         line=int(message.line),
-        function=message.function,
+        function=message.function[:_MAX_NAME],
     )

@@ -8,10 +8,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Self
 
-from composer.dashboard.observing.diagrams import Diagrams
 from composer.dashboard.observing.log_lines import LogLines
 from composer.dashboard.observing.meters import TopicMeters
 from composer.dashboard.observing.topology import Topology
+from composer.dashboard.pictures import Diagrams
 from composer.drift import ObservedEndpoint
 from composer.remote.lifecycle import LifecycleClient
 from composer.remote.session import Deadline

@@ -5,8 +5,8 @@ To add an operation, add a function to one of the modules, and its line in ``OPE
 
 from __future__ import annotations
 
+from composer.dashboard.context import Operation
 from composer.dashboard.operations import calls, nodes, types
-from composer.dashboard.operations.operation import Operation
 
 OPERATIONS: dict[str, Operation] = {
     "node": Operation(nodes.node),

@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.context import Dashboard
-from composer.dashboard.operations.operation import Prepared
+from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.protocol.messages import Values, json_safe
 from composer.dashboard.publishing import read_outgoing
 

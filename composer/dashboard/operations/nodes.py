@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.channels.nodes import COMMANDS
 from composer.dashboard.channels.topics import shown_qos
-from composer.dashboard.context import Dashboard
+from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.declared import required
-from composer.dashboard.operations.operation import Prepared
 from composer.dashboard.protocol.errors import RequestError, from_ros
 from composer.dashboard.protocol.messages import Values, json_safe
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.context import Dashboard
-from composer.dashboard.operations.operation import Prepared
+from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.protocol.messages import Values
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import logging
 import os
 import signal
 import socket
@@ -102,12 +103,18 @@ def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], Non
         log_config=None,
         log_level="error",
     )
+    logging.getLogger("uvicorn.error").addFilter(_is_of_use)
     server = _Server(config, app, on_ready)
     try:
         asyncio.run(server.serve(sockets=[listening]))
     finally:
         for number in STOP_SIGNALS:  # uvicorn has set them back
             signal.signal(number, _end_at_once)
+
+
+def _is_of_use(record: logging.LogRecord) -> bool:
+    """Return whether to log something: each refused WebSocket would be a line."""
+    return "without completing handshake" not in record.getMessage()
 
 
 def _end_at_once(number: int, _: FrameType | None) -> None:
