@@ -123,7 +123,7 @@ class Handler:
 
 
 def array_length(parameter: Parameter) -> int | None:
-    """Return the number of elements of a value; None if it is no array, or not set."""
+    """Return the number of elements of a value; None if it is not a list, or not set."""
     value = None if parameter.value is None else parameter.value.value
     return len(value) if isinstance(value, list) else None
 
