@@ -49,7 +49,10 @@ def containers(part: Any) -> Iterator[Any]:
 
 def mutate(content: Any, chance: random.Random) -> None:
     """Remove an entry, shorten a list, change a number or flip a switch."""
-    container = chance.choice([*containers(content)])
+    places = [*containers(content)]
+    if not places:
+        return
+    container = chance.choice(places)
     key = chance.choice([*container] if isinstance(container, dict) else range(len(container)))
     match container[key]:
         case bool(value):
