@@ -36,7 +36,6 @@ def behavior_problems(code: Code) -> Iterator[Problem]:
                     yield from _awaited(call, scope)
                 case ast.Subscript(value=ast.Attribute() as owner, slice=index):
                     yield from _key(dotted(owner), index, scope)
-                    yield from _element(owner, index, scope)
                 case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Attribute() as value):
                     yield from _unpacked(names, value, scope)
                 case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
@@ -109,38 +108,24 @@ def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
         yield scope.problem(Family.PORT, message, index, suggestion(key, names))
 
 
-def _element(array: ast.expr, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
-    """Yield the constant indices that the value of an array parameter does not have."""
-    size, at = _size(array, scope), scope.constant(index)
-    if size is not None and isinstance(at, int) and not -size <= at < size:
-        message = f"{_parameter(array, scope)} has no element {at}: it has {_elements(size)}"
-        yield scope.problem(Family.INDEX, message, index)
-
-
 def _unpacked(names: list[ast.expr], array: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     """Yield the array parameters that are assigned to more or fewer names than they have."""
-    size = _size(array, scope)
-    is_open = any(isinstance(name, ast.Starred) for name in names)
-    if size is not None and (size < len(names) - 1 if is_open else size != len(names)):
-        message = f"{_parameter(array, scope)} has {_elements(size)}, not {len(names)}"
-        yield scope.problem(Family.INDEX, message, array, "change its value, or the code")
-
-
-def _size(array: ast.expr, scope: NodeScope) -> int | None:
-    """Return the number of elements in the value of an array parameter."""
     owner, _, name = dotted(array).rpartition(".")
     is_own = owner == "self.parameters" and scope.method is not None
     parameter = scope.code.node.parameter(name) if is_own else None
-    return None if parameter is None else array_length(parameter)
+    size = None if parameter is None else array_length(parameter)
+    if size is None or any(isinstance(node, ast.Try) or _is_len(node) for node in scope.nodes):
+        return  # the code may know
+    is_open = any(isinstance(item, ast.Starred) for item in names)
+    if size < len(names) - 1 if is_open else size != len(names):
+        elements = f"{size} element" + ("" if size == 1 else "s")
+        message = f"parameter '{name}' of node '{scope.code.node.name}' has {elements}"
+        hint = "change its value, or the code"
+        yield scope.problem(Family.INDEX, f"{message}, not {len(names)}", array, hint)
 
 
-def _parameter(array: ast.expr, scope: NodeScope) -> str:
-    name = dotted(array).rpartition(".")[2]
-    return f"parameter '{name}' of node '{scope.code.node.name}'"
-
-
-def _elements(count: int) -> str:
-    return f"{count} element" + ("" if count == 1 else "s")
+def _is_len(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and node.id == "len"
 
 
 def _word(node: ast.expr, scope: NodeScope) -> Word | None:

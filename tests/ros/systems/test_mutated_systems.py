@@ -22,6 +22,8 @@ from tests.ros.support.in_process import RunningSystem, wait_until
 
 BATCHES, BATCH = 10, 20
 RUNS_S = 0.5
+#: Warnings of what fails if the code gets there.
+FORETOLD = ("elements, not ", "element, not ")
 #: Of the examples, those that need nothing else, and whose nodes are to come up.
 NAMES = (
     "executors",
@@ -104,6 +106,6 @@ def test_what_validates_comes_up(batch: int) -> None:
     for _ in range(BATCH):
         content, system, warnings = next(systems)
         problem = problem_of(system)
-        if problem is not None:
+        if problem is not None and not any(text in warnings for text in FORETOLD):
             failed.append(f"{json.dumps(content)}\n{warnings}\n{problem}")
     assert not failed, "\n\n".join(failed)
