@@ -19,7 +19,6 @@ from composer.executables import (
 from composer.model import Executable, ExecutableKind, LifecycleKind
 from composer.source import Located, Span
 
-UNKNOWN_EXECUTABLE = error("RC471", "unknown-executable")
 EXECUTABLE_NOT_INSTALLED = info("RC472", "executable-not-installed")
 INVALID_EXECUTABLE = error("RC473", "invalid-executable")
 
@@ -40,7 +39,7 @@ def check_unknown_executable(context: Context) -> Iterator[Diagnostic]:
         folder = _folder(executable)
         if folder is not None and not folder.is_dir() and executable.working_directory:
             written = executable.working_directory
-            yield Diagnostic(UNKNOWN_EXECUTABLE, f"folder '{written}' does not exist", written.span)
+            yield Diagnostic(INVALID_EXECUTABLE, f"folder '{written}' does not exist", written.span)
 
 
 def _command(executable: Executable) -> Iterator[Diagnostic]:
@@ -52,13 +51,13 @@ def _command(executable: Executable) -> Iterator[Diagnostic]:
         exists = (executable.folder / program.value).is_file()
         what = "is not executable" if exists else "does not exist"
         hint = f"run 'chmod +x {program}', or name its interpreter first" if exists else None
-        yield Diagnostic(UNKNOWN_EXECUTABLE, f"program '{program}' {what}", program.span, hint=hint)
+        yield Diagnostic(INVALID_EXECUTABLE, f"program '{program}' {what}", program.span, hint=hint)
     for script in arguments[:1]:
         path = folder / script.value
         if script.value.endswith(_SCRIPTS) and folder.is_dir() and not path.is_file():
             hint = suggestion(path.name, _file_names(path.parent))
             yield Diagnostic(
-                UNKNOWN_EXECUTABLE, f"file '{script}' does not exist", script.span, hint=hint
+                INVALID_EXECUTABLE, f"file '{script}' does not exist", script.span, hint=hint
             )
 
 
@@ -69,7 +68,7 @@ def _executable_of_package(package: Located[str], name: Located[str]) -> Iterato
         return  # see executable_not_installed.py
     if find_executable(package.value, name.value, os.environ) is None:
         yield Diagnostic(
-            UNKNOWN_EXECUTABLE,
+            INVALID_EXECUTABLE,
             f"package '{package}' has no executable '{name}'",
             name.span,
             hint=suggestion(name.value, executable_names(package.value, os.environ)),

@@ -28,9 +28,8 @@ from composer.rules.references import UNDECLARED_NAME
 from composer.source import Located, Span
 
 EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")
-SINGLE_THREAD = warning("RC417", "single-thread")
-SPLIT_EXECUTOR = info("RC480", "split-executor")
-EXECUTOR_OUTSIDE_PROCESS = warning("RC481", "executor-outside-process")
+EXECUTOR_SETTINGS = warning("RC417", "executor-settings")
+LOST_BETWEEN_PROCESSES = info("RC480", "lost-between-processes")
 
 _EXECUTOR_BUSY = replace(EXECUTOR_OVERLOADED, severity=Severity.WARNING)
 #: From this load on, an executor is busy.
@@ -76,7 +75,7 @@ def check_single_thread(context: Context) -> Iterator[Diagnostic]:
     for executor in context.system.executors:
         if executor.kind is ExecutorKind.MULTI_THREADED and executor.threads == 1:
             yield Diagnostic(
-                SINGLE_THREAD,
+                EXECUTOR_SETTINGS,
                 f"executor '{executor.name}' is multi_threaded, but has one thread",
                 executor.threads_span or executor.name.span,
                 hint="use two or more threads, or 'kind: events'",
@@ -85,7 +84,7 @@ def check_single_thread(context: Context) -> Iterator[Diagnostic]:
             executor
         ):
             yield Diagnostic(
-                SINGLE_THREAD,
+                EXECUTOR_SETTINGS,
                 f"executor '{executor.name}' has one thread, as its kind is {executor.kind}",
                 executor.threads_span or executor.name.span,
                 hint="add 'kind: multi_threaded', or remove 'threads'",
@@ -111,7 +110,7 @@ def check_split_executor(context: Context) -> Iterator[Diagnostic]:
         reported.add(name)
         at = node.executor.span if other.executor is None else other.executor.span
         yield Diagnostic(
-            SPLIT_EXECUTOR,
+            LOST_BETWEEN_PROCESSES,
             f"'{name}' is one executor in {_process_text(node)} "
             f"and another one in {_process_text(other)}",
             node.executor.span,
@@ -148,7 +147,7 @@ def check_executor_outside_process(context: Context) -> Iterator[Diagnostic]:
             continue
         reported.add(pair)
         yield Diagnostic(
-            EXECUTOR_OUTSIDE_PROCESS,
+            EXECUTOR_SETTINGS,
             f"executor '{executor.name}' runs on {_cpu_text(outside)}, "
             f"but process '{process.name}' only on {_cpu_text(process.cpus)}",
             executor.name.span,

@@ -7,16 +7,15 @@ from collections.abc import Iterator
 from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.subjects import NODES_OF_PROCESSES, unknown_subjects
-from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
 from composer.model import Channel
 from composer.names import topic_name_problem
+from composer.rules.executors import LOST_BETWEEN_PROCESSES
 from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE
 from composer.source import Located
 
 CONFLICTING_PROCESS = error("RC479", "conflicting-process")
-SEPARATE_PROCESS = error("RC482", "separate-process")
 MANY_SERVICES = warning("RC488", "many-services")
-ISOLATION_BETWEEN_PROCESSES = info("RC541", "isolation-between-processes")
 
 
 def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
@@ -117,14 +116,14 @@ def check_separate_process(context: Context) -> Iterator[Diagnostic]:
         for name, value in process.environment:
             if name.value == _DOMAIN:
                 yield Diagnostic(
-                    SEPARATE_PROCESS,
+                    CONFLICTING_PROCESS,
                     f"process '{process.name}' would be in a ROS domain of its own",
                     name.span,
                     hint=f"set {_DOMAIN} for 'compose run' instead, which all processes inherit",
                 )
             elif name.value == _DISCOVERY_RANGE and value == "OFF":
                 yield Diagnostic(
-                    SEPARATE_PROCESS,
+                    CONFLICTING_PROCESS,
                     f"process '{process.name}' would discover no other process",
                     name.span,
                     hint="remove it",
@@ -149,7 +148,7 @@ def check_isolation_between_processes(context: Context) -> Iterator[Diagnostic]:
         if not all(channel.sources and channel.sinks for channel in known):
             continue
         yield Diagnostic(
-            ISOLATION_BETWEEN_PROCESSES,
+            LOST_BETWEEN_PROCESSES,
             f"'isolation' of '{connection.name}' has no effect: no two of its nodes are in the "
             "same process",
             connection.isolation.span,

@@ -13,10 +13,8 @@ from composer.model import ChannelKind, Port, PortKind, PortOfNode
 from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
 
 QOS_DURATION_TOO_SHORT = warning("RC312", "qos-duration-too-short")
-KEEP_ALL = info("RC314", "keep-all")
-SHALLOW_QUEUE = info("RC315", "shallow-queue")
-UNRELIABLE_DELIVERY = info("RC316", "unreliable-delivery")
-RELIABLE_SENSOR_STREAM = info("RC317", "reliable-sensor-stream")
+UNSUITED_DEPTH = info("RC314", "unsuited-depth")
+UNSUITED_RELIABILITY = info("RC316", "unsuited-reliability")
 
 
 def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
@@ -74,7 +72,7 @@ def check_shallow_queue(context: Context) -> Iterator[Diagnostic]:
             rate_hz = known.topic_hz(port.full_name) if _is_shallow(port.qos.profile) else None
             if rate_hz is not None and rate_hz >= FAST_HZ:
                 yield Diagnostic(
-                    SHALLOW_QUEUE,
+                    UNSUITED_DEPTH,
                     f"reliable topic '{port.full_name}' at {number(rate_hz)} Hz "
                     "has a queue depth of 1",
                     port.qos.policy_span("depth"),
@@ -100,7 +98,7 @@ def check_keep_all(context: Context) -> Iterator[Diagnostic]:
                 continue
             if qos.profile.history is History.KEEP_ALL:
                 yield Diagnostic(
-                    KEEP_ALL,
+                    UNSUITED_DEPTH,
                     "'keep_all' lets queues grow without limit",
                     qos.policy_span("history"),
                     hint="use 'keep_last' with a depth",
@@ -143,7 +141,7 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
     else:
         hint = "use 'qos: sensor_data'"
     return Diagnostic(
-        RELIABLE_SENSOR_STREAM,
+        UNSUITED_RELIABILITY,
         f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
         port.qos.policy_span("reliability"),
         tuple(
@@ -166,7 +164,7 @@ def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:
                 continue
             if _COMMAND.search(port.full_name):
                 yield Diagnostic(
-                    UNRELIABLE_DELIVERY,
+                    UNSUITED_RELIABILITY,
                     f"'{port.full_name}' carries commands, but is best effort and may lose them",
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: command'",
@@ -183,7 +181,7 @@ def check_unreliable_state(context: Context) -> Iterator[Diagnostic]:
             qos = port.qos
             if port.kind.channel is ChannelKind.TOPIC and qos.known and _is_lost(qos.profile):
                 yield Diagnostic(
-                    UNRELIABLE_DELIVERY,
+                    UNSUITED_RELIABILITY,
                     "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
                     qos.policy_span("reliability"),
                     hint="use 'reliable' or 'volatile', unless an external node requires both",

@@ -10,8 +10,7 @@ from composer.diagnostics import Diagnostic, warning
 from composer.model import Node, OnFailure, RestartBudget, Supervision
 from composer.source import Span
 
-RESTART_SETTINGS = warning("RC406", "restart-settings")
-IMPOSSIBLE_POLICY = warning("RC476", "impossible-policy")
+FAILURE_SETTINGS = warning("RC406", "failure-settings")
 
 
 def check_endless_restart(context: Context) -> Iterator[Diagnostic]:
@@ -26,7 +25,7 @@ def check_endless_restart(context: Context) -> Iterator[Diagnostic]:
             continue
         seen.add(budget.span)
         yield Diagnostic(
-            RESTART_SETTINGS,
+            FAILURE_SETTINGS,
             f"{budget.max_attempts} restarts take at least {number(total_ms)} ms, "
             f"but only restarts within {number(budget.window_ms)} ms are counted",
             budget.span,
@@ -59,7 +58,7 @@ def check_restart_delay(context: Context) -> Iterator[Diagnostic]:
             continue
         seen.add(span)
         yield Diagnostic(
-            RESTART_SETTINGS,
+            FAILURE_SETTINGS,
             f"restarts start with a delay of {number(restart.backoff_ms)} ms, longer than the "
             f"maximum of {number(restart.backoff_max_ms)} ms",
             span,
@@ -83,7 +82,7 @@ def check_unused_restart(context: Context) -> Iterator[Diagnostic]:
     for span in declared:
         if span not in used:
             yield Diagnostic(
-                RESTART_SETTINGS,
+                FAILURE_SETTINGS,
                 "the restart settings have no effect",
                 span,
                 hint="add 'on_failure: restart'",
@@ -106,7 +105,7 @@ def check_impossible_policy(context: Context) -> Iterator[Diagnostic]:
             continue
         problem = _policy_problem(node)
         if problem is not None:
-            yield Diagnostic(IMPOSSIBLE_POLICY, problem[0], policy.span, hint=problem[1])
+            yield Diagnostic(FAILURE_SETTINGS, problem[0], policy.span, hint=problem[1])
 
 
 def _policy_problem(node: Node) -> tuple[str, str] | None:

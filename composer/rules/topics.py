@@ -12,7 +12,6 @@ from composer.model import ChannelKind, Event, Port, PortKind, PortOfNode, Prima
 from composer.rules.connections import diagnostic_location, name_location
 
 TOPIC_LOOP = warning("RC326", "topic-loop")
-OWN_PUBLISHER = warning("RC327", "own-publisher")
 COMPETING_COMMANDS = warning("RC328", "competing-commands")
 
 #: For each topic, the topics to which its messages are republished, with the subscription.
@@ -108,7 +107,7 @@ def check_own_publisher(context: Context) -> Iterator[Diagnostic]:
             place, labels = name_location(sink)
             published = Label(source.port.name.span, f"'{port_name(source)}' publishes them")
             yield Diagnostic(
-                OWN_PUBLISHER,
+                TOPIC_LOOP,
                 f"node '{sink.node.name}' receives its own messages on '{channel.name}'",
                 place,
                 (*labels, published),

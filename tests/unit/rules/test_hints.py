@@ -70,7 +70,7 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     "threads of an executor that has one": (
         "system: demo\nexecutors: {io: {threads: 4}}\n"
         "nodes: {n: {executor: io, on_activate: {log: hello}}}\n",
-        "single-thread",
+        "executor-settings",
         ["add 'kind: multi_threaded', or remove 'threads'"],
     ),
     "a chain without timers": (
@@ -86,17 +86,17 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     "sensor data with a reliable subscription": (
         f"{LIDAR.replace(', external: true', '')}  map:\n"
         f"    subscriptions: {{scan: {{{SCAN}, topic: /scan, qos: command, log: x}}}}\n",
-        "reliable-sensor-stream",
+        "unsuited-reliability",
         ["use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"],
     ),
     "sensor data for external nodes": (
         LIDAR,
-        "reliable-sensor-stream",
+        "unsuited-reliability",
         ["let subscriptions use 'qos: sensor_data'; a reliable publisher serves them too"],
     ),
     "joint states, which consumers request reliably": (
         LIDAR.replace("LaserScan", "JointState"),
-        "reliable-sensor-stream",
+        "unsuited-reliability",
         [],
     ),
     "a variable of an include with for_each": (
@@ -122,7 +122,7 @@ def test_hint(tmp_path: Path, text: str, rule: str, hints: list[str | None]) -> 
 def test_reliable_subscriptions_are_labeled(tmp_path: Path) -> None:
     text = HINTS["sensor data with a reliable subscription"][0]
     [diagnostic] = [
-        item for item in diagnostics_in(text, tmp_path) if item.rule.name.startswith("reliable")
+        item for item in diagnostics_in(text, tmp_path) if item.rule.name == "unsuited-reliability"
     ]
     assert [(label.message, label.span.line) for label in diagnostic.related] == [
         ("'map.scan' requests it", 7)

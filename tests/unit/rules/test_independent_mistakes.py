@@ -64,7 +64,7 @@ INDEPENDENT = {
             "external: true}}}",
             connections=("{topic: /a, from: program.out, to: reader.in, qos: command}",),
         ),
-        ["outside-qos", "unreliable-delivery"],
+        ["outside-qos", "unsuited-reliability"],
     ),
     "an executor that other processes share": (
         system(
@@ -74,7 +74,7 @@ INDEPENDENT = {
             above="processes: {remote: {memory_mb: 100}, other: {memory_mb: 100}}\n"
             "executors: {fast: {kind: single_threaded}}",
         ),
-        ["split-executor", "undeclared-name"],
+        ["lost-between-processes", "undeclared-name"],
     ),
 }
 

@@ -86,12 +86,12 @@ nodes:
 MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
     "a condition does not end a loop through one topic": (
         {"system.yaml": ECHO},
-        [("own-publisher", "system.yaml", 7)],
+        [("topic-loop", "system.yaml", 7)],
     ),
     "a topic on which others publish and subscribe too": ({"system.yaml": SHARED}, []),
     "errors are counted in the window only": (
         {"system.yaml": RESTART % "max_attempts: 3"},
-        [("restart-settings", "system.yaml", 6)],
+        [("failure-settings", "system.yaml", 6)],
     ),
     "a window for errors": ({"system.yaml": RESTART % "window_ms: 300"}, []),
     "two nodes with one name, and parameters of one of them": (

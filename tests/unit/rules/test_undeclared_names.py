@@ -128,7 +128,7 @@ def test_parameter_files(
         ),
         # PX4's QoS: described for a program, chosen for a node of the system.
         (f"{PROGRAM}, {WORDS.replace('command', PX4)}", []),
-        (WORDS.replace("command", PX4), [("info", "unreliable-delivery")]),
+        (WORDS.replace("command", PX4), [("info", "unsuited-reliability")]),
     ],
 )
 def test_names_and_qos(node: str, expected: list[tuple[str, str]], tmp_path: Path) -> None:
