@@ -138,7 +138,7 @@ class ExecutableNode(OutsideNode):
             return
         self._find()
         child = await self._start(UNCONFIGURED)
-        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_event)
+        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
         end_s = monotonic() + self._executable.ready_timeout_s
         service = f"{self.full_name}/change_state"
 

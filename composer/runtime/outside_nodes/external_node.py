@@ -113,7 +113,7 @@ class ExternalNode(OutsideNode):
         if not await self._until_ready(self._is_there, end_s):
             missing = f"it has no service {self.full_name}/change_state"
             self._refuse_absent(missing, UNCONFIGURED)
-        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_event)
+        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
         self._is_lost = False
 
     def _refuse_absent(self, missing: str, state: str) -> None:

@@ -21,13 +21,8 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.managed_node import (
-    FINALIZED,
-    PRIMARY_STATES,
-    NodeListener,
-    TransitionOutcome,
-)
-from composer.runtime.outside_nodes.remote_lifecycle import GOALS
+from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
+from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN, GOALS
 
 UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
 _DURING = {
@@ -38,8 +33,7 @@ _DURING = {
     "shutdown": "shuttingdown",
 }
 _TRANSITIONS = {state: transition for transition, state in _DURING.items()}
-#: What the events of a node may name as its new state.
-_LABELS = {*PRIMARY_STATES, *_TRANSITIONS, "errorprocessing"}
+_AFTER_ERROR = "errorprocessing"
 _AVAILABLE: dict[str, Mapping[str, int]] = {
     UNCONFIGURED: {
         "configure": Transition.TRANSITION_CONFIGURE,
@@ -100,7 +94,6 @@ class OutsideNode(ABC):
         self._listener = context.listener
         self._logger = model.full_name.strip("/").replace("/", ".")
         self._state = UNCONFIGURED
-        self._external_transition = ""  # one that another tool has started
         self._lock = _TransitionLock()
         self._end_s: float | None = None
 
@@ -240,20 +233,17 @@ class OutsideNode(ABC):
         self._state = UNCONFIGURED
         self._listener.on_ended(reason, UNCONFIGURED, is_awaited=is_awaited)
 
-    def _on_event(self, start: str, goal: str) -> None:
+    def _on_state(self, start: str, state: str) -> None:
         """Follow a transition that another tool has requested from the node itself."""
-        if self._lock.is_held or self._state == FINALIZED or goal not in _LABELS:
-            return  # the last one, if another program publishes on the topic
-        self._external_transition = _TRANSITIONS.get(start, self._external_transition)
-        self._state = goal
-        if goal not in PRIMARY_STATES or not self._external_transition:
+        if self._lock.is_held or self._state in (state, FINALIZED):
             return
-        transition, self._external_transition = self._external_transition, ""
-        success = goal == GOALS[transition]
-        reason = "" if success else f"'{transition}' failed"
-        self.activations += goal == ACTIVE
+        transition = _TRANSITIONS.get(start) or _transition_between(self._state, state)
+        success = start != _AFTER_ERROR and state in DONE_IN[transition]
+        reason = "" if success else "a transition that another tool requested has failed"
+        self._state = state
+        self.activations += state == ACTIVE
         self._listener.on_transition_end(
-            TransitionOutcome(transition, goal, success=success, reason=reason)
+            TransitionOutcome(transition, state, success=success, reason=reason)
         )
 
     async def _until_ready(self, condition: Callable[[], bool], end_s: float) -> bool:
@@ -268,6 +258,13 @@ class OutsideNode(ABC):
                 return False
             await sleep(self.loop, _POLL_S)
         return True
+
+
+def _transition_between(before: str, after: str) -> str:
+    """Return the last transition on the way from one primary state to another."""
+    if after == INACTIVE:
+        return "deactivate" if before == ACTIVE else "configure"
+    return {UNCONFIGURED: "cleanup", ACTIVE: "activate", FINALIZED: "shutdown"}[after]
 
 
 def missing_text(ports: Iterable[Port]) -> str:

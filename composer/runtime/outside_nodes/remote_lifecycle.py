@@ -10,6 +10,7 @@ from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.node import Node as RosNode
 
+from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.node.managed_node import PRIMARY_STATES
@@ -19,6 +20,7 @@ _ASK_AGAIN_S = 1.0
 _POLL_S = 0.02
 _SOON_S = 0.02
 _EVENTS_DEPTH = 20
+_CONFIRMED_WITHIN_S = 5.0
 #: The state in which each transition ends if it succeeds.
 GOALS = {
     "configure": "inactive",
@@ -54,9 +56,13 @@ class RemoteLifecycle:
         ros: RosNode,
         loop: Loop,
         full_name: str,
-        on_event: Callable[[str, str], None],
+        on_state: Callable[[str, str], None],
     ) -> None:
-        """``on_event(start, goal)`` is called for each change of state, with their labels."""
+        """``on_state(start, state)`` is called after transition events.
+
+        ``start`` is the label of the state in which the last transition began. ``state`` is the
+        primary state that the service of the node reports: any node can publish an event.
+        """
         self._ros = ros
         self._loop = loop
         self._full_name = full_name
@@ -66,15 +72,17 @@ class RemoteLifecycle:
             TransitionEvent, f"{full_name}/transition_event", lambda _: None, _EVENTS_DEPTH
         )
 
-        def on_taken(taken: tuple[Any, Any]) -> None:
-            on_event(str(taken[0].start_state.label), str(taken[0].goal_state.label))
-
+        self._on_state = on_state
+        self._event_start: str | None = None  # of the last event that is not confirmed yet
+        self._confirmation: Future[None] | None = None
         loop.add_client(self._get_state)
         loop.add_client(self._change_state)
-        loop.add_subscription(self._events, on_taken)
+        loop.add_subscription(self._events, self._on_event)
 
     def close(self) -> None:
         """Destroy the clients."""
+        if self._confirmation is not None:
+            self._confirmation.cancel()
         for entity in (self._get_state, self._change_state, self._events):
             self._loop.remove(entity)
         self._ros.destroy_client(self._get_state)
@@ -112,6 +120,23 @@ class RemoteLifecycle:
                 self._change_state.remove_pending_request(future)
             if response is not None:
                 return bool(response.success), await self._settled(end_s)
+
+    def _on_event(self, taken: tuple[Any, Any]) -> None:
+        self._event_start = str(taken[0].start_state.label)
+        if self._confirmation is None:
+            self._confirmation = self._loop.run_task(self._confirm())
+
+    async def _confirm(self) -> None:
+        """Ask the node for its state until no event has arrived meanwhile."""
+        try:
+            while (start := self._event_start) is not None:
+                self._event_start = None
+                state = await self._settled(time.monotonic() + _CONFIRMED_WITHIN_S)
+                self._on_state(self._event_start or start, state)
+        except NotAnswered:
+            self._event_start = None  # its disappearance is noticed elsewhere
+        finally:
+            self._confirmation = None
 
     async def _settled(self, end_s: float) -> str:
         """Return the state once no transition runs."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lifecycle_msgs.msg import State, TransitionEvent
 from lifecycle_msgs.srv import GetState
 from std_msgs.msg import String
 
@@ -171,6 +172,19 @@ def test_external_transitions_of_a_managed_executable(tmp_path: Path, peer: Peer
         response = peer.call(GetState, "/robot/camera/get_state")
         assert response.current_state.label == "active"
         assert pid_of(system, "camera") != pid
+        assert not system.reported(NodeFailed)
+
+
+def test_events_that_the_node_does_not_confirm_move_nothing(tmp_path: Path, peer: Peer) -> None:
+    with running(ROBOT, tmp_path) as system:
+        changes = len(system.states("/robot/camera"))
+        forged = peer.publisher(TransitionEvent, "/robot/camera/transition_event")
+        active = State(label="active")
+        for label in ("finalized", "unconfigured", "inactive", "no state"):
+            forged.publish(TransitionEvent(start_state=active, goal_state=State(label=label)))
+        assert peer.change("/robot/camera", "deactivate")
+        wait_until(lambda: system.node("camera").state == "inactive", "the state")
+        assert system.states("/robot/camera")[changes:] == ["/robot/camera inactive"]
         assert not system.reported(NodeFailed)
 
 
