@@ -102,7 +102,7 @@ def test_all_forms_of_a_connection_are_offered(
     [
         ("system: s\nqos_profiles: {q: {rel|iability: reliable}}", "lost messages are sent again"),
         ("system: s\nqos_profiles: {q: {dead|line_ms: 5}}", "Maximum time between two messages"),
-        ("system: s\nexecutors: {e: {ki|nd: events}}", "the executors of rclpy"),
+        ("system: s\nexecutors: {e: {ki|nd: events}}", "one callback at a time"),
         ("system: s\nexecutors: {e|e: {kind: events}}", "calls the callbacks of its nodes"),
         ("system: s\nlifecycle: {on_f|ailure: isolate}", "What to do when a node fails"),
         ("system: s\nconnections: [{fr|om: n.a}]", "The publisher or publishers"),

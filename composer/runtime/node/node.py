@@ -66,6 +66,7 @@ class RunningNode(LocalNode):
         self._behavior: Any = None
         self._cleaned_up_behavior: Any = None  # for ``on_shutdown``
         self._failures: list[str] | None = None  # reported while a lifecycle handler runs
+        self._failed_in = -1  # the activation in which it has last reported a failure
         self._make_library_node = options.make_library_node
         self._library: LibraryNode | None = None
         self._listeners = options.process.transforms
@@ -120,10 +121,11 @@ class RunningNode(LocalNode):
 
     def _fail(self, reason: str) -> None:
         failures = self._failures
-        if failures is None:
-            self._listener.on_fault(FaultKind.REPORTED, str(reason))
-        else:
+        if failures is not None:
             failures.append(str(reason))
+        elif self._failed_in != self.activations:  # a timer calls it again until the node is down
+            self._failed_in = self.activations
+            self._listener.on_fault(FaultKind.REPORTED, str(reason))
 
     def _set_used(self, *used: object) -> None:
         self._context.hot_objects = self._always_on_context.hot_objects = used

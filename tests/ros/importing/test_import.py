@@ -92,8 +92,8 @@ def test_a_constructor_that_fails_or_waits_is_reported(
         ("import", "class", "bad:Waits", "--construct", "--timeout", "3"),
         ("import", "class", "bad:Other", "--construct"),
     )
-    assert fails.startswith("compose: constructing 'bad:Fails' failed: ValueError: no map\n")
-    assert waits.startswith("compose: constructing 'bad:Waits' did not end within 3 s\n")
+    assert "\ncompose: constructing 'bad:Fails' failed: ValueError: no map\n" in fails
+    assert "\ncompose: constructing 'bad:Waits' did not end within 3 s\n" in waits
     assert "TypeError: bad:Other is not derived from rclpy.node.Node\n" in other
 
 
