@@ -12,8 +12,6 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.logging import get_logger
-
 from composer.names import PROGRAM_LOGGER
 from composer.runtime.executors.stacks import calls_user_code, is_internal
 from composer.runtime.metrics.repeat_limit import RepeatLimit
@@ -81,6 +79,8 @@ def log_exception(what: str, error: BaseException) -> None:
     admission = _LOGGED.admit(what)
     if admission is not None:
         text = internal_report_of(error) if admission.is_first else describe(error)
+        from rclpy.logging import get_logger  # noqa: PLC0415 - the rest of the module needs no ROS
+
         get_logger(PROGRAM_LOGGER).error(f"{what}: {text}{admission.suffix}")
 
 

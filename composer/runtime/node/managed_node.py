@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol, TypeVar, runtime_checkable
-
-from rclpy.node import Node as RosNode
+from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 from composer.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
 from composer.plan import FaultKind
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.loop import Loop
 from composer.runtime.metrics.statistics import Statistics
+
+if TYPE_CHECKING:  # tests of the supervision run without ROS
+    from rclpy.node import Node as RosNode
+
+    from composer.runtime.executors.loop import Loop
 
 #: The label of the state that a node cannot leave.
 FINALIZED = "finalized"
