@@ -9,8 +9,8 @@ without knowledge of the rules:
   (``nodes/arm.py:text``). The changed lines are always such a place.
 - ``valid``: edits in the same form that are correct.
 
-A mistake is found if it adds an error, a warning or an info. The mistakes of three files in four,
-and the files in ``more`` and ``code``, are checked by ``make soak``.
+A mistake is found if it adds an error, a warning or an info. Three files in four, and the files in
+``more`` and ``code``, are checked by ``make soak``.
 
 The files in ``code`` are about Python alone, a third of it in rclpy classes, and by other authors.
 Left out are kinds that are not checked any more: attributes and arguments that change their kind,
@@ -305,8 +305,12 @@ def test_mistakes_are_found_once_in_the_right_place(
 
 @pytest.mark.parametrize(
     "files",
-    [FILES, pytest.param(MORE, marks=pytest.mark.soak), pytest.param(CODE, marks=pytest.mark.soak)],
-    ids=["corpus", "more", "code"],
+    [
+        pytest.param(FILES[::4], id="corpus"),
+        pytest.param(REST, id="rest", marks=pytest.mark.soak),
+        pytest.param(MORE, id="more", marks=pytest.mark.soak),
+        pytest.param(CODE, id="code", marks=pytest.mark.soak),
+    ],
 )
 def test_correct_files_give_no_errors_and_no_warnings(
     files: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
