@@ -7,6 +7,7 @@ before it produced, even if that has errors, so that one run shows every diagnos
 from __future__ import annotations
 
 import gc
+import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Map
 from contextlib import contextmanager, suppress
@@ -28,7 +29,7 @@ from composer.diagnostics import (
     shown,
 )
 from composer.document import parse_bytes, read_document
-from composer.document.limits import MAX_ENTRIES
+from composer.document.limits import MAX_BYTES, MAX_ENTRIES
 from composer.document.rules import TOO_LARGE
 from composer.expand import expand
 from composer.fast_dataclass import dataclass
@@ -37,6 +38,7 @@ from composer.model import System
 from composer.node_types import NodeTypes, interface_folders
 from composer.project import SETTINGS_FILE, Project
 from composer.project.rule_selection import apply_rule_settings, check_rule_settings
+from composer.regular_files import read_regular
 from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.resolve.parameter_files.reader import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, reported, run_checks
@@ -287,10 +289,10 @@ def _may_be_included(path: Path, project: Project, checked: Collection[Path]) ->
     """Return whether a file next to or above this one, which is not checked now, names it."""
     folders = takewhile(project.holds, path.parents)
     for other in (item for folder in folders for item in folder.glob("*.y*ml")):
-        with suppress(OSError, UnicodeDecodeError):
-            is_other = other not in checked and other.is_file()
-            if is_other and path.name in other.read_text(encoding="utf-8"):
-                return True
+        if other not in checked and project.holds(other):
+            with suppress(OSError):
+                if os.fsencode(path.name) in read_regular(other, MAX_BYTES):
+                    return True
     return False
 
 

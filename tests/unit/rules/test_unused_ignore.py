@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.loading import load
 from composer.rules.ignore_comments import ignores_in
 from composer.source import SourceFile
 from tests.unit.support.checking import diagnostics_in, quoted, rules_broken
@@ -130,3 +131,18 @@ def test_many_comments_take_linear_time() -> None:
         assert lines == {count + 2}
 
     assert_linear(read, 300, 2400)
+
+
+@pytest.mark.parametrize("is_inside", [True, False])
+def test_files_outside_the_project_need_no_comment(is_inside: bool, tmp_path: Path) -> None:
+    project = tmp_path / "project"
+    project.mkdir()
+    (project / "composer.yaml").touch()
+    other = (project if is_inside else tmp_path) / "whole.yaml"
+    other.write_text("system: whole\ninclude: [part.yaml]\n")
+    if not is_inside:
+        (project / "link.yaml").symlink_to(other)
+    part = project / "part.yaml"
+    part.write_text("system: part\nnodes: {one: {}}  # compose: ignore[start-order]\n")
+    found = [item.rule.name for item in load(part).diagnostics]
+    assert found == ([] if is_inside else ["unused-ignore"])
