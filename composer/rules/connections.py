@@ -11,7 +11,7 @@ from composer.analysis.context import Context, is_unresolved
 from composer.analysis.earlier_errors import earlier_errors
 from composer.analysis.formatting import port_name
 from composer.analysis.subjects import wiring
-from composer.diagnostics import Diagnostic, Label, error, info, warning
+from composer.diagnostics import Diagnostic, Label, Rule, error, info, warning
 from composer.model import ChannelKind, PortKind, PortOfNode
 from composer.names import join
 from composer.source import Span
@@ -206,48 +206,42 @@ def check_client_without_server(context: Context) -> Iterator[Diagnostic]:
     for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
         for endpoint in unconnected_ports(context, kind):
             if endpoint.port.required is None:
-                place, labels = name_location(endpoint)
-                yield Diagnostic(
-                    CLIENT_WITHOUT_SERVER,
+                message = (
                     f"no node in this system provides '{endpoint.port.full_name}', "
-                    f"which '{port_name(endpoint)}' calls",
-                    place,
-                    labels,
-                    nearest_channel(context, endpoint) or external_hint(endpoint),
-                    relies_on=wiring(endpoint.node, endpoint.port),
+                    f"which '{port_name(endpoint)}' calls"
                 )
+                hint = nearest_channel(context, endpoint) or external_hint(endpoint)
+                yield _unconnected(CLIENT_WITHOUT_SERVER, endpoint, message, hint)
 
 
 def check_subscription_without_publisher(context: Context) -> Iterator[Diagnostic]:
     """Check for topics that have only subscriptions."""
     for endpoint in unconnected_ports(context, PortKind.SUBSCRIPTION):
         if endpoint.port.required is None:
-            place, labels = name_location(endpoint)
-            yield Diagnostic(
-                SUBSCRIPTION_WITHOUT_PUBLISHER,
+            message = (
                 f"no node in this system publishes '{endpoint.port.full_name}', "
-                f"which '{port_name(endpoint)}' subscribes to",
-                place,
-                labels,
-                nearest_channel(context, endpoint) or external_hint(endpoint),
-                relies_on=wiring(endpoint.node, endpoint.port),
+                f"which '{port_name(endpoint)}' subscribes to"
             )
+            hint = nearest_channel(context, endpoint) or external_hint(endpoint)
+            yield _unconnected(SUBSCRIPTION_WITHOUT_PUBLISHER, endpoint, message, hint)
 
 
 def check_publisher_without_subscription(context: Context) -> Iterator[Diagnostic]:
     """Check for topics that have only publishers."""
     for endpoint in unconnected_ports(context, PortKind.PUBLISHER):
         if endpoint.port.required is None and not is_meant_by_another(context, endpoint):
-            place, labels = name_location(endpoint)
-            yield Diagnostic(
-                PUBLISHER_WITHOUT_SUBSCRIPTION,
+            message = (
                 f"no node in this system subscribes to '{endpoint.port.full_name}', "
-                f"which '{port_name(endpoint)}' publishes",
-                place,
-                labels,
-                external_hint(endpoint),
-                relies_on=wiring(endpoint.node, endpoint.port),
+                f"which '{port_name(endpoint)}' publishes"
             )
+            hint = external_hint(endpoint)
+            yield _unconnected(PUBLISHER_WITHOUT_SUBSCRIPTION, endpoint, message, hint)
+
+
+def _unconnected(rule: Rule, endpoint: PortOfNode, message: str, hint: str | None) -> Diagnostic:
+    place, labels = name_location(endpoint)
+    reliance = wiring(endpoint.node, endpoint.port)
+    return Diagnostic(rule, message, place, labels, hint, relies_on=reliance)
 
 
 def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
