@@ -143,7 +143,12 @@ class HostedQosEvents(QosEvents):
 
     def _call(self, kind: IntEnum, status: Any) -> None:
         """Call the callback of the class soon, if the node is active then."""
+        self._context.loop.call_soon(partial(self._call_now, kind, status))
+
+    def _call_now(self, kind: IntEnum, status: Any) -> None:
         if kind in _COUNTS and self._context.gate.incoming:
-            self._matches = status
-        callback = self._callbacks[kind]
-        self._context.loop.call_soon(partial(call_in_group, self._context, callback, status))
+            last, self._matches = self._matches, status
+            counts = status.total_count, status.current_count
+            if counts == (last.total_count, last.current_count):
+                return  # the event was on its way while the activation has reported it
+        call_in_group(self._context, self._callbacks[kind], status)
