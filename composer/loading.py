@@ -17,10 +17,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TypeAlias
 
-from composer.analysis.subjects import joined, without_consequences
-from composer.assembly import NodeTypeFile, assemble, inherit
-from composer.assembly.deduplication import add_include_labels, deduplicate
-from composer.diagnostics import (
+from composer.base.diagnostics import (
     Diagnostic,
     Severity,
     has_errors,
@@ -28,28 +25,31 @@ from composer.diagnostics import (
     registered_rules,
     shown,
 )
-from composer.document import parse_bytes, read_document
-from composer.document.limits import MAX_BYTES, MAX_ENTRIES
-from composer.document.rules import TOO_LARGE
-from composer.expand import expand
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.regular_files import read_regular
+from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
+from composer.language.document import parse_bytes, read_document
+from composer.language.document.limits import MAX_BYTES, MAX_ENTRIES
+from composer.language.document.rules import TOO_LARGE
+from composer.language.expand import expand
+from composer.language.schema import check_schema, kind_of, kinds
+from composer.language.schema.kinds import check_kind
+from composer.language.tree import Mapping
+from composer.language.tree import Sequence as ListTree
 from composer.model import System
-from composer.node_types import NodeTypes, interface_folders
+from composer.model.assembly import NodeTypeFile, assemble, inherit
+from composer.model.assembly.deduplication import add_include_labels, deduplicate
+from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
+from composer.model.resolve.parameter_files.reader import PARAMETER_SUBSTITUTION
 from composer.project import SETTINGS_FILE, Project
+from composer.project.node_types import NodeTypes, interface_folders
 from composer.project.rule_selection import apply_rule_settings, check_rule_settings
-from composer.regular_files import read_regular
-from composer.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
-from composer.resolve.parameter_files.reader import PARAMETER_SUBSTITUTION
 from composer.rules import Context, all_checks, reported, run_checks
+from composer.rules.analysis.subjects import joined, without_consequences
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
 from composer.rules.node_types import unused_node_types
 from composer.rules.type_check import TypeCheck
-from composer.schema import check_schema, kind_of, kinds
-from composer.schema.kinds import check_kind
-from composer.source import SourceFile, Span
-from composer.tree import Mapping
-from composer.tree import Sequence as ListTree
 
 #: What identifies a diagnostic across the systems in which it appears: its rule and place.
 _Identity: TypeAlias = tuple[str, str]

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from composer.document import read_document
-from composer.tree import plain
+from composer.language.document import read_document
+from composer.language.tree import plain
 
 FOLDER = Path(__file__).resolve().parent
 NAMES = ("system", "node", "project")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from composer.graph import View, build_graph, scene_of
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
 
 ROOT = Path(__file__).parents[1]

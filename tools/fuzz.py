@@ -122,7 +122,7 @@ def _file() -> Callable[[bytes], None]:
 
 
 def _expression() -> Callable[[bytes], None]:
-    from composer.expressions import (  # noqa: PLC0415
+    from composer.language.expressions import (  # noqa: PLC0415
         EvaluationError,
         ExpressionError,
         compile_expression,

@@ -15,8 +15,8 @@ from typing import Any
 
 import yaml
 
-from composer.expressions import CONSTANTS, FUNCTIONS
-from composer.schema import SCHEMAS, schema
+from composer.language.expressions import CONSTANTS, FUNCTIONS
+from composer.language.schema import SCHEMAS, schema
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "language.md"

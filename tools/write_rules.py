@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from composer.diagnostics import Rule
+from composer.base.diagnostics import Rule
 from composer.report.rules import all_rules, page_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "rules.md"

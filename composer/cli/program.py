@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from composer.characters import escape_line
+from composer.base.characters import escape_line
 from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.output.terminal import TolerantStream, drop
 

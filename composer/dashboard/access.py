@@ -23,7 +23,7 @@ from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 _TOKEN_BYTES = 32
 #: A token of a user's own must not be guessable.

@@ -15,7 +15,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
-from composer.characters import escape_line
+from composer.base.characters import escape_line
 from composer.dashboard.context import Dashboard
 from composer.dashboard.feeds import Receiver
 from composer.dashboard.protocol.errors import BadRequestError, RequestError, internal_error

@@ -6,17 +6,17 @@ from collections.abc import Callable
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.access import Access
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.protocol.messages import Values
 from composer.dashboard.ros_side import RosSide
-from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.session import Deadline
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
+from composer.base.diagnostics import Diagnostic
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.dashboard.protocol.errors import RequestError
-from composer.diagnostics import Diagnostic
-from composer.fast_dataclass import dataclass
 from composer.graph.facts import node_facts, publishing_rates_hz
 from composer.model import Node, Parameter, PrimaryState, System
-from composer.source import Span
 
 _MAX_LINES = 200
 

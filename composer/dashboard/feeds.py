@@ -168,7 +168,7 @@ class Feeds:
             return closing, [item for item in self._running.values() if item.next_s <= now_s]
 
     def _poll(self, running: RunningFeed, ros: RosGraphSide) -> None:
-        from composer.remote.session import RosError
+        from composer.client.session import RosError
 
         running.is_urgent = False
         running.polled_s = time.monotonic()

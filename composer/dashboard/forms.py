@@ -63,7 +63,7 @@ class Forms:
         }
 
     def from_json(self, values: Mapping[str, Any], name: str, part: str) -> dict[str, Any]:
-        """Return values of a form as :mod:`composer.remote.messages.values` takes them.
+        """Return values of a form as :mod:`composer.client.messages.values` takes them.
 
         Large integers and infinities arrive as text, because JavaScript or JSON lacks them.
         """

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.protocol.errors import RequestError
 from composer.dashboard.protocol.messages import Values
 from composer.model import PortKind
-from composer.qos import PRESETS, Durability, QosProfile, incompatibilities
+from composer.model.qos import PRESETS, Durability, QosProfile, incompatibilities
 
 if TYPE_CHECKING:
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.drift import ObservedEndpoint
+    from composer.plan.drift import ObservedEndpoint
 
 _PRESETS = ("command", "sensor_data", "state")
 
@@ -30,8 +30,8 @@ class Outgoing:
 
     def open(self, ros: RosGraphSide) -> None:
         """Create the publisher. Raises RosError, RequestError."""
-        from composer.remote.messages.values import build_message, class_of
-        from composer.remote.name_matching import full_name
+        from composer.client.messages.values import build_message, class_of
+        from composer.client.name_matching import full_name
         from composer.runtime.ros.qos_profiles import rclpy_profile
 
         self._ros = ros
@@ -60,7 +60,7 @@ class Outgoing:
 
     def wait_until_acknowledged(self) -> None:
         """Wait a second at most until reliable subscriptions have the message."""
-        from composer.remote.messages.topics import wait_until_acknowledged
+        from composer.client.messages.topics import wait_until_acknowledged
 
         wait_until_acknowledged(self._publisher)
 

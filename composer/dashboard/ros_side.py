@@ -17,10 +17,10 @@ from composer.dashboard.feeds import Feeds
 from composer.dashboard.protocol.errors import RequestError, from_ros
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
+    from composer.client.shared_session import SharedSession
     from composer.dashboard.forms import Forms
     from composer.dashboard.observing.observed import Observed
-    from composer.remote.session import Deadline
-    from composer.remote.shared_session import SharedSession
 
 T = TypeVar("T")
 
@@ -120,7 +120,7 @@ class RosSide:
     def _call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
         if not self._joined.wait(_JOINED_WITHIN_S) or self._side is None:
             raise RequestError("failed", self.message or "the ROS graph cannot be joined")
-        from composer.remote.session import Deadline, RosError
+        from composer.client.session import Deadline, RosError
 
         try:
             return operation(self._side, Deadline(timeout_s))
@@ -165,8 +165,8 @@ class RosSide:
 
     def _join(self, stack: ExitStack) -> RosGraphSide:
         _import()
+        from composer.client.shared_session import SharedSession
         from composer.dashboard.observing.observed import Observed, first_topology
-        from composer.remote.shared_session import SharedSession
         from composer.runtime.middleware.dds_xml import announce_less_often
         from composer.runtime.middleware.environment import prepare_environment
 
@@ -183,9 +183,9 @@ class RosSide:
 def _import() -> None:
     """Import what joining takes, on one thread at a time: modules of rclpy import each other."""
     with _IMPORTING:
+        import composer.client.shared_session
         import composer.dashboard.observing.observed
         import composer.dashboard.pictures  # for the first diagram
-        import composer.remote.shared_session
         import composer.runtime.middleware.dds_xml  # noqa: F401
 
 

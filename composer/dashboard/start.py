@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from composer import version
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.access import Access, is_loopback, new_token, read_token
 from composer.dashboard.context import Dashboard, Options
 from composer.dashboard.declared import Declared
@@ -15,10 +16,9 @@ from composer.dashboard.forms import Forms
 from composer.dashboard.ros_side import RosSide
 from composer.dashboard.web.app import make_app
 from composer.dashboard.web.server import listen, serve
-from composer.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
-from composer.node_types import interface_folders
 from composer.project import Project
+from composer.project.node_types import interface_folders
 
 PROTOCOL_VERSION = 1
 #: On a busy computer. A participant that does not leave stays in the graph of others for 20 s.

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from composer.analysis.frames import kind_of, topic_of
-from composer.diagnostics import Diagnostic, Severity
-from composer.drift.compare import states_after_bring_up
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import Diagnostic, Severity
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.graph.diagram import Mark, Problem, worst
 from composer.graph.facts import (
     node_facts,
@@ -38,7 +37,8 @@ from composer.model import (
 )
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up
-from composer.source import Span
+from composer.plan.drift.compare import states_after_bring_up
+from composer.rules.analysis.frames import kind_of, topic_of
 
 
 @dataclass(frozen=True, slots=True)

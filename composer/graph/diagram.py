@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterable
 from enum import StrEnum
 
-from composer.fast_dataclass import dataclass
-from composer.tree import Plain
+from composer.base.fast_dataclass import dataclass
+from composer.language.tree import Plain
 
 #: Facts about a vertex or an edge, in the order they are shown.
 Details = tuple[tuple[str, Plain], ...]

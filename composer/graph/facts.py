@@ -6,9 +6,9 @@ import ast
 import math
 from collections.abc import Iterator, Mapping
 
-from composer.analysis.rates import causes_in_node, published_by_method
 from composer.graph.diagram import Details
 from composer.graph.scene import SceneChannel, SceneEndpoint
+from composer.language.tree import Plain
 from composer.model import (
     DEFAULT_EXECUTOR,
     ChannelKind,
@@ -18,11 +18,11 @@ from composer.model import (
     StaticTransform,
     Timer,
 )
+from composer.model.qos import PRESETS, History, QosProfile
 from composer.python_code.lookup import find_behavior
 from composer.python_code.nodes import published_port
 from composer.python_code.syntax import Method
-from composer.qos import PRESETS, History, QosProfile
-from composer.tree import Plain
+from composer.rules.analysis.rates import causes_in_node, published_by_method
 
 _SOURCES = {
     ChannelKind.TOPIC: "publishers",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 from composer.graph.diagram import Details, Problem, parent_of
 from composer.graph.facts import discovered_qos_label, qos_facts
 from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort
+from composer.language.tree import Plain
 from composer.model import PortKind
-from composer.tree import Plain
+from composer.plan.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 
 _TITLE = "ROS graph"
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-from composer.diagram_options import Format
 from composer.graph.diagram import Graph
+from composer.graph.diagram_options import Format
 from composer.graph.formats import dot, html, json, mermaid, svg
 from composer.graph.layout import arrange
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TypeAlias
 
-from composer.fast_dataclass import dataclass
-from composer.tree import Plain
+from composer.base.fast_dataclass import dataclass
+from composer.language.tree import Plain
 
 #: The primitive types of the ROS 2 interface definition language, and the range of the integers.
 #: ``char`` is a uint8 in ROS 2 and is converted to it; ``byte`` is a separate type.

@@ -6,8 +6,9 @@ import re
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
-from composer.diagnostics import nearest, shown, suggestion
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import nearest, shown, suggestion
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span, shown_path
 from composer.interfaces.definitions import Action, Interface, Message, Service, parts
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
 from composer.interfaces.share_json import read_description
@@ -20,7 +21,6 @@ from composer.interfaces.sources import (
     find_packages,
     installed_prefixes,
 )
-from composer.source import SourceFile, Span, shown_path
 
 #: A type as descriptions of interfaces name it.
 _LONG_TYPE = re.compile(r"(?m)^[ \t]*(?P<package>[a-z]\w*)/msg/(?P<name>[A-Z]\w*)")

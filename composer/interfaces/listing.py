@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.interfaces.definitions import (
     FLOATS,
     TEXTS,
@@ -16,7 +16,7 @@ from composer.interfaces.definitions import (
 )
 from composer.interfaces.index import Interfaces
 from composer.interfaces.parser import SEPARATOR, parse_line
-from composer.tree import Plain
+from composer.language.tree import Plain
 
 #: As in ros2.
 _INDENT = "\t"

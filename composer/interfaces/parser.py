@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 
-from composer.diagnostics import nearest, shown
+from composer.base.diagnostics import nearest, shown
 from composer.interfaces.definitions import (
     FLOATS,
     INTEGER_RANGES,
@@ -24,7 +24,7 @@ from composer.interfaces.definitions import (
     MessageConstant,
     Service,
 )
-from composer.tree import Plain, ScalarValue
+from composer.language.tree import Plain, ScalarValue
 
 _INTERFACE_NAME = re.compile(
     r"(?P<package>[a-z][a-z0-9_]*)/(?P<folder>msg|srv|action)/(?P<name>[A-Z][A-Za-z0-9]*)",

@@ -19,7 +19,7 @@ from composer.interfaces.definitions import (
     Message,
     Service,
 )
-from composer.tree import Plain
+from composer.language.tree import Plain
 
 #: type_description_interfaces/msg/FieldType, numbers 1 to 22; arrays add 48, 96 or 144 to them.
 _TYPE_NAMES: Mapping[int, str] = {

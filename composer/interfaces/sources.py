@@ -15,9 +15,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.regular_files import NotRegularError, read_regular
 from composer.interfaces.parser import split_name
-from composer.regular_files import NotRegularError, read_regular
 
 FOLDERS = ("msg", "srv", "action")
 _MAXIMUM_BYTES = 1_000_000

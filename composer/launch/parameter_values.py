@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from composer.document import parse_document
-from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
-from composer.resolve.parameter_files.sections import is_pattern
-from composer.source import SourceFile
-from composer.tree import Plain, plain
+from composer.base.source import SourceFile
+from composer.language.document import parse_document
+from composer.language.tree import Plain, plain
+from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
+from composer.model.resolve.parameter_files.sections import is_pattern
 
 _EVERY_NODE = "/**"
 

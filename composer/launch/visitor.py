@@ -27,9 +27,9 @@ from launch.actions import (
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 from launch_ros.actions import LifecycleNode, LoadComposableNodes, Node
 
+from composer.base.source import shown_path
 from composer.launch.parameter_values import parameter_values
 from composer.launch.process_options import process_options, text_of
-from composer.source import shown_path
 
 _UNKNOWN_NAME = "<node_name_unspecified>"
 #: The name that launch gives to the module of each launch file.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model.ports import ChannelKind, Port, PortKind
 from composer.model.system import Node
 

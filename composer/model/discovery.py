@@ -6,8 +6,8 @@ import re
 from dataclasses import field
 from enum import StrEnum
 
-from composer.fast_dataclass import dataclass
-from composer.source import Located, Span
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
 
 DEFAULT_SERVER_PORT = 11811
 _HIGHEST_PORT = 65535

@@ -7,9 +7,9 @@ from contextlib import suppress
 from dataclasses import field
 from pathlib import Path, PurePosixPath
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
 from composer.model.discovery import interface_problem, peer_problem
-from composer.source import Located, Span
 
 #: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
 HIGHEST_DOMAIN_ID = 232

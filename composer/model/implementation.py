@@ -6,9 +6,9 @@ from dataclasses import field
 from enum import StrEnum
 from pathlib import Path
 
-from composer.fast_dataclass import dataclass
-from composer.source import Located, Span
-from composer.tree import Plain
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
+from composer.language.tree import Plain
 
 #: Default time in milliseconds until the ports of an executable or external node must be there.
 DEFAULT_READY_TIMEOUT_MS = 10_000.0

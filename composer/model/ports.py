@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
 
-from composer.expressions import EvaluationError, Expression
-from composer.fast_dataclass import dataclass
-from composer.qos import QosProfile
-from composer.source import Located, Span
-from composer.templates import Template
-from composer.tree import Plain
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
+from composer.language.expressions import EvaluationError, Expression
+from composer.language.templates import Template
+from composer.language.tree import Plain
+from composer.model.qos import QosProfile
 
 
 class PeriodUnit(StrEnum):

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
 from composer.model.supervision import OnFailure
-from composer.source import Located, Span
 
 if TYPE_CHECKING:
     from composer.model.supervision import Supervision
@@ -77,7 +77,8 @@ def member_system(
 def own_enclave(environment: Mapping[str, str], full_name: str) -> dict[str, str]:
     """Return the variable for a process of a system, if ``environment`` sets an enclave at all.
 
-    As in the policy (:mod:`composer.export.sros2`), the enclave of a process is its full name.
+    As in the policy that ``compose export sros2`` writes, the enclave of a process is its full
+    name.
     """
     return {ENCLAVE_VARIABLE: full_name} if environment.get(ENCLAVE_VARIABLE) else {}
 

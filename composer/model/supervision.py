@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import field
 from enum import StrEnum
 
-from composer.fast_dataclass import dataclass
-from composer.source import Located, Span
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
 
 #: Default timeout of a transition in milliseconds.
 DEFAULT_TIMEOUT_MS = 10_000.0

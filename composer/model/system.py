@@ -8,7 +8,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, SourceFile, Span
+from composer.language.tree import Plain
 from composer.model.discovery import Discovery
 from composer.model.hosts import Host
 from composer.model.implementation import (
@@ -18,6 +20,7 @@ from composer.model.implementation import (
     HostedClass,
     ImplementationKind,
 )
+from composer.model.names import join_node_name
 from composer.model.ports import (
     ChannelKind,
     Delivery,
@@ -41,9 +44,6 @@ from composer.model.supervision import (
     Supervision,
 )
 from composer.model.transforms import Transforms
-from composer.names import join_node_name
-from composer.source import Located, SourceFile, Span
-from composer.tree import Plain
 
 
 class _Named(Protocol):

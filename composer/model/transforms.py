@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import field
 
-from composer.fast_dataclass import dataclass
-from composer.geometry import Transform
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
+from composer.model.geometry import Transform
 from composer.model.ports import Port, PortKind, Qos
-from composer.qos import Durability, QosProfile
-from composer.source import Located, Span
+from composer.model.qos import Durability, QosProfile
 
 TF_TYPE = "tf2_msgs/msg/TFMessage"
 TF_TOPIC = "/tf"

@@ -6,7 +6,7 @@ the nearest ``nodes`` folder, else above the nearest ``interfaces`` folder, else
 symbolic links.
 
 The search ends where it finds something that belongs to another user: see
-:mod:`composer.ownership`.
+:mod:`composer.base.ownership`.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ import pwd
 from dataclasses import field
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic, shown
-from composer.fast_dataclass import dataclass
-from composer.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
+from composer.base.diagnostics import Diagnostic, shown
+from composer.base.fast_dataclass import dataclass
+from composer.base.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
+from composer.base.resources import data_folder
+from composer.base.source import SourceFile, Span, shown_path
 from composer.project.settings import (
     FOREIGN_OWNER,
     SETTINGS_FILE,
@@ -28,8 +30,6 @@ from composer.project.settings import (
     is_inside,
     read_settings,
 )
-from composer.resources import data_folder
-from composer.source import SourceFile, Span, shown_path
 
 __all__ = ["INTERFACES", "NODES", "OUTSIDE_HINT", "SETTINGS_FILE", "SYSTEMS", "Project", "Settings"]
 

@@ -18,8 +18,8 @@ from typing import TypeAlias
 
 from pathspec import GitIgnoreSpec, PathSpec
 
-from composer.fast_dataclass import dataclass
-from composer.regular_files import open_regular, read_regular
+from composer.base.fast_dataclass import dataclass
+from composer.base.regular_files import open_regular, read_regular
 
 #: In a workspace: it holds a copy of a project, which may be replaced.
 MARK = ".compose-sync"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
-from composer.diagnostics import Diagnostic, Rule, Severity, nearest, shown
+from composer.base.diagnostics import Diagnostic, Rule, Severity, nearest, shown
+from composer.base.source import Located
 from composer.project.settings import BAD_SETTING, Settings
-from composer.source import Located
 
 
 def apply_rule_settings(diagnostics: Iterable[Diagnostic], settings: Settings) -> list[Diagnostic]:

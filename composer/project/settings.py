@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic, Severity, error, shown, warning
-from composer.document import read_document
-from composer.document.rules import UNREADABLE_FILE, YAML_SYNTAX
-from composer.fast_dataclass import dataclass
-from composer.schema import check_schema
-from composer.source import Located, SourceFile, Span, shown_path
-from composer.tree import Mapping, Scalar, Sequence
+from composer.base.diagnostics import Diagnostic, Severity, error, shown, warning
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, SourceFile, Span, shown_path
+from composer.language.document import read_document
+from composer.language.document.rules import UNREADABLE_FILE, YAML_SYNTAX
+from composer.language.schema import check_schema
+from composer.language.tree import Mapping, Scalar, Sequence
 
 BAD_SETTING = error("RC042", "bad-setting")
 FOREIGN_OWNER = warning("RC044", "foreign-owner")

@@ -10,7 +10,8 @@ from functools import cached_property
 from itertools import chain
 from pathlib import Path
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span, shown_path
 from composer.model import BehaviorReference
 from composer.project import Project
 from composer.python_code.modules import (
@@ -22,7 +23,6 @@ from composer.python_code.modules import (
 )
 from composer.python_code.syntax import Class, Method, Module, read_module
 from composer.python_code.trees import Import
-from composer.source import Span, shown_path
 
 _Finder = Callable[[str, Path, Project], Path | None]
 #: Maximum number of files to read for one behavior.

@@ -13,12 +13,12 @@ from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
-from composer.fast_dataclass import dataclass
-from composer.ownership import TrustedUsers
+from composer.base.fast_dataclass import dataclass
+from composer.base.ownership import TrustedUsers
+from composer.base.regular_files import FileTooLargeError, NotRegularError, read_regular
+from composer.base.source import Span
+from composer.base.spelling import Vocabulary
 from composer.project import Project
-from composer.regular_files import FileTooLargeError, NotRegularError, read_regular
-from composer.source import Span
-from composer.spelling import Vocabulary
 
 MAXIMUM_BYTES = 250_000
 #: Files of these types in a package may be modules that are compiled when it is built.

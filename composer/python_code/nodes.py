@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TypeAlias
 
 from composer import behavior
-from composer.diagnostics import Diagnostic, Label, Rule
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import Diagnostic, Label, Rule
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
 from composer.model import HostedClass, Node, Parameter, Port, PortKind, System
+from composer.model.resolve.declarations.parameters import rclpy_type
+from composer.model.resolve.tree_values import is_opaque
 from composer.python_code.lookup import BehaviorSource, find_behavior
 from composer.python_code.scopes import Scope
 from composer.python_code.syntax import Method, scopes_in
 from composer.python_code.trees import SCOPES, argument, span_of, walk
-from composer.resolve.declarations.parameters import rclpy_type
-from composer.resolve.tree_values import is_opaque
-from composer.source import Located, Span
 
 #: A node, and the source of its behavior or class.
 NodeClass: TypeAlias = tuple[Node, BehaviorSource]

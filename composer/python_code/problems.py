@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from enum import Enum
 
-from composer.fast_dataclass import dataclass
-from composer.source import Span
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 
 
 class Family(Enum):

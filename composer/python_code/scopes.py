@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TypeVar
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
 from composer.interfaces.sources import FOLDERS
+from composer.language.tree import Plain
 from composer.python_code.trees import (
     SCOPES,
     Function,
@@ -19,8 +21,6 @@ from composer.python_code.trees import (
     span_of,
     walk,
 )
-from composer.source import SourceFile, Span
-from composer.tree import Plain
 
 T = TypeVar("T")
 

@@ -9,7 +9,8 @@ from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
 from composer.python_code.modules import Unreadable, read_text
 from composer.python_code.scopes import Call, Scope
 from composer.python_code.trees import (
@@ -25,7 +26,6 @@ from composer.python_code.trees import (
     span_of,
     walk,
 )
-from composer.source import SourceFile, Span
 
 #: Maximum depth of an expression: with more, functions of ``ast`` exceed Python's stack.
 MAXIMUM_DEPTH = 250

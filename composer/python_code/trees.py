@@ -6,8 +6,8 @@ import ast
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 
-from composer.fast_dataclass import dataclass
-from composer.source import SourceFile, Span
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

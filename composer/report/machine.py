@@ -11,10 +11,10 @@ from typing import Any
 from urllib.parse import quote
 
 from composer import DISTRIBUTION, version
-from composer.characters import visible
-from composer.diagnostics import Diagnostic, Rule, Severity
+from composer.base.characters import visible
+from composer.base.diagnostics import Diagnostic, Rule, Severity
+from composer.base.source import Span
 from composer.report.rules import page_of
-from composer.source import Span
 
 #: Incremented for every incompatible change of the JSON, ``schemas/report.schema.json``.
 JSON_VERSION = 1

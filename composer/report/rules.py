@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable
 
-import composer.document
-import composer.expand
-import composer.resolve
+import composer.language.document
+import composer.language.expand
+import composer.language.schema
+import composer.model.resolve
 import composer.rules
-import composer.schema
-from composer.diagnostics import Diagnostic, Rule, nearest, registered_rules
-from composer.fast_dataclass import dataclass
-from composer.resources import rules_folder
+from composer.base.diagnostics import Diagnostic, Rule, nearest, registered_rules
+from composer.base.fast_dataclass import dataclass
+from composer.base.resources import rules_folder
 
 
 def all_rules() -> tuple[Rule, ...]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from composer.characters import visible, width
-from composer.diagnostics import Diagnostic, Severity
-from composer.fast_dataclass import dataclass
-from composer.source import Span
+from composer.base.characters import visible, width
+from composer.base.diagnostics import Diagnostic, Severity
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 
 #: SGR codes: the frame of source lines, bold text, and severities.
 _FRAME = "34"

@@ -13,10 +13,10 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from composer.analysis.context import Context, location
-from composer.analysis.formatting import with_short_values
-from composer.diagnostics import Diagnostic, Severity, in_order
-from composer.document.error_limit import LimitedDiagnostics, TooManyErrors
+from composer.base.diagnostics import Diagnostic, Severity, in_order
+from composer.language.document.error_limit import LimitedDiagnostics, TooManyErrors
+from composer.rules.analysis.context import Context, location
+from composer.rules.analysis.formatting import with_short_values
 
 Check = Callable[[Context], Iterator[Diagnostic]]
 
@@ -46,8 +46,9 @@ def reported(context: Context, diagnostics: Iterable[Diagnostic]) -> Iterator[Di
 def all_checks() -> tuple[Check, ...]:
     """Return the checks of all modules, sorted by module and name."""
     folder = Path(__file__).parent
-    files = (path.relative_to(folder).with_suffix("") for path in folder.rglob("[a-z]*.py"))
-    modules = [import_module(".".join((__name__, *file.parts))) for file in sorted(files)]
+    modules = [
+        import_module(f"{__name__}.{file.stem}") for file in sorted(folder.glob("[a-z]*.py"))
+    ]
     return tuple(
         function
         for module in modules

@@ -7,11 +7,8 @@ import re
 import sys
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import a
-from composer.analysis.python_nodes import behaviors, distinct_behaviors
-from composer.analysis.subjects import wiring
-from composer.diagnostics import Diagnostic, Label, error, nearest, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, error, nearest, suggestion, warning
+from composer.base.source import Span
 from composer.model import Node, PortKind
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import (
@@ -33,8 +30,11 @@ from composer.python_code.trees import (
     start_span,
     walk,
 )
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import a
+from composer.rules.analysis.python_nodes import behaviors, distinct_behaviors
+from composer.rules.analysis.subjects import wiring
 from composer.rules.python import missing, unnamed
-from composer.source import Span
 
 MISSING_HANDLER = error("RC433", "missing-handler")
 HANDLER_WITHOUT_PORT = error("RC434", "handler-without-port")

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import number
-from composer.analysis.rates import causes
-from composer.analysis.subjects import NODES_OF_PROCESSES, wiring
-from composer.diagnostics import Diagnostic, Label, Subject, error, warning
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import Diagnostic, Label, Subject, error, warning
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.model import Chain, Node, Port, PortKind, System, Timer
-from composer.source import Span
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import number
+from composer.rules.analysis.rates import causes
+from composer.rules.analysis.subjects import NODES_OF_PROCESSES, wiring
 
 IMPOSSIBLE_CHAIN = error("RC415", "impossible-chain")
 UNMEASURED_CHAIN = warning("RC477", "unmeasured-chain")

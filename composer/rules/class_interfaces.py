@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.class_ports import CreatedPort, all_created_ports, created_ports
-from composer.analysis.context import Context
-from composer.analysis.python_nodes import hosted_classes
-from composer.analysis.subjects import type_subject
-from composer.diagnostics import Diagnostic, Label, error, info, nearest, warning
+from composer.base.diagnostics import Diagnostic, Label, error, info, nearest, warning
+from composer.base.spelling import is_typo
 from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
+from composer.model.qos import incompatibilities
 from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
-from composer.qos import incompatibilities
+from composer.rules.analysis.class_ports import CreatedPort, all_created_ports, created_ports
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.python_nodes import hosted_classes
+from composer.rules.analysis.subjects import type_subject
 from composer.rules.python import as_warning
-from composer.spelling import is_typo
 
 CLASS_PORT_MISSING = warning("RC499", "class-port-missing")
 CLASS_PORT_TYPE = error("RC487", "class-port-type")

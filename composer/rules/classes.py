@@ -5,15 +5,15 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.python_nodes import hosted_classes
-from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.model import ExecutorKind, Node, System
 from composer.model.dependencies import dependency_edges
 from composer.python_code.nodes import ClassOfNode
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method
 from composer.python_code.trees import SCOPES, is_none, span_of, walk
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.python_nodes import hosted_classes
 from composer.rules.python import as_warning, missing, unnamed
 
 CLASS_MISSING = error("RC460", "class-missing")

@@ -7,15 +7,15 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.formatting import port_name
-from composer.analysis.subjects import wiring
-from composer.diagnostics import Diagnostic, Label, Rule, error, info, warning
+from composer.base.diagnostics import Diagnostic, Label, Rule, error, info, warning
+from composer.base.source import Span
+from composer.base.spelling import vocabulary
 from composer.model import ChannelKind, PortKind, PortOfNode
-from composer.names import join
-from composer.source import Span
-from composer.spelling import vocabulary
+from composer.model.names import join
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.formatting import port_name
+from composer.rules.analysis.subjects import wiring
 
 CLIENT_WITHOUT_SERVER = warning("RC322", "client-without-server")
 SUBSCRIPTION_WITHOUT_PUBLISHER = warning("RC323", "subscription-without-publisher")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import is_misspelled
-from composer.diagnostics import Diagnostic, Label, error
+from composer.base.diagnostics import Diagnostic, Label, error
+from composer.base.source import Located
 from composer.model import DiscoveryKind
 from composer.model.discovery import (
     host_of,
@@ -15,7 +14,8 @@ from composer.model.discovery import (
     peer_problem,
     server_problem,
 )
-from composer.source import Located
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import is_misspelled
 
 INVALID_DISCOVERY = error("RC496", "invalid-discovery")
 

@@ -6,18 +6,18 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import is_misspelled
-from composer.diagnostics import Diagnostic, error, info, suggestion
-from composer.executables import (
+from composer.base.diagnostics import Diagnostic, error, info, suggestion
+from composer.base.source import Located, Span
+from composer.model import Executable, ExecutableKind, LifecycleKind
+from composer.project.executables import (
     executable_names,
     find_executable,
     find_program,
     has_package,
     has_ros_packages,
 )
-from composer.model import Executable, ExecutableKind, LifecycleKind
-from composer.source import Located, Span
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import is_misspelled
 
 EXECUTABLE_NOT_INSTALLED = info("RC472", "executable-not-installed")
 INVALID_EXECUTABLE = error("RC473", "invalid-executable")

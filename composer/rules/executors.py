@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.formatting import number
-from composer.analysis.rates import Cause, Rates, rates
-from composer.analysis.subjects import unknown_subjects, used_parameters
-from composer.diagnostics import (
+from composer.base.diagnostics import (
     Diagnostic,
     Label,
     Severity,
@@ -21,11 +16,16 @@ from composer.diagnostics import (
     suggestion,
     warning,
 )
-from composer.expand.rules import UNUSED_DECLARATION
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
+from composer.language.expand.rules import UNUSED_DECLARATION
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.formatting import number
+from composer.rules.analysis.rates import Cause, Rates, rates
+from composer.rules.analysis.subjects import unknown_subjects, used_parameters
 from composer.rules.references import UNDECLARED_NAME
-from composer.source import Located, Span
 
 EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")
 EXECUTOR_SETTINGS = warning("RC417", "executor-settings")

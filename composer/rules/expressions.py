@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.expressions import EVENT_NAMES, ExpressionSite, expression_sites, reactions
-from composer.analysis.spans import part_of_path
-from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
-from composer.expressions import FieldPath
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.source import Span
+from composer.language.expressions import FieldPath
 from composer.model import Node
-from composer.source import Span
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.expressions import (
+    EVENT_NAMES,
+    ExpressionSite,
+    expression_sites,
+    reactions,
+)
+from composer.rules.analysis.spans import part_of_path
 
 UNKNOWN_NAME = error("RC209", "unknown-name")
 INDEX_OUT_OF_RANGE = warning("RC308", "index-out-of-range")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.expressions import message_templates
-from composer.diagnostics import Diagnostic, error, warning
-from composer.field_types import constant_problem, enumerator_problem
+from composer.base.diagnostics import Diagnostic, error, warning
 from composer.interfaces import Interfaces, Message
+from composer.interfaces.field_types import constant_problem, enumerator_problem
+from composer.language.templates import Constant, Items, Record, Template
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.expressions import message_templates
 from composer.rules.types import certain_field_problems
-from composer.templates import Constant, Items, Record, Template
 
 UNKNOWN_FIELD = error("RC304", "unknown-field")
 INVALID_VALUE = error("RC305", "invalid-value")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import listed
-from composer.analysis.frames import (
+from composer.base.diagnostics import Diagnostic, Label, error, nearest, warning
+from composer.base.spelling import is_typo
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import listed
+from composer.rules.analysis.frames import (
     Broadcast,
     FrameTree,
     Gap,
@@ -17,8 +19,6 @@ from composer.analysis.frames import (
     nearest_parent,
     place,
 )
-from composer.diagnostics import Diagnostic, Label, error, nearest, warning
-from composer.spelling import is_typo
 
 CONFLICTING_TRANSFORMS = error("RC510", "conflicting-transforms")
 UNCONNECTED_FRAMES = error("RC512", "unconnected-frames")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.diagnostics import Diagnostic, error, suggestion
-from composer.expand.rules import UNUSED_DECLARATION
+from composer.base.diagnostics import Diagnostic, error, suggestion
+from composer.base.source import Located
+from composer.language.expand.rules import UNUSED_DECLARATION
 from composer.model import Host
 from composer.model.hosts import (
     address_problem,
@@ -17,8 +17,8 @@ from composer.model.hosts import (
     user_problem,
     workspace_problem,
 )
+from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.references import UNDECLARED_NAME
-from composer.source import Located
 
 INVALID_HOST = error("RC492", "invalid-host")
 ENVIRONMENT_VARIABLE = error("RC494", "environment-variable")

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 
-from composer.diagnostics import (
+from composer.base.diagnostics import (
     Diagnostic,
     Rule,
     Severity,
@@ -23,8 +23,8 @@ from composer.diagnostics import (
     shown,
     warning,
 )
-from composer.fast_dataclass import dataclass
-from composer.source import SourceFile, Span
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
 
 UNUSED_IGNORE = warning("RC502", "unused-ignore")
 

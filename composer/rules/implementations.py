@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 
-from composer.analysis.context import Context
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.python_nodes import hosted_classes
-from composer.diagnostics import Diagnostic, Label, error, warning
+from composer.base.diagnostics import Diagnostic, Label, error, warning
+from composer.base.source import Span
 from composer.model import ImplementationKind, Isolation, Node, Port, PortKind, System
 from composer.python_code.nodes import handlers
-from composer.source import Span
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.python_nodes import hosted_classes
 
 IDLE_PORT = warning("RC438", "idle-port")
 SEVERAL_IMPLEMENTATIONS = error("RC470", "several-implementations")

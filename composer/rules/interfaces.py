@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.formatting import a
-from composer.analysis.subjects import package_subjects
-from composer.diagnostics import Diagnostic, Label, error, nearest, shown
+from composer.base.diagnostics import Diagnostic, Label, error, nearest, shown
+from composer.base.source import shown_path
 from composer.interfaces import Action, Interfaces, InvalidDefinition, Message, Service
-from composer.interfaces.building import how_to_build
 from composer.interfaces.index import similar_interface
 from composer.interfaces.sources import FOLDERS
 from composer.model import ChannelKind, Port
-from composer.source import shown_path
+from composer.model.interface_packages import how_to_build
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.formatting import a
+from composer.rules.analysis.subjects import package_subjects
 
 UNKNOWN_INTERFACE = error("RC301", "unknown-interface")
 OUTDATED_INTERFACE = error("RC307", "outdated-interface")

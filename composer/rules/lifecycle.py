@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
-from composer.analysis.formatting import number
-from composer.analysis.rates import timed_publishers
-from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
-from composer.expand.rules import CYCLE
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.source import Located
+from composer.language.expand.rules import CYCLE
 from composer.model import Dependency, Node, PortKind, PortOfNode, PrimaryState, System
 from composer.model.dependencies import dependency_cycles
-from composer.source import Located
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
+from composer.rules.analysis.formatting import number
+from composer.rules.analysis.rates import timed_publishers
 
 START_ORDER = warning("RC402", "start-order")
 IMPOSSIBLE_WATCH = error("RC404", "impossible-watch")

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved, location
-from composer.analysis.formatting import a, free_name, safe_name
-from composer.analysis.subjects import connection_subjects, namespace_subjects
-from composer.diagnostics import Diagnostic, Label, error, info, warning
-from composer.expand.rules import DUPLICATE_NAME
+from composer.base.diagnostics import Diagnostic, Label, error, info, warning
+from composer.base.source import Located, Span
+from composer.language.expand.rules import DUPLICATE_NAME
 from composer.model import Connection, Node, Port, System
-from composer.names import (
+from composer.model.names import (
     is_hidden,
     join,
     namespace_problem,
@@ -19,7 +17,9 @@ from composer.names import (
     remapped_name,
     topic_name_problem,
 )
-from composer.source import Located, Span
+from composer.rules.analysis.context import Context, is_unresolved, location
+from composer.rules.analysis.formatting import a, free_name, safe_name
+from composer.rules.analysis.subjects import connection_subjects, namespace_subjects
 
 INVALID_NAME = error("RC221", "invalid-name")
 INVALID_NAMESPACE = error("RC222", "invalid-namespace")

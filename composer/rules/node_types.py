@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePath
 
-from composer.analysis.context import Context, is_unresolved, location
-from composer.diagnostics import Diagnostic, error, suggestion, warning
-from composer.expand.rules import UNUSED_DECLARATION
+from composer.base.diagnostics import Diagnostic, error, suggestion, warning
+from composer.base.source import Located, shown_path
+from composer.language.expand.rules import UNUSED_DECLARATION
 from composer.model import System
-from composer.node_types import replaced_built_in_type
+from composer.model.resolve.tree_values import is_opaque
 from composer.project import SETTINGS_FILE, Project
-from composer.resolve.tree_values import is_opaque
-from composer.source import Located, shown_path
+from composer.project.node_types import replaced_built_in_type
+from composer.rules.analysis.context import Context, is_unresolved, location
 
 UNKNOWN_NODE_TYPE = error("RC201", "unknown-node-type")
 REPLACED_NODE_TYPE = warning("RC214", "replaced-node-type")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import and_others
-from composer.analysis.parameters import (
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion
+from composer.model import USE_SIM_TIME, Parameter, ParameterType
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import and_others
+from composer.rules.analysis.parameters import (
     KNOWN_TYPES,
     ReportedValues,
     describe,
@@ -17,8 +19,6 @@ from composer.analysis.parameters import (
     valid_values,
     wrong_choices,
 )
-from composer.diagnostics import Diagnostic, Label, error, suggestion
-from composer.model import USE_SIM_TIME, Parameter, ParameterType
 
 PARAMETER_VALUE = error("RC421", "parameter-value")
 PARAMETER_DECLARATION = error("RC425", "parameter-declaration")

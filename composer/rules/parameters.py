@@ -6,12 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import PurePath
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.expressions import expression_sites
-from composer.analysis.python_nodes import behaviors
-from composer.analysis.spans import part_of_path
-from composer.diagnostics import (
+from composer.base.diagnostics import (
     Diagnostic,
     Label,
     Severity,
@@ -22,11 +17,16 @@ from composer.diagnostics import (
     suggestion,
     warning,
 )
+from composer.base.source import Located, Span
+from composer.base.spelling import is_typo
 from composer.model import Node, Parameter, UnmatchedParameters
-from composer.names import namespace_problem, split_node_name
-from composer.resolve.parameter_files import PARAMETER_FILES
-from composer.source import Located, Span
-from composer.spelling import is_typo
+from composer.model.names import namespace_problem, split_node_name
+from composer.model.resolve.parameter_files import PARAMETER_FILES
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.expressions import expression_sites
+from composer.rules.analysis.python_nodes import behaviors
+from composer.rules.analysis.spans import part_of_path
 
 UNKNOWN_PARAMETER = error("RC206", "unknown-parameter")
 SIMILAR_PARAMETER = warning("RC216", "similar-parameter")

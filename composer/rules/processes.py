@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.subjects import NODES_OF_PROCESSES, unknown_subjects
-from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.source import Located
 from composer.model import Channel
-from composer.names import topic_name_problem
+from composer.model.names import topic_name_problem
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.subjects import NODES_OF_PROCESSES, unknown_subjects
 from composer.rules.executors import LOST_BETWEEN_PROCESSES
 from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE
-from composer.source import Located
 
 CONFLICTING_PROCESS = error("RC479", "conflicting-process")
 MANY_SERVICES = warning("RC488", "many-services")

@@ -10,11 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.python_nodes import distinct_behaviors, distinct_classes
-from composer.analysis.spans import class_name_hint, part_of
-from composer.analysis.subjects import package_subjects
-from composer.diagnostics import (
+from composer.base.diagnostics import (
     Diagnostic,
     Label,
     Rule,
@@ -36,6 +32,10 @@ from composer.python_code.modules import nearby_modules
 from composer.python_code.problems import Family, Problem
 from composer.python_code.syntax import Method, Module
 from composer.python_code.trees import start_span, walk
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.python_nodes import distinct_behaviors, distinct_classes
+from composer.rules.analysis.spans import class_name_hint, part_of
+from composer.rules.analysis.subjects import package_subjects
 
 UNKNOWN_IMPORT = error("RC444", "unknown-import")
 MODULE_NOT_INSTALLED = info("RC445", "module-not-installed")

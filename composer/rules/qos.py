@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import number, port_name
-from composer.analysis.rates import rates, timed_publishers
-from composer.diagnostics import Diagnostic, Label, info, warning
+from composer.base.diagnostics import Diagnostic, Label, info, warning
 from composer.model import ChannelKind, Port, PortKind, PortOfNode
-from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import number, port_name
+from composer.rules.analysis.rates import rates, timed_publishers
 
 QOS_DURATION_TOO_SHORT = warning("RC312", "qos-duration-too-short")
 UNSUITED_DEPTH = info("RC314", "unsuited-depth")

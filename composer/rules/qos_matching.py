@@ -7,14 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 
-from composer.analysis.context import Context, location
-from composer.analysis.formatting import listed, port_name
-from composer.diagnostics import Diagnostic, Label, error, warning
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import Diagnostic, Label, error, warning
+from composer.base.fast_dataclass import dataclass
+from composer.base.resources import nodes_folder
+from composer.base.source import Span
 from composer.model import Channel, ChannelKind, Node, Port, PortOfNode
-from composer.qos import Incompatibility, QosProfile, incompatibilities
-from composer.resources import nodes_folder
-from composer.source import Span
+from composer.model.qos import Incompatibility, QosProfile, incompatibilities
+from composer.rules.analysis.context import Context, location
+from composer.rules.analysis.formatting import listed, port_name
 
 QOS_INCOMPATIBLE = error("RC311", "qos-incompatible")
 OUTSIDE_QOS = warning("RC531", "outside-qos")

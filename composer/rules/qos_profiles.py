@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.subjects import unknown_subjects
-from composer.diagnostics import Diagnostic, Label, errors_subject, info, suggestion
-from composer.expand.rules import CYCLE, UNUSED_DECLARATION
+from composer.base.diagnostics import Diagnostic, Label, errors_subject, info, suggestion
+from composer.base.source import Located
+from composer.language.expand.rules import CYCLE, UNUSED_DECLARATION
 from composer.model import ChannelKind, NamedQos
-from composer.qos import PRESETS
+from composer.model.qos import PRESETS
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.subjects import unknown_subjects
 from composer.rules.references import UNDECLARED_NAME
-from composer.source import Located
 
 QOS_IMPLICIT = info("RC501", "qos-implicit")
 

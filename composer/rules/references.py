@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from composer.analysis.context import Context, is_unresolved, location
-from composer.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
-from composer.analysis.expressions import sends
-from composer.analysis.formatting import a, either
-from composer.analysis.spans import part_of
-from composer.analysis.subjects import (
+from composer.base.diagnostics import Diagnostic, Label, Subject, error, suggestion
+from composer.base.fast_dataclass import dataclass
+from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
+from composer.rules.analysis.context import Context, is_unresolved, location
+from composer.rules.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
+from composer.rules.analysis.expressions import sends
+from composer.rules.analysis.formatting import a, either
+from composer.rules.analysis.spans import part_of
+from composer.rules.analysis.subjects import (
     NAMESPACES,
     connection_subjects,
     port_subject,
     unknown_subjects,
 )
-from composer.diagnostics import Diagnostic, Label, Subject, error, suggestion
-from composer.fast_dataclass import dataclass
-from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
 
 UNKNOWN_NODE = error("RC202", "unknown-node")
 UNKNOWN_PORT = error("RC203", "unknown-port")

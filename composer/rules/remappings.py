@@ -6,9 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.subjects import wiring
-from composer.diagnostics import (
+from composer.base.diagnostics import (
     Diagnostic,
     Label,
     Severity,
@@ -18,10 +16,12 @@ from composer.diagnostics import (
     suggestion,
     warning,
 )
+from composer.base.source import Located
+from composer.base.spelling import is_typo
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
-from composer.names import expand_name, remapped_name, topic_name_problem
-from composer.source import Located
-from composer.spelling import is_typo
+from composer.model.names import expand_name, remapped_name, topic_name_problem
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.subjects import wiring
 
 UNKNOWN_REMAPPING = error("RC208", "unknown-remapping")
 REMAPPING_COLLISION = warning("RC226", "remapping-collision")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import number
-from composer.diagnostics import Diagnostic, warning
+from composer.base.diagnostics import Diagnostic, warning
+from composer.base.source import Span
 from composer.model import Node, OnFailure, RestartBudget, Supervision
-from composer.source import Span
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import number
 
 FAILURE_SETTINGS = warning("RC406", "failure-settings")
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.formatting import number, port_name
-from composer.analysis.subjects import NAMESPACES, port_subject, wiring
-from composer.diagnostics import Diagnostic, Label, error, info
+from composer.base.diagnostics import Diagnostic, Label, error, info
+from composer.base.source import Span
 from composer.model import Channel, ChannelKind, ImplementationKind, PortKind, PortOfNode
 from composer.model.dependencies import dependency_cycles, in_dependency_order
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.formatting import number, port_name
+from composer.rules.analysis.subjects import NAMESPACES, port_subject, wiring
 from composer.rules.lifecycle import START_ORDER
-from composer.source import Span
 
 DUPLICATE_SERVER = error("RC321", "duplicate-server")
 UNSUITED_PATTERN = info("RC331", "unsuited-pattern")

@@ -6,12 +6,12 @@ import ast
 import math
 from collections.abc import Iterator
 
-from composer.analysis.context import Context
-from composer.analysis.formatting import number
-from composer.analysis.subjects import used_parameters
-from composer.diagnostics import Diagnostic, Label, error, info, suggestion, warning
-from composer.expressions import Expression
+from composer.base.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.language.expressions import Expression
 from composer.model import Node, Parameter, PeriodError, PeriodUnit, Timer
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.formatting import number
+from composer.rules.analysis.subjects import used_parameters
 from composer.rules.references import UNDECLARED_NAME
 
 TIMER_PERIOD = error("RC411", "timer-period")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.formatting import port_name
-from composer.analysis.subjects import wiring
-from composer.diagnostics import Diagnostic, Label, warning
+from composer.base.diagnostics import Diagnostic, Label, warning
 from composer.model import ChannelKind, Event, Port, PortKind, PortOfNode, PrimaryState
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.formatting import port_name
+from composer.rules.analysis.subjects import wiring
 from composer.rules.connections import diagnostic_location, name_location
 
 TOPIC_LOOP = warning("RC326", "topic-loop")

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from composer.analysis.context import Context, is_unresolved
-from composer.analysis.earlier_errors import earlier_errors
-from composer.analysis.expressions import message_templates
-from composer.analysis.formatting import number
-from composer.analysis.frames import BROADCAST, FrameUse, place, uses_of_behaviors
-from composer.diagnostics import Diagnostic, Label, error, suggestion, warning
-from composer.geometry import is_unit, normalized
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.source import Located, Span
+from composer.language.templates import Constant, Items, Record, Template, Text
 from composer.model import (
     POSE_TYPES,
     DynamicTransform,
@@ -21,8 +17,12 @@ from composer.model import (
     StaticTransform,
     Transforms,
 )
-from composer.source import Located, Span
-from composer.templates import Constant, Items, Record, Template, Text
+from composer.model.geometry import is_unit, normalized
+from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.expressions import message_templates
+from composer.rules.analysis.formatting import number
+from composer.rules.analysis.frames import BROADCAST, FrameUse, place, uses_of_behaviors
 
 FRAME_ID_SLASH = warning("RC309", "frame-id-slash")
 TRANSFORM_SOURCE = error("RC515", "transform-source")

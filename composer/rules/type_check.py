@@ -10,18 +10,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import field
 from typing import TypeAlias
 
-from composer.analysis.context import Context
-from composer.analysis.earlier_errors import earlier_errors
-from composer.diagnostics import Diagnostic
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import Diagnostic
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checker import RunningCheck, start
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import use_of
 from composer.python_code.problems import Family, Problem
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.python import diagnostic, sources
-from composer.source import Span
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.
 _Use: TypeAlias = tuple[object, ...]

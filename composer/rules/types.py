@@ -6,16 +6,16 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from composer.analysis.context import Context
-from composer.analysis.fields import field_problems
-from composer.analysis.formatting import port_name
-from composer.analysis.subjects import connection_subjects, port_subject, type_subject
-from composer.diagnostics import Diagnostic, Label, Subject, error
-from composer.fast_dataclass import dataclass
-from composer.field_types import Problem
+from composer.base.diagnostics import Diagnostic, Label, Subject, error
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
+from composer.interfaces.field_types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
-from composer.names import join
-from composer.source import Span
+from composer.model.names import join
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.fields import field_problems
+from composer.rules.analysis.formatting import port_name
+from composer.rules.analysis.subjects import connection_subjects, port_subject, type_subject
 
 TYPE_MISMATCH = error("RC303", "type-mismatch")
 

@@ -33,7 +33,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
 from composer.model import LogLevel, Node, System
-from composer.names import PROGRAM_LOGGER, join
+from composer.model.names import PROGRAM_LOGGER, join
 from composer.plan import Fault, Plan
 from composer.runtime.children.discovery_server import discovery_servers
 from composer.runtime.executors.placement import (

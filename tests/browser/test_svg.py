@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from composer.graph import View, build_graph, scene_of
+from composer.base.resources import systems_folder
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
-from composer.resources import systems_folder
 from tests.browser.conftest import Opened
 
 

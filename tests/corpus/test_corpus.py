@@ -28,11 +28,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from composer.diagnostics import Diagnostic, Severity
+from composer.base.diagnostics import Diagnostic, Severity
 from composer.interfaces import Interfaces
 from composer.loading import LoadResult, collect_diagnostics, load
-from composer.node_types import interface_folders
 from composer.project import Project
+from composer.project.node_types import interface_folders
 
 FILES = sorted(Path(__file__).parent.glob("*.yaml"))
 MORE = sorted((Path(__file__).parent / "more").glob("*.yaml"))

@@ -6,12 +6,12 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from composer.export.container_image import Contents, containerfile
-from composer.export.deployment import Service
-from composer.export.docker_compose import compose_file
-from composer.export.kubernetes import manifests
-from composer.export.systemd import Installation, units
-from composer.hosts.remote_command import python_words
+from composer.bridges.export.container_image import Contents, containerfile
+from composer.bridges.export.deployment import Service
+from composer.bridges.export.docker_compose import compose_file
+from composer.bridges.export.kubernetes import manifests
+from composer.bridges.export.systemd import Installation, units
+from composer.client.hosts.remote_command import python_words
 from composer.loading import load
 from composer.model import Host
 

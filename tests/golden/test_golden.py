@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Rule
+from composer.base.diagnostics import Rule
 from composer.loading import load
 from composer.report.text import render
 from composer.rules import all_checks

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.graph import View, build_graph, scene_of
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
 
 HERE = Path(__file__).parent / "graph"

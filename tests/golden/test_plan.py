@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from composer.base.resources import systems_folder
 from composer.loading import load
 from composer.plan import bring_up, tear_down
-from composer.resources import systems_folder
 
 EXPECTED = Path(__file__).parent / "plan"
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.document import read_document
-from composer.resources import nodes_folder, schemas_folder, systems_folder
-from composer.tree import Entry, Mapping, Sequence, Tree
+from composer.base.resources import nodes_folder, schemas_folder, systems_folder
+from composer.language.document import read_document
+from composer.language.tree import Entry, Mapping, Sequence, Tree
 from tests.language_server.client import Cursor, LanguageServer
 from tests.programs import require_package
 

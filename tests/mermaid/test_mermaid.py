@@ -15,11 +15,11 @@ from typing import Any
 
 import pytest
 
-from composer.graph import View, build_graph, scene_of
+from composer.base.resources import systems_folder
 from composer.graph.diagram import Graph
 from composer.graph.formats import mermaid
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
-from composer.resources import systems_folder
 from tests.programs import require_package
 from tests.unit.graph.test_renderers import EVIL, evil_graph
 from tests.unit.support.fleets import fleet_graph

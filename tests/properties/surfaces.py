@@ -15,16 +15,16 @@ from xml.etree import ElementTree
 
 from hypothesis import strategies as st
 
-from composer.diagnostics import in_order, registered_rules
-from composer.document import parse_bytes
-from composer.graph import View, build_graph, scene_of
+from composer.base.diagnostics import in_order, registered_rules
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import Bundle, Definition
+from composer.language.document import parse_bytes
 from composer.loading import load_bytes
+from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
 from composer.project.rule_selection import check_rule_settings
 from composer.project.settings import SettingsSource, read_settings
-from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
 from tests.properties.mutation import mutated, spliced
 from tests.properties.validating import (
     INTERFACES,

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.assembly.canonical import canonical
-from composer.document import parse_document
-from composer.document.writer import write_document
+from composer.base.resources import systems_folder
+from composer.base.source import SourceFile, Span
+from composer.language.document import parse_document
+from composer.language.document.writer import write_document
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
 from composer.loading import LoadResult, gives_same_model, load
-from composer.resources import systems_folder
-from composer.source import SourceFile, Span
-from composer.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
+from composer.model.assembly.canonical import canonical
 from tests.examples import examples
 from tests.properties.validating import SHIPPED
 

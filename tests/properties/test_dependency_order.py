@@ -7,13 +7,13 @@ from graphlib import CycleError, TopologicalSorter
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composer.base.source import Located, SourceFile, Span
 from composer.model import Dependency, Node, System
 from composer.model.dependencies import (
     declared_edges,
     dependency_cycles,
     in_dependency_order,
 )
-from composer.source import Located, SourceFile, Span
 
 SOURCE = SourceFile("robot.yaml")
 SPAN = Span(SOURCE, 1, 1)

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from composer.diagnostics import MAXIMUM_VALUE_LENGTH
-from composer.document import parse_bytes, parse_document
-from composer.document.limits import MAX_INTEGER, MIN_INTEGER
-from composer.source import SourceFile
-from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH
+from composer.base.source import SourceFile
+from composer.language.document import parse_bytes, parse_document
+from composer.language.document.limits import MAX_INTEGER, MIN_INTEGER
+from composer.language.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
 from tests.examples import examples
 
 #: Tokens of YAML, which get further than random characters.

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.expressions import EvaluationError, ExpressionError, compile_expression
-from composer.expressions.builder import OPERATIONS, SCOPE
+from composer.language.expressions import EvaluationError, ExpressionError, compile_expression
+from composer.language.expressions.builder import OPERATIONS, SCOPE
 
 ESCAPES = (
     "().__class__",

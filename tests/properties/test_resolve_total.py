@@ -7,13 +7,13 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composer.base.source import SourceFile, Span
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
 from composer.model.dependencies import dependency_cycles
-from composer.node_types import NodeTypes
+from composer.model.resolve import OverrideOptions, read_overrides, resolve
 from composer.plan import bring_up, tear_down
 from composer.project import Project
-from composer.resolve import OverrideOptions, read_overrides, resolve
-from composer.source import SourceFile, Span
-from composer.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.project.node_types import NodeTypes
 from tests.examples import examples
 
 SOURCE = SourceFile("robot.yaml", "")

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 from jsonschema.validators import extend
 
-from composer.document import read_document
-from composer.resources import nodes_folder, systems_folder
-from composer.schema import SCHEMAS, schema
-from composer.schema.fast_check import compile_check
-from composer.tree import plain
+from composer.base.resources import nodes_folder, systems_folder
+from composer.language.document import read_document
+from composer.language.schema import SCHEMAS, schema
+from composer.language.schema.fast_check import compile_check
+from composer.language.tree import plain
 from tests.examples import examples
 from tests.properties.mutation import mutated
 

@@ -7,12 +7,12 @@ import json
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from composer.document import parse_document
-from composer.document.limits import MAX_VALUES
-from composer.expand import expand, missing_variables
-from composer.schema import SCHEMAS, check_schema, schema
-from composer.source import SourceFile
-from composer.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+from composer.base.source import SourceFile
+from composer.language.document import parse_document
+from composer.language.document.limits import MAX_VALUES
+from composer.language.expand import expand, missing_variables
+from composer.language.schema import SCHEMAS, check_schema, schema
+from composer.language.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
 from tests.examples import examples
 
 KEYS = sorted(

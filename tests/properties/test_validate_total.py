@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from hypothesis import example, given
 
-from composer.assembly.canonical import canonical
-from composer.document.writer import write_document
-from composer.expand.rules import UNUSED_DECLARATION
+from composer.language.document.writer import write_document
+from composer.language.expand.rules import UNUSED_DECLARATION
 from composer.loading import collect_diagnostics, load
+from composer.model.assembly.canonical import canonical
 from tests.examples import examples
 from tests.properties.surfaces import SURFACES, TEXTS
 from tests.properties.validating import INTERFACES, check_diagnostics, validate_and_check

@@ -7,14 +7,14 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from composer.diagnostics import Diagnostic
-from composer.document import read_document
+from composer.base.diagnostics import Diagnostic
+from composer.base.resources import interfaces_folder, nodes_folder, systems_folder
+from composer.base.source import Span
 from composer.interfaces import Interfaces
+from composer.language.document import read_document
+from composer.language.tree import plain
 from composer.loading import load_bytes
 from composer.report import machine, text
-from composer.resources import interfaces_folder, nodes_folder, systems_folder
-from composer.source import Span
-from composer.tree import plain
 
 ROOT = Path(__file__).parents[2]
 INTERFACES = Interfaces.load([interfaces_folder()])

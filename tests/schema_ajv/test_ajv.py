@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 
-from composer.document import parse_document, read_document
+from composer.base.resources import nodes_folder, systems_folder
+from composer.base.source import SourceFile
+from composer.language.document import parse_document, read_document
+from composer.language.schema import REPORT, SCHEMAS, check_schema, kind_of, schema
+from composer.language.tree import plain
 from composer.report.machine import render_json
-from composer.resources import nodes_folder, systems_folder
-from composer.schema import REPORT, SCHEMAS, check_schema, kind_of, schema
-from composer.source import SourceFile
-from composer.tree import plain
 from tests.programs import require_package
 from tests.properties.mutation import mutated
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from composer import resources
+from composer.base import resources
 
 BEHAVIORS = sorted(resources.nodes_folder().glob("*.py"))
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Severity
-from composer.files import find_files
+from composer.base.diagnostics import Severity
+from composer.base.resources import nodes_folder, systems_folder
 from composer.interfaces import Interfaces
 from composer.loading import LoadResult, load, load_bytes
-from composer.resolve import OverrideOptions
-from composer.resources import nodes_folder, systems_folder
+from composer.model.resolve import OverrideOptions
+from composer.project.files import find_files
 
 GOOD = """\
 system: robot

@@ -24,7 +24,7 @@ class CommandError(Exception):
 
     def text(self) -> str:
         """Return the lines for stderr, without control characters."""
-        from composer.characters import visible
+        from composer.base.characters import visible
 
         lines = [f"compose: {self.message}"]
         if self.hint is not None:

@@ -16,7 +16,7 @@ from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.system_arguments import runnable_system
 
 if TYPE_CHECKING:
-    from composer.hosts.deployment import RemoteProcess
+    from composer.client.hosts.deployment import RemoteProcess
     from composer.loading import LoadResult
     from composer.model import Host, LogLevel, System
     from composer.project.copied_files import CopiedFiles
@@ -86,7 +86,7 @@ def check_workspaces(hosts: list[Host]) -> None:
 @contextmanager
 def reported_problems() -> Iterator[None]:
     """Print what is wrong with hosts, and end the command."""
-    from composer.hosts.check import HostsDiffer
+    from composer.client.hosts.check import HostsDiffer
 
     try:
         yield
@@ -102,7 +102,7 @@ def process_logs(
 ) -> Iterator[Callable[[RemoteProcess, LogLevel, str, str], None]]:
     """Keep the lines of processes on other computers in log files here, for 'compose logs'."""
     from composer.cli.support.run_logging import run_log
-    from composer.names import join
+    from composer.model.names import join
     from composer.runtime.supervision.events import Logged
 
     with ExitStack() as stack:

@@ -9,14 +9,14 @@ from collections.abc import Mapping
 from importlib.metadata import distributions
 from pathlib import Path
 
-from composer.cli.support.errors import CommandError
-from composer.cli.support.output.terminal import say
-from composer.scaffolding.interface_package import (
+from composer.bridges.scaffolding.interface_package import (
     InvalidPackage,
     NotForPip,
     bundled_package,
     read_package,
 )
+from composer.cli.support.errors import CommandError
+from composer.cli.support.output.terminal import say
 
 _WHEEL_PREFIX = "ros-"
 

@@ -14,8 +14,8 @@ from composer.cli.support.errors import CONFIG, CommandError, UsageError
 from composer.cli.support.output.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline, Session
     from composer.model import System
-    from composer.remote.session import Deadline, Session
     from composer.runtime.process.query_socket import NameAndTypes
 
 
@@ -73,7 +73,7 @@ def require_launch(command: str) -> None:
 
 def require_interfaces(system: System) -> None:
     """Raise CommandError if Python lacks an interface package that a port of the system uses."""
-    from composer.interfaces.building import how_to_build, used_packages
+    from composer.model.interface_packages import how_to_build, used_packages
 
     for package, node in used_packages(system).items():
         if find_spec(package) is None:
@@ -90,7 +90,7 @@ def require_modules(system: System) -> None:
 
     What else an import raises is reported when the node is configured.
     """
-    from composer.interfaces.building import how_to_build, how_to_get
+    from composer.model.interface_packages import how_to_build, how_to_get
 
     for node in system.nodes:
         if node.hosted_class is None or not node.in_process:
@@ -112,8 +112,8 @@ def require_modules(system: System) -> None:
 def _interface_sources() -> Mapping[str, Path]:
     """Return the folders of the project's interface packages, by name."""
     from composer.interfaces.sources import find_packages
-    from composer.node_types import interface_folders
     from composer.project import Project
+    from composer.project.node_types import interface_folders
 
     return find_packages(interface_folders(Project.at(Path.cwd()))).folders
 
@@ -130,7 +130,7 @@ def ros_session(
     large.
     """
     require_ros(command)
-    from composer.remote.session import Deadline, RosError, Session, use_command_profile
+    from composer.client.session import Deadline, RosError, Session, use_command_profile
 
     if not carries_messages:
         use_command_profile()
@@ -153,13 +153,13 @@ def graph_names(
     A running system on this computer answers at once; without one, join the ROS graph.
     """
     require_ros(command)
-    from composer.remote.systems.local_graph import local_names
+    from composer.client.systems.local_graph import local_names
 
     found = local_names(kind, timeout_s, hidden=hidden)
     if found is not None:
         return found
     with ros_session(command, timeout_s) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames
 
         return GraphNames(session, deadline).names(kind, hidden=hidden)
 
@@ -167,14 +167,14 @@ def graph_names(
 def types_of(command: str, kind: str, name: str, timeout_s: float) -> tuple[str, ...]:
     """Return the types of a topic, service or action. Raises CommandError if there is none."""
     require_ros(command)
-    from composer.remote.systems.local_graph import local_names
+    from composer.client.systems.local_graph import local_names
 
     known = dict(local_names(kind, timeout_s, hidden=True) or ())
     absolute = name if name.startswith("/") else f"/{name}"
     if absolute in known:
         return known[absolute]
     with ros_session(command, timeout_s) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames
 
         return GraphNames(session, deadline).types(kind, name)
 
@@ -195,7 +195,7 @@ def names_of_type(
 
 
 def _warn_of_skipped(session: Session) -> None:
-    from composer.characters import visible
+    from composer.base.characters import visible
 
     for warning in session.graph.skipped.warnings():
         say(f"warning: {visible(warning)}")

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from composer.cli.support.output.console import OutputQueue
 from composer.cli.support.output.progress import logger_and_text, severity_of
 from composer.cli.support.output.terminal import say
-from composer.names import PROGRAM_LOGGER
-from composer.run_log import Record, RotatingFile, RunFolder
+from composer.client.run_log import Record, RotatingFile, RunFolder
+from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.middleware.environment import log_folder
 from composer.runtime.supervision.events import CallbackFailed, Event, Logged
 

@@ -24,7 +24,7 @@ _SUFFIXES = ("", ".yaml", ".yml")
 
 def complete_system(incomplete: str) -> list[str]:
     """Complete the names of the project's systems and of example systems, and paths."""
-    from composer.installed_projects import installed_systems
+    from composer.project.installed_projects import installed_systems
 
     known = sorted({*project_systems(), *installed_systems(), *example_systems()})
     names = [name for name in known if name.startswith(incomplete)]
@@ -67,7 +67,7 @@ def system_file(text: str) -> Path:
     Systems of the project come before those of installed packages, and these before example
     systems. Raises UsageError.
     """
-    from composer.installed_projects import installed_systems
+    from composer.project.installed_projects import installed_systems
 
     if not text:
         raise UsageError("the name of the system is empty")
@@ -84,7 +84,7 @@ def system_file(text: str) -> Path:
         return examples[text]
     if _is_folder(path):
         raise UsageError(f"'{text}' is a folder, not a system file")
-    from composer.diagnostics import nearest
+    from composer.base.diagnostics import nearest
 
     near = nearest_path(path)
     is_file = near is not None and not _is_folder(near)
@@ -120,8 +120,8 @@ def _own_system(name: str, path: Path, example: Path | None) -> Path:
 
     Raises UsageError if it belongs to another user, whose file must be named explicitly.
     """
-    from composer.ownership import TrustedUsers
-    from composer.source import shown_path
+    from composer.base.ownership import TrustedUsers
+    from composer.base.source import shown_path
 
     shown = shown_path(path)
     if TrustedUsers.own().other_owner(path) is not None:
@@ -136,7 +136,7 @@ def _own_system(name: str, path: Path, example: Path | None) -> Path:
 
 def example_systems() -> dict[str, Path]:
     """Return the bundled example systems, by name."""
-    from composer.resources import systems_folder
+    from composer.base.resources import systems_folder
 
     return {path.stem: path for path in sorted(systems_folder().glob("*.yaml"))}
 
@@ -151,7 +151,7 @@ def path_exists(path: Path) -> bool:
 
 def nearest_path(path: Path) -> Path | None:
     """Return the existing path most similar to ``path``, which does not exist, or None."""
-    from composer.diagnostics import nearest
+    from composer.base.diagnostics import nearest
 
     folder: Path | None = path.parent
     if path.parent != path and not _is_folder(path.parent):
@@ -188,10 +188,10 @@ def load_system(
 
     Only ``compose validate`` reports diagnostics of severity info.
     """
-    from composer.diagnostics import Severity
+    from composer.base.diagnostics import Severity
     from composer.loading import load
+    from composer.model.resolve import OverrideOptions
     from composer.report.text import render
-    from composer.resolve import OverrideOptions
 
     result = load(
         path,
@@ -257,8 +257,8 @@ def running_system_name(text: str) -> str:
     """
     if not text.endswith((".yaml", ".yml")):
         return text
-    from composer.document import read_document
-    from composer.tree import Scalar
+    from composer.language.document import read_document
+    from composer.language.tree import Scalar
 
     tree, _, diagnostics = read_document(Path(text))
     name = tree.get("system") if tree is not None else None

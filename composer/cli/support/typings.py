@@ -8,9 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.base.fast_dataclass import dataclass
 from composer.cli.support.errors import CommandError
 from composer.cli.support.output.terminal import say
-from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
     from composer.loading import LoadResult
@@ -38,10 +38,10 @@ def project_stubs(project: Project, paths: Sequence[Path] = ()) -> ProjectStubs:
 
     The default are the systems in the folder ``systems`` and in the root of the project.
     """
-    from composer.files import find_files
     from composer.interfaces import Interfaces
     from composer.loading import load_models
-    from composer.node_types import interface_folders
+    from composer.project.files import find_files
+    from composer.project.node_types import interface_folders
     from composer.python_code.stubs.behaviors import behavior_classes
     from composer.python_code.stubs.folder import stub_files
 
@@ -86,9 +86,9 @@ def write_changes(folder: Path, changes: FolderChanges) -> None:
 
 def update_typings(project: Project) -> None:
     """Bring the stubs of a project up to date, if it has some; say so, or what prevents it."""
-    from composer.ownership import TrustedUsers
+    from composer.base.ownership import TrustedUsers
+    from composer.base.source import shown_path
     from composer.python_code.stubs.folder import TYPINGS, folder_changes, has_stubs
-    from composer.source import shown_path
 
     folder = project.root / TYPINGS
     try:

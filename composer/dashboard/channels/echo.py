@@ -80,7 +80,7 @@ class EchoFeed(Feed):
 
     def _shown(self, message: Any) -> Any:
         """Return a message, or the requested fields of it, as plain data."""
-        from composer.remote.messages.values import part, to_short_plain
+        from composer.client.messages.values import part, to_short_plain
 
         if not self._fields:
             return json_safe(to_short_plain(message, self._max_items))

@@ -14,8 +14,8 @@ from composer.dashboard.protocol.messages import Values, json_safe, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:
+    from composer.client.calls import FinishedGoal
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.calls import FinishedGoal
 
 _ACCEPTED_WITHIN_S = 5.0
 _MAX_ITEMS = 256
@@ -72,7 +72,7 @@ class GoalFeed(Feed):
             yield self._updates.popleft()
 
     def _run(self) -> None:
-        from composer.remote.session import RosError
+        from composer.client.session import RosError
 
         try:
             finished = self._observe()
@@ -90,10 +90,10 @@ class GoalFeed(Feed):
 
     def _observe(self) -> FinishedGoal | None:
         """Send the goal and wait for its end; None if nothing observes it any more."""
-        from composer.remote.calls import GoalRequest, send_goal
-        from composer.remote.graph_names import GraphNames
-        from composer.remote.name_matching import full_name
-        from composer.remote.session import Deadline
+        from composer.client.calls import GoalRequest, send_goal
+        from composer.client.graph_names import GraphNames
+        from composer.client.name_matching import full_name
+        from composer.client.session import Deadline
 
         deadline = Deadline(_ACCEPTED_WITHIN_S)
         session = self._ros.session
@@ -117,7 +117,7 @@ class GoalFeed(Feed):
         self._feedback = feedback
 
     def _shown(self, message: Any) -> Any:
-        from composer.remote.messages.values import to_short_plain
+        from composer.client.messages.values import to_short_plain
 
         return json_safe(to_short_plain(message, _MAX_ITEMS))
 

@@ -13,11 +13,11 @@ from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:
+    from composer.client.systems.system_reports import NodeReport
     from composer.dashboard.observing.topology import Topology
     from composer.dashboard.pictures import Diagram
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.drift import ObservedEndpoint
-    from composer.remote.systems.system_reports import NodeReport
+    from composer.plan.drift import ObservedEndpoint
 
 VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")
 #: The size of the page in pixels, unless a subscription says it.
@@ -95,7 +95,7 @@ class DiagramFeed(Feed):
 
     def _laid_out(self, topology: Topology, states: Mapping[str, str | None]) -> Diagram:
         from composer.dashboard.pictures import Diagram, declared_scene, live_scene
-        from composer.graph import View
+        from composer.graph.views import View
 
         if self._declared is not None:
             return Diagram(declared_scene(self._declared), View(self._view))
@@ -158,7 +158,7 @@ class LiveFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Yield all states and rates."""
-        from composer.remote.systems.system_reports import of_whole_systems
+        from composer.client.systems.system_reports import of_whole_systems
 
         observed = self._ros.observed
         # Sorted: what other processes of a system report of their nodes is newer, and comes later.

@@ -14,8 +14,8 @@ from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:
+    from composer.client.systems.system_reports import NodeReport, SystemReport
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.systems.system_reports import NodeReport, SystemReport
 
 _PERIOD_S = 1.0
 #: While nodes are being discovered.
@@ -67,7 +67,7 @@ class NodesFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Yield all nodes and systems if anything is new."""
-        from composer.remote.systems.system_reports import of_whole_systems
+        from composer.client.systems.system_reports import of_whole_systems
 
         observed = self._ros.observed
         self.period_s = _SOON_S if observed.is_new else _PERIOD_S

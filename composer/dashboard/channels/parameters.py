@@ -13,11 +13,11 @@ from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.errors import RequestError, from_ros
 from composer.dashboard.protocol.messages import Values, json_safe, to_json
 from composer.dashboard.protocol.outbox import Update
-from composer.qos import QosProfile
+from composer.model.qos import QosProfile
 
 if TYPE_CHECKING:
+    from composer.client.shared_session import SampledTopic
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.shared_session import SampledTopic
 
 _EVENTS = "/parameter_events"
 _EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
@@ -77,8 +77,8 @@ class ParametersFeed(Feed):
             yield Update(found)
 
     def _read(self) -> None:
-        from composer.remote.parameters import ParameterClient
-        from composer.remote.session import Deadline, RosError
+        from composer.client.parameters import ParameterClient
+        from composer.client.session import Deadline, RosError
 
         found: str | RequestError
         try:

@@ -17,7 +17,7 @@ from composer.model import PortKind
 if TYPE_CHECKING:
     from composer.dashboard.observing.topology import Topology
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.drift import ObservedEndpoint
+    from composer.plan.drift import ObservedEndpoint
 
 _MAX_MEASURED = 40
 #: Discovery does not report these.

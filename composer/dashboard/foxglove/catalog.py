@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.frames import CDR, SCHEMA_ENCODING
 from composer.dashboard.foxglove.schemas import Schemas
 from composer.dashboard.protocol.outbox import Update
-from composer.fast_dataclass import dataclass
 from composer.model import PortKind
 
 if TYPE_CHECKING:

@@ -8,6 +8,8 @@ from dataclasses import field
 
 from starlette.websockets import WebSocket
 
+from composer.base.diagnostics import nearest
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.catalog import (
     Catalog,
@@ -33,8 +35,6 @@ from composer.dashboard.foxglove.topics import ClockFeed
 from composer.dashboard.protocol.errors import BadRequestError, RequestError
 from composer.dashboard.protocol.messages import Values
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
-from composer.diagnostics import nearest
-from composer.fast_dataclass import dataclass
 
 #: Messages of a topic that wait for a client.
 _MAX_WAITING = 256

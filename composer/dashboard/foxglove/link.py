@@ -7,17 +7,17 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.client import MAX_PENDING, POLICY_VIOLATION, Client
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.foxglove.frames import ERROR, WARNING, status
 from composer.dashboard.protocol.errors import RequestError, internal_error
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Outbox, Update
-from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.session import Deadline
 
 T = TypeVar("T")
 

@@ -7,18 +7,18 @@ import binascii
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.errors import BadRequestError
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
-from composer.fast_dataclass import dataclass
-from composer.qos import QosProfile
+from composer.model.qos import QosProfile
 
 if TYPE_CHECKING:
+    from composer.client.parameters import ParameterClient
+    from composer.client.session import Deadline
+    from composer.client.shared_session import SampledTopic
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.parameters import ParameterClient
-    from composer.remote.session import Deadline
-    from composer.remote.shared_session import SampledTopic
 
 _EVENTS = "/parameter_events"
 _EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
@@ -124,7 +124,7 @@ def set_all(ros: RosGraphSide, deadline: Deadline, settings: Iterable[Setting]) 
 
 
 def _read_everything(ros: RosGraphSide, deadline: Deadline) -> Found:
-    from composer.remote.snapshot import GraphObserver
+    from composer.client.snapshot import GraphObserver
 
     # Nodes that have just ended would be waited for.
     present = {name for name, _ in ros.session.graph.names("node")}
@@ -142,8 +142,8 @@ def _read_everything(ros: RosGraphSide, deadline: Deadline) -> Found:
 
 
 def _for_each(by_node: Mapping[str, Any], ros: RosGraphSide, deadline: Deadline, act: Any) -> Found:
-    from composer.remote.parameters import ParameterClient
-    from composer.remote.session import RosError
+    from composer.client.parameters import ParameterClient
+    from composer.client.session import RosError
 
     found = Found([], [])
     for node, items in by_node.items():
@@ -167,7 +167,7 @@ def _read(client: ParameterClient, names: list[str], found: Found) -> None:
 
 
 def _set(client: ParameterClient, settings: list[Setting], found: Found) -> None:
-    from composer.remote.session import RosError
+    from composer.client.session import RosError
 
     for setting in settings:
         try:

@@ -21,8 +21,8 @@ from composer.dashboard.protocol.messages import Values
 from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.session import Deadline
 
 _CALL_S = 10.0
 _PARAMETERS_S = 5.0
@@ -37,7 +37,7 @@ def call_service(link: Link, call: ServiceCall, services: Mapping[int, OfferedSe
         link.post({"op": "serviceCallFailure", **content})
 
     def run(ros: RosGraphSide, deadline: Deadline) -> bytes:
-        from composer.remote.messages.serialized import call_serialized
+        from composer.client.messages.serialized import call_serialized
 
         return call_serialized(ros.session, deadline, service.name, service.type, call.data)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from composer.interfaces import FieldType, Interfaces, Message, Service
-from composer.tree import Plain
+from composer.language.tree import Plain
 
 _SEPARATOR = "=" * 80
 _MAX_SCHEMAS = 10_000

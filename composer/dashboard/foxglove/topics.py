@@ -13,13 +13,13 @@ from composer.dashboard.protocol.budget import Budget
 from composer.dashboard.protocol.errors import BadRequestError, RequestError, from_ros
 from composer.dashboard.protocol.messages import to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
-from composer.qos import QosProfile, Reliability
+from composer.model.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
+    from composer.client.messages.serialized import SerializedPublisher
+    from composer.client.shared_session import SampledTopic
     from composer.dashboard.observing.topic_reader import TopicReader
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.messages.serialized import SerializedPublisher
-    from composer.remote.shared_session import SampledTopic
 
 _DEPTH = 200
 _POLL_S = 0.02
@@ -134,8 +134,8 @@ class PublishedFeed(Feed):
 
     def start(self, ros: RosGraphSide) -> None:
         """Create the publisher; what waits is lost if that is not possible."""
+        from composer.client.messages.serialized import SerializedPublisher
         from composer.dashboard.publishing import suitable_profile
-        from composer.remote.messages.serialized import SerializedPublisher
 
         try:
             profile = suitable_profile(ros, self.topic)
@@ -148,7 +148,7 @@ class PublishedFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Publish what waits; yield errors."""
-        from composer.remote.session import RosError
+        from composer.client.session import RosError
 
         assert self._publisher is not None  # noqa: S101 - set by start
         while (data := self._take()) is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from composer.qos import Durability, QosProfile, Reliability
+from composer.model.qos import Durability, QosProfile, Reliability
 
 #: Messages of these types are expected to be large; those of others are once one was.
 LARGE_TYPES = frozenset(

@@ -11,15 +11,15 @@ from collections import Counter, deque
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.client.run_log import current_domain, find_parts, find_runs, last_records
 from composer.model import SEVERITIES
-from composer.names import PROGRAM_LOGGER
-from composer.qos import Durability, QosProfile, Reliability
-from composer.run_log import current_domain, find_parts, find_runs, last_records
+from composer.model.names import PROGRAM_LOGGER
+from composer.model.qos import Durability, QosProfile, Reliability
 from composer.runtime.middleware.environment import log_folder
 
 if TYPE_CHECKING:
-    from composer.remote.shared_session import SampledTopic, SharedSession
+    from composer.client.shared_session import SampledTopic, SharedSession
 
 _TOPIC, _TYPE = "/rosout", "rcl_interfaces/msg/Log"
 #: As the publishers of rcl: late joiners get the lines of the last ten seconds.

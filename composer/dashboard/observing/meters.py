@@ -12,17 +12,17 @@ from dataclasses import field
 from functools import partial
 from typing import TYPE_CHECKING
 
+from composer.base.fast_dataclass import dataclass
+from composer.client.messages.rates import TopicRate
 from composer.dashboard.observing.large_messages import LARGE_BYTES, LARGE_TYPES, large_profile
-from composer.fast_dataclass import dataclass
 from composer.model import PortKind
-from composer.qos import Durability, QosProfile, Reliability
-from composer.remote.messages.rates import TopicRate
+from composer.model.qos import Durability, QosProfile, Reliability
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from composer.drift import ObservedEndpoint
-    from composer.remote.shared_session import SampledTopic, SharedSession
+    from composer.client.shared_session import SampledTopic, SharedSession
+    from composer.plan.drift import ObservedEndpoint
 
 _DEPTH = 100
 #: A rate is that of the messages of the last seconds.
@@ -76,7 +76,7 @@ class TopicMeters:
         if known is not None:
             known.users += 1
             return True
-        from composer.remote.messages.values import InvalidValueError
+        from composer.client.messages.values import InvalidValueError
 
         publishers = [end for end in ends if end.kind is PortKind.PUBLISHER]
         types = {end.type for end in ends}

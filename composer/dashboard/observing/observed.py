@@ -8,24 +8,24 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Self
 
+from composer.client.lifecycle import LifecycleClient
+from composer.client.session import Deadline
+from composer.client.systems.local_endpoints import local_endpoints
+from composer.client.systems.local_queries import local_report
+from composer.client.systems.managers import DISCOVERY_S, Systems
+from composer.client.systems.system_reports import SystemReport
 from composer.dashboard.observing.log_lines import LogLines
 from composer.dashboard.observing.meters import TopicMeters
 from composer.dashboard.observing.topology import Topology
 from composer.dashboard.pictures import Diagrams
-from composer.drift import ObservedEndpoint
-from composer.remote.lifecycle import LifecycleClient
-from composer.remote.session import Deadline
-from composer.remote.systems.local_endpoints import local_endpoints
-from composer.remote.systems.local_queries import local_report
-from composer.remote.systems.managers import DISCOVERY_S, Systems
-from composer.remote.systems.system_reports import SystemReport
+from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.instance_lock import LocalSystems
 from composer.runtime.ros_graph.graph import COMMAND_PREFIX, SETTLE_S
 from composer.runtime.ros_graph.node_endpoints import endpoints
 
 if TYPE_CHECKING:
+    from composer.client.shared_session import SharedSession
     from composer.dashboard.ros_side import Work
-    from composer.remote.shared_session import SharedSession
 
 _PERIOD_S = 1.0
 #: Nodes are discovered one after the other at first.

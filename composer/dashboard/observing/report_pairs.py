@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
-    from composer.remote.systems.system_reports import SystemReport
+    from composer.client.systems.system_reports import SystemReport
 
 #: Managers report every second, and at each change: those are too close for a rate.
 _APART_S = 0.5

@@ -18,10 +18,10 @@ from composer.dashboard.protocol.errors import RequestError
 from composer.model import PortKind
 
 if TYPE_CHECKING:
+    from composer.client.shared_session import Sample, SampledTopic
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.drift import ObservedEndpoint
-    from composer.qos import QosProfile
-    from composer.remote.shared_session import Sample, SampledTopic
+    from composer.model.qos import QosProfile
+    from composer.plan.drift import ObservedEndpoint
 
 
 class TopicReader:
@@ -75,7 +75,7 @@ class TopicReader:
 
     def _subscribe(self) -> None:
         """Subscribe, or subscribe again if the publishers have changed."""
-        from composer.remote.name_matching import full_name
+        from composer.client.name_matching import full_name
 
         full_name("topic", self.topic)  # raises if it is not a valid name
         ends = [end for _, end in self._ros.observed.topology().of_topics.get(self.topic, [])]
@@ -100,7 +100,7 @@ class TopicReader:
 
     def _wanted_profile(self, publishers: list[ObservedEndpoint], type_name: str) -> QosProfile:
         """Return the strictest profile that all publishers satisfy, except for large messages."""
-        from composer.remote.messages.topics import strictest_compatible_qos
+        from composer.client.messages.topics import strictest_compatible_qos
 
         offers = [end.qos for end in publishers if end.qos is not None]
         profile = strictest_compatible_qos(offers, self._depth)

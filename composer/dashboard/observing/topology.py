@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 
-from composer.drift import ObservedEndpoint, ObservedNode, Snapshot
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import PortKind
-from composer.names import is_hidden
+from composer.model.names import is_hidden
+from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
 
 _GET_STATE = "lifecycle_msgs/srv/GetState"
 _MANAGER, _IS_ACTIVE, _TRIGGER = "/manager", "is_active", "std_srvs/srv/Trigger"
@@ -40,7 +40,7 @@ class Topology:
         )
 
     def snapshot(self, states: Mapping[str, str | None]) -> Snapshot:
-        """Return the nodes as :mod:`composer.graph` and :mod:`composer.drift` read them."""
+        """Return the nodes as :mod:`composer.graph` and :mod:`composer.plan.drift` read them."""
         return Snapshot(
             tuple(
                 ObservedNode(

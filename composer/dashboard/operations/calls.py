@@ -10,8 +10,8 @@ from composer.dashboard.protocol.messages import Values, json_safe
 from composer.dashboard.publishing import read_outgoing
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.session import Deadline
 
 _CHANGE_S = 5.0
 _MAX_TIMEOUT_S = 120.0
@@ -28,10 +28,10 @@ def call(values: Values, dashboard: Dashboard) -> Prepared:
     timeout_s = values.number("timeout_s", 5.0, 0.1, _MAX_TIMEOUT_S)
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.calls import ServiceRequest, call_service
-        from composer.remote.graph_names import GraphNames
-        from composer.remote.messages.values import to_short_plain
-        from composer.remote.name_matching import full_name
+        from composer.client.calls import ServiceRequest, call_service
+        from composer.client.graph_names import GraphNames
+        from composer.client.messages.values import to_short_plain
+        from composer.client.name_matching import full_name
 
         service = full_name("service", name)
         names = GraphNames(ros.session, deadline)
@@ -52,7 +52,7 @@ def publish(values: Values, dashboard: Dashboard) -> Prepared:
     outgoing = read_outgoing(values)
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.session import Deadline as Limit
+        from composer.client.session import Deadline as Limit
 
         outgoing.open(ros)
         try:
@@ -74,7 +74,7 @@ def set_parameter(values: Values, dashboard: Dashboard) -> Prepared:
     node, name, value = values.text("node"), values.text("name"), values.any("value")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.parameters import ParameterClient
+        from composer.client.parameters import ParameterClient
 
         client = ParameterClient(ros.session, deadline, node)
         return {"value": json_safe(client.set({name: value})[name])}

@@ -14,9 +14,9 @@ from composer.dashboard.protocol.errors import RequestError, from_ros
 from composer.dashboard.protocol.messages import Values, json_safe
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
+    from composer.client.systems.lifecycle_batch import NodeOutcome
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.session import Deadline
-    from composer.remote.systems.lifecycle_batch import NodeOutcome
 
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _READ_S = 5.0
@@ -91,8 +91,8 @@ def drift(values: Values, dashboard: Dashboard) -> Prepared:
     del values
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.drift import compare
-        from composer.remote.snapshot import GraphObserver
+        from composer.client.snapshot import GraphObserver
+        from composer.plan.drift import compare
 
         with GraphObserver(ros.session) as observer:
             found = compare(
@@ -125,7 +125,7 @@ def transition(values: Values, dashboard: Dashboard) -> Prepared:
     dependents = values.flag("dependents")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
+        from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
         outcomes = batch.run(dependents=dependents)
@@ -143,7 +143,7 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
     name = values.text("node")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
+        from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         message = _restart_by_manager(ros, deadline, name)
         if message is not None:
@@ -160,9 +160,9 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
 
 def _restart_by_manager(ros: RosGraphSide, deadline: Deadline, name: str) -> str | None:
     """Restart a node of a system; return the message of the manager, None if it has no manager."""
-    from composer.remote.name_matching import NotFoundError
-    from composer.remote.systems.managed_nodes import find_managed_nodes
-    from composer.remote.systems.managers import Systems
+    from composer.client.name_matching import NotFoundError
+    from composer.client.systems.managed_nodes import find_managed_nodes
+    from composer.client.systems.managers import Systems
 
     systems = Systems(ros.session, deadline)
     try:
@@ -183,7 +183,7 @@ def command(values: Values, dashboard: Dashboard) -> Prepared:
     system, name = values.text("system"), values.choice("command", COMMANDS)
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.systems.managers import Systems
+        from composer.client.systems.managers import Systems
 
         systems = Systems(ros.session, deadline)
         try:

@@ -8,8 +8,8 @@ from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.protocol.messages import Values
 
 if TYPE_CHECKING:
+    from composer.client.session import Deadline
     from composer.dashboard.ros_side import RosGraphSide
-    from composer.remote.session import Deadline
 
 _KINDS = ("message", "service", "action")
 _CHANNELS = ("topic", "service", "action")
@@ -59,7 +59,7 @@ def type_of(values: Values, dashboard: Dashboard) -> Prepared:
     kind, name = values.choice("kind", _CHANNELS), values.text("name")
 
     def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
-        from composer.remote.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames
 
         return {"types": list(GraphNames(ros.session, deadline).types(kind, name))}
 

@@ -6,12 +6,12 @@ import logging
 import os
 from typing import TYPE_CHECKING, Any
 
-from composer.characters import escape_line
+from composer.base.characters import escape_line
 
 if TYPE_CHECKING:
-    from composer.remote.session import RosError
+    from composer.client.session import RosError
 
-#: The codes of errors of :mod:`composer.remote`, by the names of their classes: importing these
+#: The codes of errors of :mod:`composer.client`, by the names of their classes: importing these
 #: imports ROS.
 _CODES = {
     "NoResponseError": "no_response",

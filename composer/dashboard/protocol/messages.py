@@ -7,10 +7,10 @@ import math
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from composer.base.diagnostics import nearest
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.protocol.errors import BadRequestError
-from composer.diagnostics import nearest
-from composer.document.scalars import text_of_not_finite
-from composer.fast_dataclass import dataclass
+from composer.language.document.scalars import text_of_not_finite
 
 T = TypeVar("T")
 

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import field
 from enum import StrEnum
 
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.protocol.budget import Budget
 from composer.dashboard.protocol.errors import RequestError
-from composer.fast_dataclass import dataclass
 
 #: Batches of messages that wait for each subscription.
 MAX_BATCHES = 8

@@ -12,6 +12,8 @@ from typing import Any
 
 from starlette.websockets import WebSocket
 
+from composer.base.diagnostics import nearest
+from composer.base.fast_dataclass import dataclass
 from composer.dashboard.channels import CHANNELS
 from composer.dashboard.channels.goal import GoalFeed
 from composer.dashboard.client import MAX_PENDING, Client
@@ -27,8 +29,6 @@ from composer.dashboard.protocol.messages import (
     to_json,
 )
 from composer.dashboard.protocol.outbox import Outbox
-from composer.diagnostics import nearest
-from composer.fast_dataclass import dataclass
 
 _MAX_SUBSCRIPTIONS = 64
 #: Operations of the connection itself.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.characters import escape_line, escape_lines
+from composer.base.characters import escape_line, escape_lines
 from composer.graph.diagram import (
     Cluster,
     Edge,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from composer.characters import escape_json
+from composer.base.characters import escape_json
 from composer.graph.diagram import Cluster, Edge, Graph, Vertex
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.characters import escape_line
+from composer.base.characters import escape_line
 from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Mark, Vertex, VertexKind
 from composer.graph.formats.theme import LIGHT_COLORS
 

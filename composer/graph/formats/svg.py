@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from composer.characters import is_safe
+from composer.base.characters import is_safe
 from composer.graph.diagram import EdgeKind, Graph, Mark, Problem, Vertex, VertexKind
 from composer.graph.formats.theme import STYLE
 from composer.graph.layout import Frame, Layout, Path, Point, Rectangle, Size

@@ -11,7 +11,7 @@ from dataclasses import field
 from itertools import groupby
 from typing import TypeAlias
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.graph.layout.boxes import Box, Group, Item, space_between
 
 #: Sweeps propagate positions over all ranks; rounds balance pulls from both sides.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterator, Mapping
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Edge, Graph, Vertex, VertexKind
 from composer.graph.layout.result import Size
 

@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.graph.layout.boxes import LOOP_BOW, LOOP_LABEL_GAP, Axes, Box, EdgeChain, SelfLoop
 from composer.graph.layout.coordinates import Extent, extent_of
 from composer.graph.layout.result import Path, Point

@@ -11,14 +11,14 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.checker.cache import entry_of, keep_entry, read_entry
 from composer.python_code.checker.file_sets import FileSet, file_sets
 from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.problems import CheckerFailed, Family, Problem
-from composer.source import Span
 
 if TYPE_CHECKING:
     from composer.python_code.checker.check import Check

@@ -12,10 +12,10 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from composer.base.regular_files import read_regular
+from composer.base.source import Span
 from composer.python_code.checker.file_sets import FileSet
 from composer.python_code.problems import Family, Problem
-from composer.regular_files import read_regular
-from composer.source import Span
 
 try:
     from _blake2 import blake2b  # hashlib also loads OpenSSL, which takes 3 ms of each start

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.copies import Copy, edited_copy
@@ -16,7 +17,6 @@ from composer.python_code.checker.pyrefly import Finding, Process, start_process
 from composer.python_code.checker.relevance import Relevance, reassigned
 from composer.python_code.lookup import BrokenModule
 from composer.python_code.problems import Family, Problem
-from composer.source import Span
 
 
 @dataclass(slots=True)

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import TypeVar
 
+from composer.base.source import Span
 from composer.python_code.syntax import Module
 from composer.python_code.trees import Function, catches, dotted, positional_arguments, span_of
-from composer.source import Span
 
 _Statement = TypeVar("_Statement", bound=ast.stmt)
 #: What code raises that uses a value of a wrong type.

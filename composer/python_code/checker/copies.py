@@ -12,7 +12,7 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import field
 from typing import TypeGuard
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.checker.file_sets import ClassEdit
 from composer.python_code.nodes import Signature

@@ -12,7 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node, PortKind
@@ -28,7 +29,6 @@ from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
 from composer.python_code.syntax import Module
 from composer.python_code.trees import walk
-from composer.source import SourceFile
 from composer.typed import SUFFIX
 
 _FILES = "files"

@@ -12,8 +12,9 @@ import sys
 from collections.abc import Iterable
 from dataclasses import field
 
-from composer.diagnostics import nearest, suggestion
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import nearest, suggestion
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding
@@ -29,7 +30,6 @@ from composer.python_code.trees import (
     positional_arguments,
     span_of,
 )
-from composer.source import Span
 
 #: What the checker says about code that Python refuses to compile.
 SYNTAX_KINDS = frozenset({"invalid-syntax", "parse-error"})

@@ -7,8 +7,8 @@ from dataclasses import field
 from functools import cached_property
 
 from composer import behavior
-from composer.diagnostics import suggestion
-from composer.fast_dataclass import dataclass
+from composer.base.diagnostics import suggestion
+from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Interfaces, Message
 from composer.interfaces.definitions import parts
 from composer.interfaces.sources import FOLDERS

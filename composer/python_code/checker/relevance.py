@@ -11,11 +11,11 @@ import ast
 import re
 from collections.abc import Container, Iterable
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.python_code.checker.code_index import CodeIndex, arguments_of
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.trees import dotted, is_none
-from composer.source import Span
 
 #: Kinds that are certain in any class, whatever the annotations say.
 _CERTAIN_KINDS = frozenset(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.diagnostics import suggestion
-from composer.field_types import STATUS, Word
+from composer.base.diagnostics import suggestion
+from composer.interfaces.field_types import STATUS, Word
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.nodes import array_length, published_port, reached_methods
 from composer.python_code.problems import Family, Problem

@@ -9,7 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from composer.diagnostics import suggestion
+from composer.base.diagnostics import suggestion
+from composer.base.source import shown_path
+from composer.base.spelling import edit_distance
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.project import Project
@@ -27,8 +29,6 @@ from composer.python_code.problems import Family, Problem
 from composer.python_code.stubs.folder import LIBRARIES
 from composer.python_code.syntax import Module, defined_names, read_module
 from composer.python_code.trees import dotted, start_span, walk
-from composer.source import shown_path
-from composer.spelling import edit_distance
 
 _API = "composer.behavior"
 _API_NAMES = API_CLASSES | {"Any", "Changes"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 
-from composer.diagnostics import nearest
+from composer.base.diagnostics import nearest
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.lookup import imported_from, is_of_rclpy
 from composer.python_code.nodes import (

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from keyword import iskeyword
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.model import Node, Parameter, Port, PortKind
 from composer.python_code.nodes import GENERAL_HANDLERS, Signature, handlers

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from composer import behavior
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import Node
 from composer.python_code.stubs.behaviors import behavior_module

@@ -16,6 +16,7 @@ from math import inf
 from time import monotonic
 from typing import Any, Final, TypeVar
 
+from composer.base.source import Located
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
@@ -23,7 +24,6 @@ from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import BATCH_SIZE, CallbackStatistics
-from composer.source import Located
 
 T = TypeVar("T")
 

@@ -14,7 +14,7 @@ from itertools import pairwise
 from time import monotonic
 from typing import Any
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import Node, Port, System
 from composer.runtime.metrics.statistics import ChainStatistics
 

@@ -13,8 +13,8 @@ from rclpy.callback_groups import (
 )
 from rclpy.node import Node
 
+from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallCancelled
-from composer.fast_dataclass import dataclass
 from composer.model import Port
 from composer.runtime.callbacks.chains import NodeChains
 from composer.runtime.callbacks.log import ErrorLog, Log

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol, TypeAlias
 
 from composer.behavior import Publisher
-from composer.expressions import EvaluationError, Expression
+from composer.language.expressions import EvaluationError, Expression
+from composer.language.templates import Template, evaluate, expressions_in
 from composer.model import Reaction
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.ros.messages import Build, compile_message
-from composer.templates import Template, evaluate, expressions_in
 
 
 class ReactionClient(Protocol):

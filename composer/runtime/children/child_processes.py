@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.children import launcher
 from composer.runtime.children.output import OutputLines
 from composer.runtime.executors.futures import Future

@@ -11,14 +11,8 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from composer.diagnostics import suggestion
-from composer.executables import (
-    executable_names,
-    find_executable,
-    find_program,
-    has_package,
-    program_path,
-)
+from composer.base.diagnostics import suggestion
+from composer.language.tree import Plain
 from composer.model import (
     ChannelKind,
     Executable,
@@ -27,10 +21,16 @@ from composer.model import (
     ParameterSection,
     ParameterType,
 )
-from composer.names import expand_name
+from composer.model.names import expand_name
+from composer.project.executables import (
+    executable_names,
+    find_executable,
+    find_program,
+    has_package,
+    program_path,
+)
 from composer.runtime.children.child_processes import Command
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
-from composer.tree import Plain
 
 #: The topics and services of an action. rcl remaps each of them by its own name.
 _ACTION_PARTS = ("send_goal", "cancel_goal", "get_result", "feedback", "status")

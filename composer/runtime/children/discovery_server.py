@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from composer.model import Discovery, LogLevel
-from composer.names import PROGRAM_LOGGER
+from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import (
     Child,
     ChildProcesses,

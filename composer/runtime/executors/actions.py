@@ -24,7 +24,7 @@ from rclpy.action.server import (
 from rclpy.task import Future as RclpyFuture
 from unique_identifier_msgs.msg import UUID
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.executors import readiness
 from composer.runtime.executors.exceptions import is_closing
 from composer.runtime.executors.futures import Cancelled

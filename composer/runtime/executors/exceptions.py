@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from composer.names import PROGRAM_LOGGER
+from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.executors.stacks import calls_user_code, is_internal
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rclpy.callback_groups import CallbackGroup
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.strand import as_a_whole
 from composer.runtime.hosting.user_code import UserFunction

@@ -7,13 +7,13 @@ from dataclasses import field, replace
 from itertools import count
 from typing import Any
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located
 from composer.model import Isolation, Node, Port, PortKind, Qos
-from composer.qos import PRESETS, QosProfile
+from composer.model.qos import PRESETS, QosProfile
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.errors import HostingError
 from composer.runtime.ros.qos_profiles import own_profile
-from composer.source import Located
 
 #: Created by rclpy for every node, or by the composer.
 _OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})

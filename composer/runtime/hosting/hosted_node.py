@@ -17,8 +17,8 @@ from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter as RosParameter
 
 from composer.behavior import TransitionFailed
-from composer.interfaces.building import how_to_get
 from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, LogLevel, Node
+from composer.model.interface_packages import how_to_get
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop

@@ -16,7 +16,7 @@ from rclpy.executors import Executor
 from rclpy.parameter import Parameter
 from rclpy.service import Service
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Awaited, Future

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from composer.model import ChannelKind, Node, PortKind
-from composer.names import expand_name
+from composer.model.names import expand_name
 
 #: How rcl names the channel of a remapping rule.
 _SCHEMES = {ChannelKind.TOPIC: "rostopic", ChannelKind.SERVICE: "rosservice"}

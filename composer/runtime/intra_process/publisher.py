@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 

@@ -13,7 +13,7 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from composer.model import Channel, ChannelKind, Delivery, Port, System, channels
-from composer.qos import Liveliness, QosProfile, incompatibilities
+from composer.model.qos import Liveliness, QosProfile, incompatibilities
 from composer.runtime.intra_process.ignore_local_publications import (
     ignore_local,
     unsupported_reason,

@@ -14,7 +14,7 @@ from weakref import ref
 
 from unique_identifier_msgs.msg import UUID
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import Isolation, Port
 from composer.runtime.executors import actions
 from composer.runtime.executors.futures import Future

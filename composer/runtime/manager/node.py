@@ -31,7 +31,7 @@ from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel
 from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.clock.clock import NodeTime

@@ -21,7 +21,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.members.report import REPORTS_WITHIN_S
 
 T = TypeVar("T")

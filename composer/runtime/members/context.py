@@ -9,7 +9,7 @@ from typing import Protocol
 
 from rclpy.node import Node as RosNode
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Process
 from composer.model.processes import own_enclave
 from composer.runtime.children.child_processes import ChildProcesses, Command

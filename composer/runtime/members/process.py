@@ -24,7 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import LogLevel, Process
-from composer.names import PROGRAM_LOGGER
+from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.output import attribute_line
 from composer.runtime.executors.exceptions import printable

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.ros.diagnostic_arrays import Status, finite, optional, read_array, write_array
 
 #: Processes report every second. One that has not reported for this time is lost.

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.executors.futures import Future
 
 if TYPE_CHECKING:  # this module and its tests need no ROS

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.metrics.statistics import CallbackStatistics, ChainStatistics
 from composer.runtime.ros.diagnostic_arrays import Level, Status, finite
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 _MAX_SUBJECTS = 1000
 #: The subject of everything new while the limit knows too many subjects.

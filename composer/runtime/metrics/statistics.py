@@ -11,7 +11,7 @@ from dataclasses import field
 from itertools import accumulate, pairwise
 from typing import Protocol
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 _SHORTEST_S = 1e-7
 _LONGEST_S = 100.0

@@ -14,7 +14,7 @@ import os
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from composer.ownership import TrustedUsers
+from composer.base.ownership import TrustedUsers
 from composer.runtime.process.instance_lock import FOLDER_NAME, private_path
 
 _PROFILE = Path(__file__).with_name("fast_dds.xml")

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.diagnostics import nearest
+from composer.base.diagnostics import nearest
 from composer.model.hosts import HIGHEST_DOMAIN_ID, domain_problem
 from composer.runtime.middleware.dds_profiles import use_discovery_profile
 from composer.runtime.middleware.shared_memory import remove_incomplete_ports

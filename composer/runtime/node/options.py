@@ -9,7 +9,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots

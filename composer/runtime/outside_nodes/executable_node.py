@@ -15,8 +15,8 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
+from composer.base.regular_files import write_whole
 from composer.model import Executable, ExecutableKind, LifecycleKind, LogLevel, Node
-from composer.regular_files import write_whole
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file

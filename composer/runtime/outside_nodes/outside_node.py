@@ -13,7 +13,7 @@ from typing import Any
 from lifecycle_msgs.msg import Transition
 from rclpy.node import Node as RosNode
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, Port
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.exceptions import describe

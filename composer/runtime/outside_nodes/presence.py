@@ -9,7 +9,7 @@ from rclpy.node import Node as RosNode
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.model import Node, Port, PortKind
-from composer.names import split_node_name
+from composer.model.names import split_node_name
 from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.

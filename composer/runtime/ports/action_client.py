@@ -9,8 +9,8 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient
 
+from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallError, GoalRejected
-from composer.fast_dataclass import dataclass
 from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for

@@ -8,8 +8,8 @@ from typing import Any
 from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.serialization import serialize_message
 
+from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallCancelled
-from composer.fast_dataclass import dataclass
 from composer.model import FeedbackSteps, Port
 from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext

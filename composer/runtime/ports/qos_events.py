@@ -21,9 +21,9 @@ from rclpy.event_handler import (
     UnsupportedEventTypeError,
 )
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
-from composer.qos import incompatibilities
+from composer.model.qos import incompatibilities
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import RepeatedWarning
 from composer.runtime.ros_graph.endpoints import EndpointInfo, topic_info

@@ -12,7 +12,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.subscription import Subscription
 
 from composer.model import Port
-from composer.qos import Durability
+from composer.model.qos import Durability
 from composer.runtime.callbacks.callback import mutation_checked
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction

@@ -19,7 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from composer.names import is_hidden
+from composer.model.names import is_hidden
 from composer.runtime.process.instance_lock import socket_path
 
 #: A name and its types. Nodes have none; more than one type is a mistake in some node.

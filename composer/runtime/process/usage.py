@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")

@@ -29,7 +29,7 @@ from rclpy.node import Node
 from rclpy.type_support import check_is_valid_srv_type
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 #: Names in one request; a response with so many values takes a few milliseconds.
 MAX_NAMES = 10_000

@@ -28,11 +28,11 @@ from rosidl_parser.definition import (
     UnboundedSequence,
 )
 
-from composer.diagnostics import suggestion
+from composer.base.diagnostics import suggestion
 from composer.interfaces.parser import split_name
 from composer.interfaces.sources import installed_prefixes
+from composer.language.templates import Computed, Constant, Items, Record, Template, Text, evaluate
 from composer.runtime.ros.type_support import UnsupportedTypeSupport
-from composer.templates import Computed, Constant, Items, Record, Template, Text, evaluate
 
 Scope: TypeAlias = Mapping[str, Any]
 Build: TypeAlias = Callable[[Scope], Any]

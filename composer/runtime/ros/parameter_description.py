@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

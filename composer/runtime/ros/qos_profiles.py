@@ -14,7 +14,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from composer.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
 
 _NANOSECONDS = 1e6  # per millisecond
 #: Durations above are rmw's infinite duration: no limit.

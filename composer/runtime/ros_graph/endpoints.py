@@ -8,9 +8,9 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from composer.fast_dataclass import dataclass
-from composer.names import join_node_name
-from composer.qos import QosProfile
+from composer.base.fast_dataclass import dataclass
+from composer.model.names import join_node_name
+from composer.model.qos import QosProfile
 from composer.runtime.ros.qos_profiles import discovered_profile
 
 #: rmw's node name of an endpoint whose participant has not reported its nodes yet.

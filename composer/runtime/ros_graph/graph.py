@@ -22,7 +22,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from composer.names import join_node_name
+from composer.model.names import join_node_name
 from composer.runtime.middleware.dds_participants import ended_participants
 from composer.runtime.process.query_socket import NameAndTypes
 from composer.runtime.ros_graph.endpoints import (

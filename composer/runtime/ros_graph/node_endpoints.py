@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
-from composer.drift import ObservedEndpoint
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import PortKind
-from composer.names import is_hidden, join_node_name, split_node_name
+from composer.model.names import is_hidden, join_node_name, split_node_name
+from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.query_socket import NameAndTypes, visible
 from composer.runtime.ros_graph.graph import RosGraph
 

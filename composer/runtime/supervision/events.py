@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TypeAlias
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.node.managed_node import ManagedNode

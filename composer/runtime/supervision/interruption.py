@@ -12,7 +12,7 @@ from pathlib import Path
 from time import sleep
 from types import FrameType
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.loop import Loop

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Generic, TypeAlias, TypeVar
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.plan import Fault
 from composer.runtime.process.signals import WakeupPipe
 

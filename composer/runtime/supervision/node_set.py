@@ -8,8 +8,9 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any
 
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located
 from composer.behavior import CallCancelled
-from composer.fast_dataclass import dataclass
 from composer.model import (
     DEFAULT_EXECUTOR,
     Executor,
@@ -49,7 +50,6 @@ from composer.runtime.outside_nodes.external_node import ExternalNode
 from composer.runtime.outside_nodes.outside_node import OutsideContext, OutsideNode
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
-from composer.source import Located
 
 _PRIMARY_STATES = {state.value: state for state in PrimaryState}
 #: The loop on which all nodes outside the process are driven.

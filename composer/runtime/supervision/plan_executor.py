@@ -10,7 +10,7 @@ from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import TransitionOutcome

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState, System
-from composer.names import PROGRAM_LOGGER
+from composer.model.names import PROGRAM_LOGGER
 from composer.plan import Plan, SystemGoals, optional_nodes
 from composer.runtime.supervision.events import BroughtUp, Reporter
 from composer.runtime.supervision.main_queue import Command, Item, MainQueue

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, NamedTuple
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import STARTING, Condition, optional_nodes, parse_goals, start_goals

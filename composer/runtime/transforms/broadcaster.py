@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from composer.geometry import IDENTITY
 from composer.model import (
     TF_STATIC_TOPIC,
     TF_TOPIC,
@@ -15,6 +14,7 @@ from composer.model import (
     StaticTransform,
     Transforms,
 )
+from composer.model.geometry import IDENTITY
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.ports.publisher import PublisherPort

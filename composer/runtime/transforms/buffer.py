@@ -7,14 +7,14 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
+from composer.base.diagnostics import suggestion
 from composer.behavior import (
     TransformConnectivityError,
     TransformError,
     TransformExtrapolationError,
     TransformLookupError,
 )
-from composer.diagnostics import suggestion
-from composer.geometry import IDENTITY, Transform, compose, inverse, is_unit
+from composer.model.geometry import IDENTITY, Transform, compose, inverse, is_unit
 from composer.runtime.transforms.history import (
     DynamicHistory,
     OutsideHistory,

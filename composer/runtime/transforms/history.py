@@ -5,8 +5,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from typing import NamedTuple
 
-from composer.fast_dataclass import dataclass
-from composer.geometry import Transform, interpolate
+from composer.base.fast_dataclass import dataclass
+from composer.model.geometry import Transform, interpolate
 
 #: As in tf2.
 HISTORY_NS = 10_000_000_000

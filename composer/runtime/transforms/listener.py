@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.time import Time
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
 from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.loop import Loop

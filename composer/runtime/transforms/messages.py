@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from composer.geometry import Quaternion, Transform, Vector, apply, is_unit, multiply, rotate
+from composer.model.geometry import Quaternion, Transform, Vector, apply, is_unit, multiply, rotate
 from composer.runtime.ros.messages import interface_class
 
 _NANOSECONDS = 1_000_000_000

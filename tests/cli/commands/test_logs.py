@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.run_log import Record, RotatingFile, RunFolder
+from composer.client.run_log import Record, RotatingFile, RunFolder
 from tests.cli.compose import compose
 
 

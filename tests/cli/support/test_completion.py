@@ -24,7 +24,7 @@ from composer.cli.support.completion import (
     silent,
 )
 from composer.cli.support.system_arguments import complete_system
-from composer.remote.systems import local_graph
+from composer.client.systems import local_graph
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.process.query_socket import GRAPH, GraphView, QuerySocket
 

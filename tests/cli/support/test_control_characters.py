@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from composer.characters import is_safe
+from composer.base.characters import is_safe
 from composer.cli.commands.files import diff
 from composer.cli.commands.ros import doctor
 from composer.cli.commands.ros.topic.info import _as_text
@@ -19,9 +19,9 @@ from composer.cli.commands.systems import ps
 from composer.cli.support.output.progress import Progress
 from composer.cli.support.output.results import as_json, as_yaml, print_names
 from composer.cli.support.output.terminal import columns, lines, say, write
-from composer.doctor import warning
-from composer.drift.drift import Drift, DriftKind
+from composer.client.doctor import warning
 from composer.model import LogLevel
+from composer.plan.drift.drift import Drift, DriftKind
 from composer.runtime.supervision.events import Logged, Stopping
 
 #: Sets the title of the terminal, forges a line, turns the direction of the text, and reports CSI.

@@ -15,10 +15,10 @@ import pytest
 import yaml
 from std_msgs.msg import String
 
-from composer.remote.graph_names import GraphNames
-from composer.remote.session import Deadline, Session
-from composer.remote.systems.local_graph import local_names
-from composer.remote.systems.local_queries import (
+from composer.client.graph_names import GraphNames
+from composer.client.session import Deadline, Session
+from composer.client.systems.local_graph import local_names
+from composer.client.systems.local_queries import (
     local_action,
     local_node,
     local_parameters,

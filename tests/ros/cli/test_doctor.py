@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from composer.doctor import Level
-from composer.doctor.graph import check_types_built
+from composer.client.doctor import Level
+from composer.client.doctor.graph import check_types_built
 from tests.ros.support.commands import (
     PATIENCE_S,
     expect_error,

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.export.sros2 import SELF_TEST_TOPICS
+from composer.bridges.export.sros2 import SELF_TEST_TOPICS
 from composer.runtime.intra_process import ignore_local_publications
 from tests.ros.support.commands import Running, listed, output_of, repeated_until, running
 

@@ -12,8 +12,8 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
-from composer.remote.systems.callback_reports import parse_callbacks
-from composer.remote.systems.system_reports import InvalidReportError, parse_state
+from composer.client.systems.callback_reports import parse_callbacks
+from composer.client.systems.system_reports import InvalidReportError, parse_state
 from composer.runtime.metrics.figures import CallbackFigures, to_statuses
 from composer.runtime.ros.diagnostic_arrays import write_array
 from composer.runtime.ros.manager_protocol import CALLBACKS_QOS, STATE_QOS

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from composer.run_log import find_runs, last_records
+from composer.client.run_log import find_runs, last_records
 from tests.ros.support.commands import expect_state
 from tests.ros.support.dashboard import Browser
 from tests.ros.support.in_process import wait_until

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 import rclpy
 
+from composer.base.source import Located, SourceFile, Span
 from composer.model import Executor, ExecutorKind
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.placement import place_threads
-from composer.source import Located, SourceFile, Span
 from tests.ros.support.in_process import running
 from tests.ros.support.loops import PATIENCE_S
 

@@ -21,11 +21,11 @@ from rcl_interfaces.srv import (
 from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
-from composer.drift import ObservedNode
-from composer.remote.lifecycle import LifecycleClient, TransitionError
-from composer.remote.parameters import ParameterClient, ParameterRejectedError, names_by_node
-from composer.remote.session import Deadline, Session
-from composer.remote.snapshot import GraphObserver
+from composer.client.lifecycle import LifecycleClient, TransitionError
+from composer.client.parameters import ParameterClient, ParameterRejectedError, names_by_node
+from composer.client.session import Deadline, Session
+from composer.client.snapshot import GraphObserver
+from composer.plan.drift import ObservedNode
 from tests.ros.support.commands import listed, output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 from std_msgs.msg import String
 
-from composer.remote.session import Session
-from composer.remote.systems.local_endpoints import local_endpoints
-from composer.remote.systems.local_queries import local_parameters
+from composer.client.session import Session
+from composer.client.systems.local_endpoints import local_endpoints
+from composer.client.systems.local_queries import local_parameters
 from composer.runtime.ros_graph.node_endpoints import endpoints
 from tests.ros.support.commands import Running, running
 from tests.ros.support.in_process import wait_until

@@ -12,8 +12,8 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import Image
 from std_msgs.msg import ByteMultiArray
 
-from composer.expressions import EvaluationError, compile_expression
-from composer.expressions.values import message_fields
+from composer.language.expressions import EvaluationError, compile_expression
+from composer.language.expressions.values import message_fields
 
 
 def odometry() -> Odometry:

@@ -16,14 +16,14 @@ from sensor_msgs.msg import BatteryState, Image, JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Bool, Byte, Float64, Header, Int8, String, UInt64
 
-from composer.document import parse_bytes
-from composer.remote.messages.values import InvalidValueError, build_message
+from composer.client.messages.values import InvalidValueError, build_message
+from composer.language.document import parse_bytes
+from composer.language.templates import Template, compile_template
 from composer.runtime.ros.messages import (
     MessageError,
     compile_message,
     interface_class,
 )
-from composer.templates import Template, compile_template
 
 WHERE = "'publish' to 'output'"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from importlib.metadata import PackageNotFoundError, requires
 
-from composer.interfaces.building import NOT_IN_WHEELS
 from composer.interfaces.sources import Bundle
+from composer.model.interface_packages import NOT_IN_WHEELS
 
 _REQUIREMENT = re.compile(r"(?P<name>[\w.-]+)\s*(\[(?P<extra>\w+)\])?")
 _CONDITION = re.compile(r"extra == .(?P<extra>\w+)")

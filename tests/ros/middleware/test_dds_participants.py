@@ -34,8 +34,8 @@ JOIN = f"""
 import json, time
 from composer.runtime.middleware.environment import prepare_environment
 prepare_environment()
-from composer.remote.graph_names import GraphNames
-from composer.remote.session import Deadline, Session
+from composer.client.graph_names import GraphNames
+from composer.client.session import Deadline, Session
 
 took_s, missing = [], []
 for _ in range({JOINS}):
@@ -53,7 +53,7 @@ import json, os, re
 from pathlib import Path
 from composer.runtime.middleware.environment import prepare_environment
 prepare_environment()
-from composer.remote.session import Deadline, Session, use_command_profile
+from composer.client.session import Deadline, Session, use_command_profile
 
 use_command_profile()
 with Session() as session:

@@ -7,9 +7,9 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.expressions import EvaluationError
-from composer.field_types import INTEGER, NUMBER, STRING, FieldChecker, Scope, type_of
 from composer.interfaces import Interfaces
+from composer.interfaces.field_types import INTEGER, NUMBER, STRING, FieldChecker, Scope, type_of
+from composer.language.expressions import EvaluationError
 from composer.runtime.ros.messages import MessageError, compile_message, interface_class
 from tests.examples import examples
 from tests.unit.support.field_types import template

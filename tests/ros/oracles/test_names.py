@@ -1,4 +1,4 @@
-"""composer.names against rcl's own validation, over random names."""
+"""composer.model.names against rcl's own validation, over random names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 from rclpy.validate_topic_name import validate_topic_name
 
-from composer.names import (
+from composer.model.names import (
     MAXIMUM_NAMESPACE_LENGTH,
     MAXIMUM_NODE_NAME_LENGTH,
     MAXIMUM_TOPIC_NAME_LENGTH,

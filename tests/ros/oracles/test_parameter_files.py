@@ -10,9 +10,9 @@ import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from composer.diagnostics import has_errors
-from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
-from composer.tree import plain
+from composer.base.diagnostics import has_errors
+from composer.language.tree import plain
+from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
 from tests.ros.support import rcl_parameters
 from tests.ros.support.rcl_parameters import RclError, Values
 

@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from composer.loading import load
 from composer.model import Node
-from composer.names import split_node_name
+from composer.model.names import split_node_name
 from composer.runtime.children.command_line import parameter_file
 from composer.runtime.node.parameters import ros_parameters
 

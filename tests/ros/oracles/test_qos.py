@@ -1,4 +1,4 @@
-"""composer.qos against rclpy: the rule over the whole product of policies, and the presets."""
+"""``composer.model.qos`` against rclpy: the rule over all combinations of policies, presets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rclpy.qos import (
     qos_profile_services_default,
 )
 
-from composer.qos import (
+from composer.model.qos import (
     PRESETS,
     Durability,
     History,

@@ -13,7 +13,7 @@ from textwrap import dedent
 
 import pytest
 
-from composer.resources import systems_folder
+from composer.base.resources import systems_folder
 from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 from composer.runtime.process.instance_lock import socket_path
 from tests.ros.support.commands import COMPOSE

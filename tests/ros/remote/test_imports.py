@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-CODE = "import sys, composer.remote.systems.process_list; sys.exit('numpy' in sys.modules)"
+CODE = "import sys, composer.client.systems.process_list; sys.exit('numpy' in sys.modules)"
 
 
 def test_listing_processes_does_not_import_numpy() -> None:

@@ -10,8 +10,8 @@ import pytest
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.srv import GetParameters
 
-from composer.remote.requests import wait_until_known
-from composer.remote.session import Deadline, Session
+from composer.client.requests import wait_until_known
+from composer.client.session import Deadline, Session
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import wait_until
 

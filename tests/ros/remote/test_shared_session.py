@@ -10,9 +10,9 @@ from composer_interfaces.action import Navigate
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.remote.calls import _ActionClient
-from composer.remote.session import Session
-from composer.remote.shared_session import InvalidHandle, SharedSession
+from composer.client.calls import _ActionClient
+from composer.client.session import Session
+from composer.client.shared_session import InvalidHandle, SharedSession
 from tests.ros.support.in_process import Peer, wait_until
 
 QOS = QoSProfile(depth=10)

@@ -23,14 +23,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
-from composer.diagnostics import has_errors
-from composer.document import parse_bytes
-from composer.expand import expand
+from composer.base.diagnostics import has_errors
+from composer.language.document import parse_bytes
+from composer.language.expand import expand
 from composer.model import PrimaryState, System
-from composer.node_types import NodeTypes
+from composer.model.resolve import resolve
 from composer.plan import bring_up, tear_down
 from composer.project import Project
-from composer.resolve import resolve
+from composer.project.node_types import NodeTypes
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.middleware.shared_memory import remove_incomplete_ports

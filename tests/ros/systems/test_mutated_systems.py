@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from composer.document import read_document
+from composer.base.resources import systems_folder
+from composer.language.document import read_document
+from composer.language.tree import plain
 from composer.loading import load_bytes
 from composer.model import System
-from composer.resources import systems_folder
 from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import BroughtUp
-from composer.tree import plain
 from tests.ros.support.in_process import RunningSystem, wait_until
 
 BATCHES, BATCH = 10, 20

@@ -20,8 +20,8 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSPresetProfiles
 
-from composer.drift import ObservedEndpoint
-from composer.remote.systems.local_queries import local_report
+from composer.client.systems.local_queries import local_report
+from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.ros_graph.graph import RosGraph, participant
 from composer.runtime.ros_graph.node_endpoints import endpoints, node_names

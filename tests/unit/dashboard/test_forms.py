@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from composer.base.resources import interfaces_folder
 from composer.dashboard.forms import Forms
 from composer.dashboard.protocol.errors import RequestError
 from composer.interfaces import Interfaces
-from composer.resources import interfaces_folder
 
 
 @pytest.fixture(scope="module")

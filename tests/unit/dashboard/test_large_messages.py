@@ -9,7 +9,7 @@ from composer.dashboard.observing.large_messages import (
     ByteLimit,
     large_profile,
 )
-from composer.qos import Durability, QosProfile, Reliability
+from composer.model.qos import Durability, QosProfile, Reliability
 
 
 @pytest.mark.parametrize("size", [100, 1_000_000, 50_000_000])

@@ -9,13 +9,13 @@ import sys
 
 import pytest
 
-from composer.dashboard.observing.processes import ProcessMonitor, total
-from composer.dashboard.protocol.messages import to_json
-from composer.remote.systems.system_reports import (
+from composer.client.systems.system_reports import (
     SystemReport,
     of_whole_systems,
     system_report,
 )
+from composer.dashboard.observing.processes import ProcessMonitor, total
+from composer.dashboard.protocol.messages import to_json
 
 BUSY = "print(flush=True)\nwhile True: pass"
 

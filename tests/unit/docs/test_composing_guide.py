@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from composer.loading import load
-from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
+from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
 
 GUIDE = Path(__file__).parents[3] / "docs" / "guides" / "composing.md"
 BLOCKS = re.findall(r"```yaml\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from composer.document import parse_document
-from composer.schema import SCHEMAS, check_schema, kind_of, schema
-from composer.source import SourceFile
+from composer.base.source import SourceFile
+from composer.language.document import parse_document
+from composer.language.schema import SCHEMAS, check_schema, kind_of, schema
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")

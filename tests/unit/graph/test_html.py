@@ -10,12 +10,12 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 
-from composer.graph import View, build_graph, scene_of
+from composer.base.resources import systems_folder
 from composer.graph.diagram import Graph
 from composer.graph.formats import html
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
-from composer.resources import systems_folder
 from tests.unit.graph.test_renderers import EVIL, evil_graph
 
 
@@ -101,10 +101,10 @@ def test_the_chosen_view_is_the_one_that_is_shown() -> None:
 
 ALL_FORMATS = """
 import hashlib, sys
-from composer.graph import View, build_graph, scene_of
+from composer.graph.views import View, build_graph, scene_of
 from composer.graph.output import Format, render
 from composer.loading import load
-from composer.resources import systems_folder
+from composer.base.resources import systems_folder
 loading = load(systems_folder() / "navigation.yaml")
 scene = scene_of([loading.system], loading.diagnostics)
 graphs = [build_graph(scene, view) for view in View]

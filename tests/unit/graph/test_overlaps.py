@@ -10,10 +10,10 @@ from itertools import combinations
 
 import pytest
 
-from composer.graph import View
 from composer.graph.diagram import Graph
 from composer.graph.layout import Layout, Point, Rectangle, Size, arrange
 from composer.graph.layout.measure import label_size, measure
+from composer.graph.views import View
 from tests.unit.support.fleets import fleet_graph
 
 

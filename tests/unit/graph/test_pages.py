@@ -7,9 +7,9 @@ from itertools import combinations, pairwise
 
 import pytest
 
-from composer.graph import View
 from composer.graph.diagram import Direction
 from composer.graph.layout import Layout, Size, arrange, arrange_for_pages
+from composer.graph.views import View
 from tests.unit.graph.test_layout import graph_of, holds, overlap
 from tests.unit.support.fleets import fleet_graph
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from composer.graph import View, output
+from composer.graph import output
 from composer.graph.diagram import Graph
 from composer.graph.layout import arrange
 from composer.graph.output import Format, PngMissing, render
+from composer.graph.views import View
 from tests.unit.support.fleets import fleet_graph
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.characters import is_safe
-from composer.graph import View, build_graph, scene_of
+from composer.base.characters import is_safe
+from composer.base.resources import systems_folder
 from composer.graph.diagram import (
     Cluster,
     Direction,
@@ -28,8 +28,8 @@ from composer.graph.formats import dot, mermaid, svg, theme
 from composer.graph.formats import json as graph_json
 from composer.graph.layout import arrange
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
-from composer.resources import systems_folder
 
 EVIL = 'end "quoted" <b>&amp; #35; `code` \\n |pipe| [x] {y} --> z;'
 SVG = "{http://www.w3.org/2000/svg}"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from composer.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
-from composer.graph import View, build_graph, live_scene_of, scene_of
 from composer.graph.diagram import Graph, Problem
+from composer.graph.views import View, build_graph, live_scene_of, scene_of
 from composer.loading import load
 from composer.model import PortKind
-from composer.qos import QosProfile, Reliability
+from composer.model.qos import QosProfile, Reliability
+from composer.plan.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
 from tests.unit.support.resolving import system_of
 
 STRING = "std_msgs/msg/String"

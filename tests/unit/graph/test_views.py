@@ -5,9 +5,9 @@ from textwrap import dedent
 
 import pytest
 
-from composer.graph import View, build_graph, scene_of
 from composer.graph.diagram import Graph, Mark, Problem, worst
 from composer.graph.output import Format, render
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load_bytes
 from tests.unit.support.resolving import system_of
 

@@ -6,7 +6,7 @@ import re
 import tomllib
 from xml.etree import ElementTree
 
-from composer.resources import interfaces_folder
+from composer.base.resources import interfaces_folder
 
 FOLDER = interfaces_folder()
 

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from composer.expressions import compile_expression
+from composer.base.source import SourceFile, Span
+from composer.language.expressions import compile_expression
 from composer.model import Period, PeriodError, PeriodUnit
-from composer.source import SourceFile, Span
 
 SPAN = Span(SourceFile("system.yaml", ""), 1, 1)
 

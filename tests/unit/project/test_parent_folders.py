@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Diagnostic
+from composer.base.diagnostics import Diagnostic
 from composer.project import Project
 
 OTHER_USER, THIRD_USER = 65534, 65533

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Diagnostic
+from composer.base.diagnostics import Diagnostic
 from composer.loading import load
 from composer.project import Project
 

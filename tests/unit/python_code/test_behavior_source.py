@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from composer.base.source import Located, SourceFile, Span
 from composer.model import BehaviorReference
 from composer.python_code.lookup import BehaviorSource, find_behavior
-from composer.source import Located, SourceFile, Span
 
 
 def find(text: str, folder: Path) -> BehaviorSource:

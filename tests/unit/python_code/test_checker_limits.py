@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Severity
+from composer.base.diagnostics import Severity
 from composer.python_code.checker import pyrefly
 from tests.unit.support.checking import diagnostics_in
 

@@ -94,8 +94,8 @@ def test_a_module_like_one_of_the_standard_library(tmp_path: Path) -> None:
 
 
 def test_an_internal_module(tmp_path: Path) -> None:
-    [(family, text, _)] = found("from composer.names import join", tmp_path)
-    assert (family, text) == (Family.INTERNAL, "composer.names")
+    [(family, text, _)] = found("from composer.model.names import join", tmp_path)
+    assert (family, text) == (Family.INTERNAL, "composer.model")
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from composer.base.source import SourceFile
 from composer.python_code.modules import Unreadable
 from composer.python_code.syntax import parse
-from composer.source import SourceFile
 
 REFUSED = {
     "class A\n    pass\n": (1, 8, "expected ':'"),

@@ -7,10 +7,10 @@ from textwrap import dedent, indent
 
 import pytest
 
-from composer.analysis.rates import causes_in_node, published_by_method
 from composer.graph.facts import publishing_rates_hz
 from composer.model import Node
 from composer.python_code.lookup import find_behavior
+from composer.rules.analysis.rates import causes_in_node, published_by_method
 from tests.unit.support.resolving import system_of
 
 SENDER = """

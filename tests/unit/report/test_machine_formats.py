@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from jsonschema import Draft7Validator
 
-from composer.diagnostics import Diagnostic, Label, Severity
+from composer.base.diagnostics import Diagnostic, Label, Severity
+from composer.base.resources import schemas_folder
+from composer.base.source import SourceFile, Span
 from composer.report.machine import fingerprints, render_github, render_json, render_sarif
-from composer.resources import schemas_folder
-from composer.source import SourceFile, Span
 from tests.unit.support.reporting import diagnostic, rule
 
 TEXT = "system: demo\nnodes: {talker: {type: relai}}\n"

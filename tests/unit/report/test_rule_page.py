@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Rule
+from composer.base.diagnostics import Rule
 from composer.report.rules import all_rules, explain, find_rule, page_of
 
 ROOT = Path(__file__).parents[3]

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from composer.characters import width
-from composer.diagnostics import Label, Severity
+from composer.base.characters import width
+from composer.base.diagnostics import Label, Severity
+from composer.base.source import SourceFile, Span
 from composer.report.text import render, summary
-from composer.source import SourceFile, Span
 from tests.unit.support.reporting import diagnostic, rule, span_of
 
 PLAIN = """\

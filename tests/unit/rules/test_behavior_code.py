@@ -194,7 +194,7 @@ MISTAKES = [
     ("odometry", "from std_msgs.mgs import String", "unknown-import", "mgs"),
     ("odometry", "from .nowhere import x", "module-not-installed", "nowhere"),
     ("odometry", "import qwertzuiop", "module-not-installed", "qwertzuiop"),
-    ("odometry", "from composer.names import expand_name", "internal-import", "composer.names"),
+    ("odometry", "from composer.model.names import x", "internal-import", "composer.model"),
     ("reset", "if request:\n    return", "missing-return", "return"),
     ("reset", "return None", "missing-return", "None"),
     ("reset", "if request:\n    return True", "missing-return", "True"),

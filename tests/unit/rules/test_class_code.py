@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Severity, has_errors
+from composer.base.diagnostics import Severity, has_errors
 from tests.unit.support.checking import diagnostics_in, quoted
 from tests.unit.support.python_cases import diagnostics_of
 

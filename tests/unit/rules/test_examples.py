@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Diagnostic, Rule
+from composer.base.diagnostics import Diagnostic, Rule
 from composer.loading import load
 from composer.report.rules import all_rules, page_of
 from composer.rules import all_checks

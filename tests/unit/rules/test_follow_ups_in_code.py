@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Severity
+from composer.base.diagnostics import Severity
 from composer.loading import collect_diagnostics, load_files, project_diagnostics
 from tests.unit.support.checking import diagnostics_in, rules_broken
 

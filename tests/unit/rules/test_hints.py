@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Severity
+from composer.base.diagnostics import Severity
 from composer.loading import load
 from tests.unit.support.checking import diagnostics_in
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.diagnostics import Diagnostic
+from composer.base.diagnostics import Diagnostic
 from composer.loading import load, project_diagnostics
 
 FILES = {

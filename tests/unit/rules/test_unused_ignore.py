@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from composer.base.source import SourceFile
 from composer.loading import load
 from composer.rules.ignore_comments import ignores_in
-from composer.source import SourceFile
 from tests.unit.support.checking import diagnostics_in, quoted, rules_broken
 from tests.unit.support.growth import assert_linear
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic
+from composer.base.diagnostics import Diagnostic
 from composer.loading import load, load_bytes
 
 #: The rules that are broken, each with the name of the file and the line.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from composer.field_types import (
+from composer.base.source import SourceFile, Span
+from composer.interfaces import Field, FieldType, Interfaces, Message
+from composer.interfaces.field_types import (
     INTEGER,
     NUMBER,
     STRING,
@@ -12,11 +14,9 @@ from composer.field_types import (
     parameter_type,
     type_of,
 )
-from composer.interfaces import Field, FieldType, Interfaces, Message
 from composer.interfaces.sources import Bundle
-from composer.source import SourceFile, Span
-from composer.templates import Template, compile_template
-from composer.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree
+from composer.language.templates import Template, compile_template
+from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree
 
 INTERFACES = Interfaces([Bundle()])
 FILE = SourceFile("system.yaml")

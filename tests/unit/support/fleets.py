@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic
-from composer.graph import View, build_graph, scene_of
+from composer.base.diagnostics import Diagnostic
 from composer.graph.diagram import Graph
+from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load_bytes
 from composer.model import System
 

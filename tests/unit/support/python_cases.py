@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from composer.diagnostics import Diagnostic
+from composer.base.diagnostics import Diagnostic
 from composer.loading import load_files
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from composer.diagnostics import Diagnostic, Label, Rule, Severity
-from composer.source import SourceFile, Span
+from composer.base.diagnostics import Diagnostic, Label, Rule, Severity
+from composer.base.source import SourceFile, Span
 
 
 def rule(severity: Severity = Severity.ERROR, code: str = "RC202", name: str = "made-up") -> Rule:

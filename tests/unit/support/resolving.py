@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import dedent
 
-from composer.diagnostics import Diagnostic
-from composer.document import parse_document
-from composer.expand import expand
+from composer.base.diagnostics import Diagnostic
+from composer.base.source import SourceFile, Span
+from composer.language.document import parse_document
+from composer.language.expand import expand
 from composer.model import System
-from composer.node_types import NodeTypes
+from composer.model.resolve import OverrideOptions, read_overrides, resolve
 from composer.project import Project
-from composer.resolve import OverrideOptions, read_overrides, resolve
-from composer.source import SourceFile, Span
+from composer.project.node_types import NodeTypes
 
 NOWHERE = Path("/nowhere")
 

@@ -25,9 +25,9 @@ from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import SystemName, runnable_system
 
 if TYPE_CHECKING:
-    from composer.drift import Drift, Snapshot
+    from composer.client.snapshot import GraphObserver
     from composer.model import System
-    from composer.remote.snapshot import GraphObserver
+    from composer.plan.drift import Drift, Snapshot
 
 EPILOGS = {
     "diff": examples(
@@ -106,7 +106,7 @@ def diff(
     declared = runnable_system(system, settings=settings or (), namespace=namespace).system
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
-        from composer.remote.snapshot import GraphObserver
+        from composer.client.snapshot import GraphObserver
 
         with GraphObserver(session) as observer:
             if watch:
@@ -119,8 +119,8 @@ def diff(
 
 
 def _comparison(system: System, autostart: Autostart | None, ignored: list[str]) -> Compare:
-    from composer.drift import compare
     from composer.model import PrimaryState
+    from composer.plan.drift import compare
 
     goal = PrimaryState(autostart.value) if autostart is not None else None
     return lambda snapshot: compare(system, snapshot, autostart=goal, ignored=ignored)
@@ -130,8 +130,8 @@ def _settled(
     observer: GraphObserver, compare: Compare, timeout_s: float, grace_s: float
 ) -> tuple[Drift, ...]:
     """Return the differences: none as soon as there are none, else those that persist."""
-    from composer.drift import Debouncer
-    from composer.remote.session import Deadline
+    from composer.client.session import Deadline
+    from composer.plan.drift import Debouncer
 
     deadline = Deadline(timeout_s)
     debouncer = Debouncer(grace_s)
@@ -150,8 +150,8 @@ def _watched(
     json: bool,
 ) -> tuple[Drift, ...]:
     """Print changes until Ctrl-C or the end of the time; return the remaining differences."""
-    from composer.drift import Debouncer
-    from composer.remote.session import Deadline
+    from composer.client.session import Deadline
+    from composer.plan.drift import Debouncer
 
     timeout_s, grace_s, watch_for_s = seconds
     end = Deadline(watch_for_s if watch_for_s is not None else float("inf"))

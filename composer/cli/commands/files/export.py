@@ -17,8 +17,8 @@ from composer.cli.support.system_arguments import RunnableSystem, SystemName, ru
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from composer.export.container_image import Contents
-    from composer.export.deployment import Service
+    from composer.bridges.export.container_image import Contents
+    from composer.bridges.export.deployment import Service
     from composer.loading import LoadResult
     from composer.model import Host, System
 
@@ -105,7 +105,7 @@ def export_launch(system: SystemName, *, output: NewFile = None, force: Force = 
     It has launch arguments for the namespace, simulated time and the log level, and ends with the
     system. To run a system from a launch file of your own, use its action ComposeSystem.
     """
-    from composer.export.launch_file import launch_file
+    from composer.bridges.export.launch_file import launch_file
 
     declared, path, _ = _exported_system(system)
     _write(launch_file(declared, path, output), output, replace=force)
@@ -137,8 +137,8 @@ def export_systemd(
     import os
     import sys
 
-    from composer.export.systemd import Installation, units
-    from composer.hosts.remote_command import python_words
+    from composer.bridges.export.systemd import Installation, units
+    from composer.client.hosts.remote_command import python_words
 
     declared, path, result = _exported_system(system)
     python = (sys.executable, "-P", "-m", "composer")
@@ -183,7 +183,7 @@ def export_docker_compose(
     """
     import os
 
-    from composer.export.docker_compose import compose_file
+    from composer.bridges.export.docker_compose import compose_file
 
     declared, path, result = _exported_system(system)
     if list_files:
@@ -221,7 +221,7 @@ def export_kubernetes(
     """
     import os
 
-    from composer.export.kubernetes import manifests
+    from composer.bridges.export.kubernetes import manifests
 
     declared, path, result = _exported_system(system)
     if list_files:
@@ -264,11 +264,11 @@ def export_sros2(
     """
     declared = _exported_system(system, namespace=namespace).system
     if not permissions:
-        from composer.export.sros2 import policy
+        from composer.bridges.export.sros2 import policy
 
         _write(policy(declared), output, replace=force)
         return
-    from composer.export.dds_permissions import permissions as dds_permissions
+    from composer.bridges.export.dds_permissions import permissions as dds_permissions
 
     texts = dds_permissions(declared, _domain_id())
     if output is None and len(texts) == 1:
@@ -323,10 +323,10 @@ def _image(
     """Return what the image of a system contains, and its name."""
     from pathlib import PurePosixPath
 
-    from composer.export.container_image import Contents
-    from composer.export.deployment import services
-    from composer.interfaces.building import NOT_IN_WHEELS, used_packages
+    from composer.bridges.export.container_image import Contents
+    from composer.bridges.export.deployment import services
     from composer.interfaces.sources import Bundle, find_packages
+    from composer.model.interface_packages import NOT_IN_WHEELS, used_packages
     from composer.project.copied_files import docker_patterns
 
     root = result.project.root
@@ -382,13 +382,13 @@ def _write_image_and(
     from pathlib import PurePosixPath
 
     from composer import DISTRIBUTION
-    from composer.export.container_image import (
+    from composer.bridges.export.container_image import (
         CONTAINERFILE,
         IGNORED_FILES,
         containerfile,
         ignored_files,
     )
-    from composer.export.wheel import wheel
+    from composer.bridges.export.wheel import wheel
 
     if folder is None:
         write_raw("".join(map(str, files.values())))

@@ -14,10 +14,10 @@ from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
 from composer.cli.support.output.terminal import say, write_bytes
 from composer.cli.support.system_arguments import complete_system, load_system, system_file
-from composer.diagram_options import FORMATS_BY_SUFFIX, Format, View
+from composer.graph.diagram_options import FORMATS_BY_SUFFIX, Format, View
 
 if TYPE_CHECKING:
-    from composer.diagnostics import Diagnostic
+    from composer.base.diagnostics import Diagnostic
     from composer.graph.scene import Scene
     from composer.model import System
 
@@ -132,7 +132,7 @@ def _declared(names: list[str]) -> Scene:
             raise CommandError(f"'{name}' cannot be drawn because of its errors")
         systems.append(result.system)
         diagnostics.extend(result.diagnostics)
-    from composer.graph import scene_of
+    from composer.graph.views import scene_of
 
     return scene_of(systems, diagnostics)
 
@@ -144,9 +144,9 @@ def _live(timeout_s: float, measure_s: float, *, has_processes: bool) -> Scene:
         session,
         deadline,
     ):
-        from composer.graph import live_scene_of
-        from composer.remote.snapshot import GraphObserver
-        from composer.remote.systems.process_list import list_processes, observed_processes
+        from composer.client.snapshot import GraphObserver
+        from composer.client.systems.process_list import list_processes, observed_processes
+        from composer.graph.views import live_scene_of
 
         with GraphObserver(session) as observer:
             snapshot = observer.snapshot(deadline)
@@ -157,15 +157,15 @@ def _live(timeout_s: float, measure_s: float, *, has_processes: bool) -> Scene:
 
 
 def _drawn(scene: Scene, form: Format, view: View, *, live: bool) -> bytes:
-    from composer import graph as graphs
     from composer.graph import output
     from composer.graph.formats import mermaid
+    from composer.graph.views import build_graph
 
     views = [view]
     if form is Format.HTML:
         unused = _DECLARED_ONLY if live else () if scene.transforms else (View.FRAMES,)
         views = [each for each in View if each not in unused]
-    pictures = [graphs.build_graph(scene, each) for each in views]
+    pictures = [build_graph(scene, each) for each in views]
     if form is Format.MERMAID and mermaid.is_too_large(pictures[0]):
         say("warning: Mermaid refuses to render a diagram of this size; use html or svg instead")
     try:

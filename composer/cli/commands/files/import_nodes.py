@@ -14,10 +14,10 @@ from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import NewFile, Timeout, examples
 from composer.cli.support.output.terminal import lines, say, write_raw
 from composer.cli.support.ros import require_launch, require_ros, ros_session
-from composer.names import node_name_problem
+from composer.model.names import node_name_problem
 
 if TYPE_CHECKING:
-    from composer.importing import FoundNode
+    from composer.bridges.importing import FoundNode
 
 app = typer.Typer(
     help="""Describe existing nodes in YAML.
@@ -88,9 +88,9 @@ def live(
     The ROS graph does not show the depth of queues. It is that of the most similar QoS preset.
     """
     with ros_session("compose import live", timeout) as (session, deadline):
-        from composer.importing.live import describe_graph
-        from composer.remote.parameter_descriptions import parameter_settings
-        from composer.remote.snapshot import GraphObserver
+        from composer.bridges.importing.live import describe_graph
+        from composer.client.parameter_descriptions import parameter_settings
+        from composer.client.snapshot import GraphObserver
 
         with GraphObserver(session) as observer:
             snapshot = observer.snapshot(deadline)
@@ -102,7 +102,7 @@ def live(
         raise CommandError(
             f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
         )
-    from composer.importing import readable, write_system
+    from composer.bridges.importing import readable, write_system
 
     found = readable(found)
     _write(write_system(found), output)
@@ -143,8 +143,8 @@ def import_class(
     The module is searched for in this folder, among the node types of the project, and on
     Python's module search path.
     """
-    from composer.importing import write_node_type
-    from composer.importing.python_class import ClassNotFound, describe_class
+    from composer.bridges.importing import write_node_type
+    from composer.bridges.importing.python_class import ClassNotFound, describe_class
 
     if output is not None:
         _node_name(output.stem)
@@ -170,9 +170,9 @@ def import_class(
 
 def _is_found(reference: str, output: Path) -> bool:
     """Return whether a node type in the file ``output`` finds the module of a class."""
+    from composer.base.source import Located, SourceFile, Span
     from composer.model import BehaviorReference
     from composer.python_code.lookup import find_behavior
-    from composer.source import Located, SourceFile, Span
 
     span = Span(SourceFile("", reference), 1, 1)
     located = Located(reference, span)
@@ -182,10 +182,10 @@ def _is_found(reference: str, output: Path) -> bool:
 def _constructed(reference: str, timeout_s: float) -> FoundNode:
     """Construct a class in a process of its own. Raises CommandError."""
     require_ros("compose import class --construct")
+    from composer.bridges.importing.constructed import describe_constructed
     from composer.cli.support.user_processes import run_user_process
-    from composer.importing.constructed import describe_constructed
 
-    module = "composer.remote.constructed_class"
+    module = "composer.client.constructed_class"
     what = f"constructing '{reference}'"
     text = run_user_process(what, module, [reference, str(Path.cwd())], timeout_s)
     return describe_constructed(reference, json.loads(text))
@@ -230,9 +230,9 @@ def import_launch(
     if not file.is_file():
         raise UsageError(f"there is no file '{file}'")
     require_launch("compose import launch")
+    from composer.bridges.importing import write_parameters, write_system
+    from composer.bridges.importing.launch_file import describe_launch_file
     from composer.cli.support.user_processes import run_user_process
-    from composer.importing import write_parameters, write_system
-    from composer.importing.launch_file import describe_launch_file
 
     arguments_of_process = [str(file.absolute()), *given]
     what = f"evaluating '{file}'"
@@ -258,8 +258,8 @@ def import_launch(
 
 def _known_types() -> set[str]:
     from composer.interfaces import Interfaces
-    from composer.node_types import interface_folders
     from composer.project import Project
+    from composer.project.node_types import interface_folders
 
     types = Interfaces.load(interface_folders(Project.at(Path.cwd())))
     return {name for kind in ("msg", "srv", "action") for name in types.names(kind)}

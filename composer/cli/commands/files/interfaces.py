@@ -113,7 +113,7 @@ def _found(
     folders: tuple[Path, ...], packages: list[str], *, install: bool
 ) -> dict[str, Path | None]:
     """Return the folders of packages by their names; None for those of ROS. Raises CommandError."""
-    from composer.diagnostics import suggestion
+    from composer.base.diagnostics import suggestion
     from composer.interfaces.sources import Bundle, find_packages, installed_prefixes
 
     known: dict[str, Path | None] = dict(find_packages(folders).folders)

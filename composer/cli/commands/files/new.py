@@ -48,7 +48,7 @@ def project(name: Name) -> None:
 
     It has a system, a node type with a behavior, tests, and what colcon needs to build it.
     """
-    from composer.scaffolding import new_project
+    from composer.bridges.scaffolding import new_project
 
     folder = Path(_checked(name))
     if folder.exists():
@@ -60,7 +60,7 @@ def project(name: Name) -> None:
 @app.command("system", epilog=examples("compose new system arm"))
 def system(name: Name) -> None:
     """Create a system and its test."""
-    from composer.scaffolding import new_system
+    from composer.bridges.scaffolding import new_system
 
     _create(_root(), new_system(_checked(name)))
 
@@ -68,11 +68,11 @@ def system(name: Name) -> None:
 @app.command("node", epilog=examples("compose new node planner"))
 def node(name: Name) -> None:
     """Create a node type with a behavior, and its test."""
-    from composer.scaffolding import new_node
+    from composer.bridges.scaffolding import new_node
 
     root = _root()
     _create(root, new_node(_checked(name)))
-    from composer.node_types import replaced_built_in_type
+    from composer.project.node_types import replaced_built_in_type
 
     if replaced_built_in_type(root / "nodes" / f"{name}.yaml") is not None:
         say(f"note: it replaces the built-in node type '{name}' in this project")
@@ -84,8 +84,8 @@ def interfaces(name: Name) -> None:
 
     Only its definitions and a short package.xml are needed: see 'compose interfaces build'.
     """
+    from composer.bridges.scaffolding import new_interfaces
     from composer.interfaces.sources import Bundle, package_name
-    from composer.scaffolding import new_interfaces
 
     root = _root()
     if name in Bundle().packages() or name == package_name(root / "package.xml"):

@@ -35,7 +35,7 @@ def rule(
 
     Without CODE, list all rules.
     """
-    from composer.diagnostics import suggestion
+    from composer.base.diagnostics import suggestion
     from composer.report.rules import all_rules, explain, find_rule
 
     rules = all_rules()

@@ -40,6 +40,6 @@ def schema(
     An editor with a YAML language server uses it for completion and checks. Add this as the first
     line of a file: "# yaml-language-server: $schema=../schemas/system.schema.json".
     """
-    from composer.schema import schema as find
+    from composer.language.schema import schema as find
 
     write(as_json(find(name.value), indent=2))

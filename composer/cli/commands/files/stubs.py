@@ -64,9 +64,9 @@ def stubs(
     'compose validate' and 'compose run' update 'typings' once it exists. Files that this command
     has not written are neither replaced nor removed.
     """
+    from composer.base.source import shown_path
     from composer.cli.support.typings import counted, project_stubs, write_changes
     from composer.python_code.stubs.folder import TYPINGS, folder_changes
-    from composer.source import shown_path
 
     project = _project(paths or ())
     found = project_stubs(project, paths or ())

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.base.fast_dataclass import dataclass
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import say, use_color, write_raw
@@ -21,10 +22,9 @@ from composer.cli.support.system_arguments import (
     project_systems,
 )
 from composer.cli.support.typings import update_typings
-from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
-    from composer.diagnostics import Diagnostic
+    from composer.base.diagnostics import Diagnostic
     from composer.project import Project
 
 EPILOGS = {
@@ -137,9 +137,9 @@ class _Checked:
 
 
 def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
-    from composer.document.limits import MAX_BYTES
-    from composer.files import find_files
+    from composer.language.document.limits import MAX_BYTES
     from composer.loading import collect_diagnostics, load_bytes, load_files
+    from composer.project.files import find_files
 
     for path in paths:
         if path != _STDIN and not path_exists(path):
@@ -163,7 +163,7 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
 
 def _path_hint(path: Path) -> str | None:
     """Return a hint with the path of the system of that name, or with a similar path."""
-    from composer.source import shown_path
+    from composer.base.source import shown_path
 
     named = example_systems() | project_systems()
     close = named.get(str(path)) or nearest_path(path)
@@ -172,7 +172,7 @@ def _path_hint(path: Path) -> str | None:
 
 def _listed(paths: Sequence[Path]) -> str:
     """Return the first paths, and how many more there are."""
-    from composer.characters import visible
+    from composer.base.characters import visible
 
     named = ", ".join(visible(str(path)) for path in paths[:_MAX_LISTED])
     return named if len(paths) <= _MAX_LISTED else f"{named} and {len(paths) - _MAX_LISTED} more"
@@ -218,7 +218,7 @@ def _print_text(diagnostics: list[Diagnostic], max_diagnostics: int | None) -> N
 
 
 def _is_error(diagnostic: Diagnostic, strict: bool) -> bool:
-    from composer.diagnostics import Severity
+    from composer.base.diagnostics import Severity
 
     severity = diagnostic.severity
     return severity is Severity.ERROR or (strict and severity is Severity.WARNING)

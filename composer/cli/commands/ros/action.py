@@ -97,13 +97,13 @@ def info(action: Action, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEO
 def _info(name: str, timeout: float) -> dict[str, Any]:
     """Return the nodes of an action: from a running system, or else from the ROS graph."""
     require_ros("compose action")
-    from composer.remote.systems.local_queries import local_action
+    from composer.client.systems.local_queries import local_action
 
     found = local_action(name, timeout)
     if found is not None:
         return found
     with ros_session("compose action", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames
 
         return asdict(GraphNames(session, deadline).action(name))
 
@@ -145,12 +145,12 @@ def send_goal(
     type_name, text = split_values(values or [])
     goal = yaml_or_stdin(text, stdin)
     with ros_session("compose action", timeout) as (session, deadline):
-        from composer.remote.calls import GoalRequest
-        from composer.remote.calls import send_goal as send
-        from composer.remote.graph_names import GraphNames
-        from composer.remote.messages.values import to_plain
-        from composer.remote.name_matching import full_name
-        from composer.remote.session import Deadline
+        from composer.client.calls import GoalRequest
+        from composer.client.calls import send_goal as send
+        from composer.client.graph_names import GraphNames
+        from composer.client.messages.values import to_plain
+        from composer.client.name_matching import full_name
+        from composer.client.session import Deadline
 
         name = full_name("action", action)
         found = type_name or GraphNames(session, deadline).only_type("action", name)

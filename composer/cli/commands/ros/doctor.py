@@ -27,7 +27,7 @@ from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import ShowWarnings, complete_system, runnable_system
 
 if TYPE_CHECKING:
-    from composer.doctor import CheckResult, Level
+    from composer.client.doctor import CheckResult, Level
     from composer.loading import LoadResult
     from composer.model import System
 
@@ -74,7 +74,7 @@ def doctor(
 
     Exit code 1 if there are errors, or warnings with --strict.
     """
-    from composer.doctor import Level
+    from composer.client.doctor import Level
 
     if hosts:
         if system is None:
@@ -102,8 +102,8 @@ def doctor(
 def _check_hosts(loaded: tuple[LoadResult, System, Path], timeout: float) -> Iterator[CheckResult]:
     """Check the other computers of a system, while its discovery server runs."""
     result, system, relative = loaded
-    from composer.doctor.hosts import check_hosts
-    from composer.hosts.start import remote_processes
+    from composer.client.doctor.hosts import check_hosts
+    from composer.client.hosts.start import remote_processes
 
     used = {item.host.name.value: item.host for item in remote_processes(system)}
     others = list(used.values())
@@ -113,14 +113,14 @@ def _check_hosts(loaded: tuple[LoadResult, System, Path], timeout: float) -> Ite
 
 
 def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
-    from composer.doctor import Level, note
-    from composer.doctor.installation import (
+    from composer.client.doctor import Level, note
+    from composer.client.doctor.installation import (
         check_environment,
         check_security,
         check_versions,
         discovery_range,
     )
-    from composer.doctor.network import check_declared_discovery, check_network
+    from composer.client.doctor.network import check_declared_discovery, check_network
     from composer.runtime.middleware.environment import complete_environment, use_discovery
     from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 
@@ -152,7 +152,7 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
 
 def _started_server(system: System | None) -> AbstractContextManager[None]:
     """Return a block with the discovery server that 'compose run' would start."""
-    from composer.doctor.network import starts_server
+    from composer.client.doctor.network import starts_server
     from composer.runtime.children.discovery_server import discovery_servers
 
     discovery = None if system is None else system.discovery
@@ -163,11 +163,11 @@ def _started_server(system: System | None) -> AbstractContextManager[None]:
 
 def _check_interfaces(system: System | None) -> Iterator[CheckResult]:
     """Check the interface packages of the project, and those that the system uses."""
-    from composer.doctor.installation import check_interfaces
+    from composer.client.doctor.installation import check_interfaces
     from composer.interfaces import Interfaces
     from composer.interfaces.sources import find_packages
-    from composer.node_types import interface_folders
     from composer.project import Project
+    from composer.project.node_types import interface_folders
 
     project = Project.at(Path.cwd())
     folders = interface_folders(project)  # with those of the examples
@@ -180,11 +180,11 @@ def _check_interfaces(system: System | None) -> Iterator[CheckResult]:
 
 
 def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
-    from composer.doctor import error
+    from composer.client.doctor import error
 
     try:
         with ros_session("compose doctor", timeout, carries_messages=True) as (session, deadline):
-            from composer.doctor.graph import (
+            from composer.client.doctor.graph import (
                 check_delivery,
                 check_discovery,
                 check_graph,

@@ -82,7 +82,7 @@ def list_package(
     json: Json = False,
 ) -> None:
     """List the types of a package."""
-    from composer.diagnostics import suggestion
+    from composer.base.diagnostics import suggestion
     from composer.interfaces.listing import packages
 
     interfaces = _interfaces()
@@ -173,8 +173,8 @@ def proto(
 
 def _interfaces() -> Interfaces:
     from composer.interfaces import Interfaces
-    from composer.node_types import interface_folders
     from composer.project import Project
+    from composer.project.node_types import interface_folders
 
     return Interfaces.load(interface_folders(Project.at(Path.cwd())))
 

@@ -17,8 +17,8 @@ from composer.cli.support.output.terminal import columns, lines, say, write
 from composer.cli.support.ros import require_ros, ros_session
 
 if TYPE_CHECKING:
-    from composer.remote.lifecycle import LifecycleClient
-    from composer.remote.systems.lifecycle_batch import LifecycleBatch
+    from composer.client.lifecycle import LifecycleClient
+    from composer.client.systems.lifecycle_batch import LifecycleBatch
 
 app = typer.Typer(
     help="""Show and change lifecycle states of running nodes.
@@ -57,7 +57,7 @@ def _complete_word(incomplete: str) -> list[str]:
 @contextmanager
 def _client(timeout_s: float) -> Iterator[LifecycleClient]:
     with ros_session("compose lifecycle", timeout_s) as (session, deadline):
-        from composer.remote.lifecycle import LifecycleClient
+        from composer.client.lifecycle import LifecycleClient
 
         yield LifecycleClient(session, deadline)
 
@@ -73,8 +73,8 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
         _write_states(known, json=json)
         return
     with ros_session("compose lifecycle", timeout) as (session, deadline):
-        from composer.remote.lifecycle import LifecycleClient
-        from composer.remote.name_matching import check_all_respond
+        from composer.client.lifecycle import LifecycleClient
+        from composer.client.name_matching import check_all_respond
 
         client = LifecycleClient(session, deadline)
         states = client.states(client.nodes())
@@ -93,7 +93,7 @@ def _write_states(states: Mapping[str, str | None], *, json: bool) -> None:
 
 def _local_states(timeout: float) -> dict[str, str] | None:
     require_ros("compose lifecycle")
-    from composer.remote.systems.local_queries import local_states
+    from composer.client.systems.local_queries import local_states
 
     return local_states(timeout)
 
@@ -107,7 +107,7 @@ def _local_states(timeout: float) -> dict[str, str] | None:
 def get(node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the lifecycle state of a node."""
     require_ros("compose lifecycle")
-    from composer.remote.systems.local_queries import local_state
+    from composer.client.systems.local_queries import local_state
 
     state = local_state(node, timeout)
     if state is None:
@@ -202,7 +202,7 @@ def set_state(
     """
     targets, transition = _split(list(words or ()), to, system)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
-        from composer.remote.systems.lifecycle_batch import (
+        from composer.client.systems.lifecycle_batch import (
             LifecycleBatch,
             LifecycleRequest,
             nodes_of_system,

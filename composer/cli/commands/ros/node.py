@@ -89,12 +89,12 @@ def info(
 def _info(name: str, timeout: float, *, hidden: bool) -> dict[str, Any]:
     """Return the endpoints of a node: from a running system, or else from the ROS graph."""
     require_ros("compose node")
-    from composer.remote.systems.local_queries import local_node
+    from composer.client.systems.local_queries import local_node
 
     found = local_node(name, timeout, hidden=hidden)
     if found is not None:
         return found
     with ros_session("compose node", timeout) as (session, deadline):
-        from composer.remote.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames
 
         return asdict(GraphNames(session, deadline).node(name, hidden=hidden))

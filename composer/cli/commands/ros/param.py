@@ -18,9 +18,9 @@ from composer.cli.support.output.terminal import columns, lines, say, say_raw, u
 from composer.cli.support.ros import require_ros, ros_session
 
 if TYPE_CHECKING:
-    from composer.remote.parameters import ParameterClient
-    from composer.remote.systems.local_queries import LocalParameters
-    from composer.resolve.parameter_files import ParameterFiles
+    from composer.client.parameters import ParameterClient
+    from composer.client.systems.local_queries import LocalParameters
+    from composer.model.resolve.parameter_files import ParameterFiles
     from composer.runtime.ros.parameter_description import ParameterDescription
 
 app = typer.Typer(
@@ -49,7 +49,7 @@ Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
 @contextmanager
 def _parameters(node: str, timeout: float) -> Iterator[ParameterClient]:
     with ros_session("compose param", timeout) as (session, deadline):
-        from composer.remote.parameters import ParameterClient
+        from composer.client.parameters import ParameterClient
 
         yield ParameterClient(session, deadline, node)
 
@@ -63,7 +63,7 @@ def _readable(
     Only the latter reports errors, so the former has all of ``names``.
     """
     require_ros("compose param")
-    from composer.remote.systems.local_queries import local_parameters
+    from composer.client.systems.local_queries import local_parameters
 
     local = local_parameters(node, timeout)
     if local is not None and local.described.keys() >= set(names):
@@ -137,7 +137,7 @@ def _ask_all(
 ) -> dict[str, list[Any] | None] | None:
     """Return the parameters of all nodes if the systems on this computer have them all."""
     require_ros("compose param")
-    from composer.remote.systems.local_queries import all_local_parameters
+    from composer.client.systems.local_queries import all_local_parameters
 
     known = all_local_parameters(timeout, hidden=hidden)
     if known is None:
@@ -149,7 +149,7 @@ def _discover_all(
     timeout: float, *, types: bool, hidden: bool, json: bool
 ) -> dict[str, list[Any] | None]:
     with ros_session("compose param", timeout) as (session, deadline):
-        from composer.remote.parameters import ParameterClient, names_by_node
+        from composer.client.parameters import ParameterClient, names_by_node
 
         found: dict[str, list[Any] | None] = dict(names_by_node(session, deadline, hidden=hidden))
         if types:
@@ -281,8 +281,8 @@ def _value(kind: str, text: str) -> Any:
         return text
     if kind not in ("bool", "integer", "double"):
         return _yaml(text)
-    from composer.document.parameter_files import resolve_parameter
-    from composer.document.scalars import NumberRefused
+    from composer.language.document.parameter_files import resolve_parameter
+    from composer.language.document.scalars import NumberRefused
 
     try:
         return resolve_parameter(text)
@@ -301,9 +301,9 @@ def _yaml(text: str) -> Any:
 
 
 def _read(file: Path) -> ParameterFiles:
-    from composer.diagnostics import has_errors
+    from composer.base.diagnostics import has_errors
+    from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
     from composer.report.text import render
-    from composer.resolve.parameter_files import ParameterFiles, read_parameter_file
 
     sections = ParameterFiles()
     diagnostics = read_parameter_file(file, sections)
@@ -315,7 +315,7 @@ def _read(file: Path) -> ParameterFiles:
 
 
 def _values_for(node: str, sections: ParameterFiles, declared: Iterable[str]) -> dict[str, Any]:
-    from composer.tree import plain
+    from composer.language.tree import plain
 
     given = sections.given(node, frozenset(declared))
     return {name: plain(entry.value) for name, entry in given.items()}

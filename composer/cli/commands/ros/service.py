@@ -120,10 +120,10 @@ def call(
     type_name, text = split_values(values or [])
     request = yaml_or_stdin(text, stdin)
     with ros_session("compose service", timeout) as (session, deadline):
-        from composer.remote.calls import ServiceRequest, call_service
-        from composer.remote.graph_names import GraphNames
-        from composer.remote.messages.values import to_plain
-        from composer.remote.name_matching import full_name
+        from composer.client.calls import ServiceRequest, call_service
+        from composer.client.graph_names import GraphNames
+        from composer.client.messages.values import to_plain
+        from composer.client.name_matching import full_name
 
         name = full_name("service", service)
         found = type_name or GraphNames(session, deadline).only_type("service", name)

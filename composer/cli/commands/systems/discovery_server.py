@@ -13,7 +13,7 @@ from composer.cli.support.errors import CONFIG, FAILED, CommandError
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import say
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
-from composer.names import PROGRAM_LOGGER
+from composer.model.names import PROGRAM_LOGGER
 
 if TYPE_CHECKING:
     from composer.model import Discovery

@@ -19,7 +19,7 @@ from composer.cli.support.output.terminal import columns, say, use_color, write,
 from composer.cli.support.system_arguments import running_system_name
 
 if TYPE_CHECKING:
-    from composer.run_log import Record, Run, Selection, SystemLog
+    from composer.client.run_log import Record, Run, Selection, SystemLog
 
 EPILOGS = {
     "logs": examples(
@@ -109,7 +109,7 @@ def logs(
         write(_listed(runs, json=json))
         return
     chosen = _chosen(runs, run)
-    from composer.run_log import SystemLog
+    from composer.client.run_log import SystemLog
 
     folder = _folder()
     if not json:
@@ -130,7 +130,7 @@ def logs(
 
 
 def _selection(nodes: list[str], since: str | None, level: LogSeverity) -> Selection:
-    from composer.run_log import Selection, parse_since
+    from composer.client.run_log import Selection, parse_since
 
     since_ns = 0 if since is None else parse_since(since, datetime.now().astimezone())
     if since_ns is None:
@@ -143,7 +143,7 @@ def _selection(nodes: list[str], since: str | None, level: LogSeverity) -> Selec
 
 def _runs(system: str | None) -> list[Run]:
     """Return the runs of a system, or all. Raises CommandError if there are none."""
-    from composer.run_log import find_runs
+    from composer.client.run_log import find_runs
 
     folder = _folder()
     name = None if system is None else running_system_name(system)
@@ -174,14 +174,14 @@ def _folder() -> Path:
 
 def _chosen(runs: list[Run], name: str | None) -> Run:
     if name is None:
-        from composer.run_log import current_domain
+        from composer.client.run_log import current_domain
 
         domain = current_domain()
         return next((run for run in reversed(runs) if run.domain == domain), runs[-1])
     for run in runs:
         if run.name == name:
             return run
-    from composer.diagnostics import nearest
+    from composer.base.diagnostics import nearest
 
     close = nearest(name, [run.name for run in runs])
     raise CommandError(

@@ -119,7 +119,7 @@ def down(system: RunningSystem, timeout: Timeout = _TIMEOUT_S) -> None:
     """
     name = running_system_name(system)
     with ros_session("compose down", timeout) as (session, deadline):
-        from composer.remote.systems.managers import Systems
+        from composer.client.systems.managers import Systems
 
         systems = Systems(session, deadline)
         found = systems.find(name)
@@ -171,7 +171,7 @@ def _command(command: str, service: str, text: str, timeout_s: float, *, failure
     """Call a service of the manager of a system and print its response. Raises CommandError."""
     name = running_system_name(text)
     with ros_session(f"compose {command}", timeout_s) as (session, deadline):
-        from composer.remote.systems.managers import Systems
+        from composer.client.systems.managers import Systems
 
         systems = Systems(session, deadline)
         found = systems.find(name)
@@ -188,9 +188,9 @@ def _up_on_hosts(loaded: tuple[LoadResult, System, Path], start: Sequence[str]) 
     """
     result, system, relative = loaded
     require_ros("compose up --hosts", system)
-    from composer.hosts.deployment import DeploymentOptions
-    from composer.hosts.start import remote_processes, run_on_hosts
-    from composer.hosts.used_files import question_about
+    from composer.client.hosts.deployment import DeploymentOptions
+    from composer.client.hosts.start import remote_processes, run_on_hosts
+    from composer.client.hosts.used_files import question_about
 
     processes = remote_processes(system)
     check_workspaces([item.host for item in processes])

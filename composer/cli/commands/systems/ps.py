@@ -17,7 +17,7 @@ from composer.cli.support.ros import require_ros, ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
 
 if TYPE_CHECKING:
-    from composer.remote.systems.system_reports import NodeReport, PartialReport, SystemReport
+    from composer.client.systems.system_reports import NodeReport, PartialReport, SystemReport
 
 EPILOGS = {
     "ps": examples(
@@ -73,7 +73,7 @@ def ps(
 def _ask(name: str | None, timeout: float, *, callbacks: bool) -> _Listed | None:
     """Return what runs if the systems on this computer know that."""
     require_ros("compose ps")
-    from composer.remote.systems.local_queries import local_report, local_reports
+    from composer.client.systems.local_queries import local_report, local_reports
 
     if name is None:
         reports = local_reports(timeout, callbacks=callbacks)
@@ -84,7 +84,7 @@ def _ask(name: str | None, timeout: float, *, callbacks: bool) -> _Listed | None
 
 def _discover(name: str | None, timeout: float, *, callbacks: bool) -> _Listed:
     with ros_session("compose ps", timeout) as (session, deadline):
-        from composer.remote.systems.process_list import list_one, list_processes
+        from composer.client.systems.process_list import list_one, list_processes
 
         if name is None:
             listed = list_processes(session, deadline, callbacks=callbacks)
@@ -106,7 +106,7 @@ def _as_json(systems: _Systems, others: Mapping[str, str | None]) -> str:
 
 def _report(report: SystemReport | PartialReport) -> dict[str, Any]:
     """Return the report with the callbacks below their nodes."""
-    from composer.remote.systems.system_reports import PartialReport
+    from composer.client.systems.system_reports import PartialReport
 
     content = asdict(report)
     if isinstance(report, PartialReport):
@@ -126,7 +126,7 @@ def _report(report: SystemReport | PartialReport) -> dict[str, Any]:
 
 
 def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
-    from composer.remote.systems.system_reports import SystemReport
+    from composer.client.systems.system_reports import SystemReport
 
     known = [report for report in systems.values() if isinstance(report, SystemReport)]
     processes = {name for report in known for name in report.processes.values()}
@@ -142,7 +142,7 @@ def _system(
     name: str, report: SystemReport | PartialReport | None, *, is_listed: bool = False
 ) -> str:
     """Return the part of a system; ``is_listed`` is whether another one has its nodes."""
-    from composer.remote.systems.system_reports import PartialReport
+    from composer.client.systems.system_reports import PartialReport
 
     if report is None:
         return lines([f"{name}: no response, its process may be busy or gone"])

@@ -47,8 +47,8 @@ def restart(
     """
     failed = False
     with ros_session("compose restart", timeout) as (session, deadline):
-        from composer.remote.systems.managed_nodes import find_managed_nodes
-        from composer.remote.systems.managers import Systems
+        from composer.client.systems.managed_nodes import find_managed_nodes
+        from composer.client.systems.managers import Systems
 
         systems = Systems(session, deadline)
         for system, found in find_managed_nodes(session, deadline, systems, nodes).items():

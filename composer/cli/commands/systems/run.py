@@ -246,7 +246,7 @@ def run(
 
 def _member(system: System, name: str) -> Process:
     """Return a process of the system by its name."""
-    from composer.diagnostics import suggestion
+    from composer.base.diagnostics import suggestion
 
     found = {process.name.value: process for process in system.processes}
     if name not in found:
@@ -309,7 +309,7 @@ def _run(
     from composer.cli.support.output.progress import Progress, severity_of, summary
     from composer.cli.support.process import end_now
     from composer.cli.support.run_logging import run_log
-    from composer.names import join
+    from composer.model.names import join
     from composer.runtime.host import Host
     from composer.runtime.process import StartRefused
     from composer.runtime.process.instance_lock import ALREADY_RUNS, AlreadyRunning

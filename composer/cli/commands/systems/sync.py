@@ -64,8 +64,8 @@ def sync(
     """
     require_hosts("compose sync", "rsync", "ssh")
     result, declared, _ = load_for_hosts(system)
-    from composer.hosts.start import sync_hosts
-    from composer.hosts.sync import SyncOptions, root_problem
+    from composer.client.hosts.start import sync_hosts
+    from composer.client.hosts.sync import SyncOptions, root_problem
     from composer.runtime.process.addresses import is_this_computer
 
     root = result.project.root
@@ -87,7 +87,7 @@ def sync(
 
 
 def _chosen(hosts: list[Host], names: list[str], system: str) -> list[Host]:
-    from composer.diagnostics import suggestion
+    from composer.base.diagnostics import suggestion
 
     by_name = {host.name.value: host for host in hosts}
     for name in names:

@@ -17,9 +17,9 @@ from composer.cli.support.system_arguments import AnyRunningSystem, running_syst
 
 if TYPE_CHECKING:
     from composer.cli.support.output.callback_tables import SortKey
-    from composer.remote.session import Session
-    from composer.remote.systems.managers import Systems
-    from composer.remote.systems.system_reports import SystemReport
+    from composer.client.session import Session
+    from composer.client.systems.managers import Systems
+    from composer.client.systems.system_reports import SystemReport
 
 EPILOGS = {
     "top": examples(
@@ -73,7 +73,7 @@ def top(
         raise UsageError(f"cannot sort by '{sort}'", hint=f"expected {_SORT_KEYS}")
     name = None if system is None else running_system_name(system)
     with ros_session("compose top", timeout) as (session, deadline):
-        from composer.remote.systems.managers import Systems
+        from composer.client.systems.managers import Systems
 
         systems = Systems(session, deadline, callbacks=True)
         found = systems.only() if name is None else systems.find(name)
@@ -102,7 +102,7 @@ class _Follower:
 
         Raises CommandError if the system stops reporting.
         """
-        from composer.remote.session import Deadline
+        from composer.client.session import Deadline
 
         due_s = self._now.callbacks_at_s + interval_s - _EARLY_S
         deadline = Deadline(interval_s + _NO_REPORT_S)

@@ -11,7 +11,7 @@ from composer.cli.support.output.terminal import columns, lines
 from composer.runtime.metrics.figures import CallbackFigures, CallbackRates, rates
 
 if TYPE_CHECKING:
-    from composer.remote.systems.system_reports import SystemReport
+    from composer.client.systems.system_reports import SystemReport
 
 _DURATION_COLUMNS = ("mean ms", "p99 ms", "max ms", "late ms", "over", "dropped")
 _SUMMARY_HEAD = ("node", "callback", "calls", *_DURATION_COLUMNS)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import TypeAlias
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 
 CONSOLE_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 _FILE_FORMAT = "[{date_time_with_ms}] [{severity}] [{name}] {message}"

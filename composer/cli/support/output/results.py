@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from composer.characters import escape_json, is_safe
+from composer.base.characters import escape_json, is_safe
 from composer.cli.support.output.terminal import columns, lines, say, write
 
 
@@ -44,7 +44,7 @@ def as_json(value: Any, *, indent: int | None = None) -> str:
 
 
 def _with_json_numbers(value: Any) -> Any:
-    from composer.document.scalars import text_of_not_finite
+    from composer.language.document.scalars import text_of_not_finite
 
     match value:
         case float() if not math.isfinite(value):

@@ -10,7 +10,7 @@ import tty
 from contextlib import suppress
 from typing import Any, Self
 
-from composer.characters import escape_lines
+from composer.base.characters import escape_lines
 from composer.cli.support.output.terminal import write, write_raw
 
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import BinaryIO, NoReturn, TextIO
 
-from composer.characters import escape_line, escape_lines, visible, width
+from composer.base.characters import escape_line, escape_lines, visible, width
 
 #: The exit code that shells report after a write to a closed pipe (128 + SIGPIPE).
 CLOSED_PIPE = 141

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from composer.graph.diagram import Details, Graph, Problem
 from composer.graph.formats.svg import text
-from composer.tree import Plain
+from composer.language.tree import Plain
 
 #: Labels for the keys of facts.
 _WORDS = {"rate_hz": "rate", "timeout_ms": "timeout", "qos": "QoS"}

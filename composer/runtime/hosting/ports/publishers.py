@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from composer.model import Port, PortKind
-from composer.qos import Durability
+from composer.model.qos import Durability
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.qos_events import HostedQosEvents, PendingQosEvents
 from composer.runtime.hosting.user_code import UserFunction

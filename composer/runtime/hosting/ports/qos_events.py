@@ -16,7 +16,7 @@ from rclpy.event_handler import (
     UnsupportedEventTypeError,
 )
 
-from composer.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.user_code import call_in_group

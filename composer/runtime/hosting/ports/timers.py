@@ -10,13 +10,13 @@ from rclpy.guard_condition import GuardCondition
 from rclpy.node import Node
 from rclpy.timer import Timer
 
+from composer.base.source import Located
 from composer.model import Period, PeriodUnit, TimerClock
 from composer.model import Timer as TimerModel
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.ports.timer import TimerPort
-from composer.source import Located
 
 _NANOSECONDS = 1e9
 

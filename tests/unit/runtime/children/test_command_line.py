@@ -8,11 +8,11 @@ from textwrap import dedent
 
 import pytest
 
-from composer.document import parse_bytes
+from composer.language.document import parse_bytes
 from composer.model import LogLevel, System
-from composer.node_types import NodeTypes
+from composer.model.resolve import resolve
 from composer.project import Project
-from composer.resolve import resolve
+from composer.project.node_types import NodeTypes
 from composer.runtime.children.command_line import (
     NotRunnable,
     make_command,

@@ -17,7 +17,7 @@ from composer.cli.support.output.callback_tables import (
     top_data,
     top_table,
 )
-from composer.remote.systems.system_reports import NodeReport, SystemReport, with_processes
+from composer.client.systems.system_reports import NodeReport, SystemReport, with_processes
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, figures, rates
 from composer.runtime.metrics.statistics import (
     BATCH_SIZE,

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from composer.base.source import Located, SourceFile, Span
 from composer.model import Discovery, DiscoveryKind
 from composer.runtime.middleware.dds_profiles import is_own_profile, use_discovery_profile
 from composer.runtime.middleware.dds_segment import profile_with_segment
@@ -26,7 +27,6 @@ from composer.runtime.middleware.environment import (
 from composer.runtime.process import StartRefused
 from composer.runtime.process.addresses import PortState, port_state
 from composer.runtime.process.instance_lock import hold_instance_lock
-from composer.source import Located, SourceFile, Span
 
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 SPAN = Span(SourceFile("robot.yaml"), 1, 1)

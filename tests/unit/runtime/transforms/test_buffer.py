@@ -14,7 +14,7 @@ from composer.behavior import (
     TransformExtrapolationError,
     TransformLookupError,
 )
-from composer.geometry import (
+from composer.model.geometry import (
     IDENTITY,
     Quaternion,
     Transform,

@@ -22,12 +22,12 @@ from composer.cli.support.output.terminal import write
 from composer.cli.support.ros import ros_session
 
 if TYPE_CHECKING:
-    from composer.remote.messages.topics import TopicSubscription
+    from composer.client.messages.topics import TopicSubscription
 
 
 def _path(path: str | None) -> str | None:
     """Check ``--field`` before ROS starts."""
-    from composer.remote.messages.field_paths import path_steps
+    from composer.client.messages.field_paths import path_steps
 
     if path is not None:
         try:
@@ -86,9 +86,9 @@ def echo(
         session,
         deadline,
     ):
-        from composer.remote.messages.topics import Topics, TopicSubscription
-        from composer.remote.messages.values import part, to_plain
-        from composer.remote.name_matching import full_name
+        from composer.client.messages.topics import Topics, TopicSubscription
+        from composer.client.messages.values import part, to_plain
+        from composer.client.name_matching import full_name
 
         topics = Topics(session, deadline)
         name = full_name("topic", topic)
@@ -110,7 +110,7 @@ def echo(
 
 
 def _messages(subscription: TopicSubscription, timeout_s: float) -> Iterator[Any]:
-    from composer.remote.session import Deadline
+    from composer.client.session import Deadline
 
     while True:
         received = subscription.take(Deadline(timeout_s))

@@ -34,13 +34,13 @@ def info(
 def _info(name: str, timeout: float) -> dict[str, Any]:
     """Return the endpoints of a topic: from a running system, or else from the ROS graph."""
     require_ros("compose topic")
-    from composer.remote.systems.local_queries import local_topic
+    from composer.client.systems.local_queries import local_topic
 
     found = local_topic(name, timeout)
     if found is not None:
         return found
     with ros_session("compose topic", timeout) as (session, deadline):
-        from composer.remote.messages.topics import Topics
+        from composer.client.messages.topics import Topics
 
         return Topics(session, deadline).info(name).plain()
 

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 import typer
 
+from composer.base.fast_dataclass import dataclass
 from composer.cli.commands.ros.topic.option_groups import option_group
 from composer.cli.support.errors import UsageError
 from composer.cli.support.output.results import as_json, as_yaml
-from composer.fast_dataclass import dataclass
 
 _MAX_LENGTH = 128
 

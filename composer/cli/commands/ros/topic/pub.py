@@ -86,14 +86,14 @@ def pub(
     --timeout limits the wait for subscriptions. At the end, a warning is printed if a reliable
     subscription has not acknowledged all messages within one second.
     """
-    from composer.qos import PRESETS
+    from composer.model.qos import PRESETS
 
     limit = 1 if once else times
     text = yaml_or_stdin(content, stdin)
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
-        from composer.remote.messages.topics import NotAcknowledgedError, Publication, publish
-        from composer.remote.messages.values import class_of, compile_content, to_plain
-        from composer.remote.name_matching import full_name
+        from composer.client.messages.topics import NotAcknowledgedError, Publication, publish
+        from composer.client.messages.values import class_of, compile_content, to_plain
+        from composer.client.name_matching import full_name
 
         publication = Publication(
             topic=full_name("topic", topic),

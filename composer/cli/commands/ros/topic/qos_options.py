@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from composer.base.fast_dataclass import dataclass
 from composer.cli.commands.ros.topic.option_groups import option_group
 from composer.cli.support.options import finite
-from composer.fast_dataclass import dataclass
-from composer.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
+from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 
 
 class Preset(StrEnum):

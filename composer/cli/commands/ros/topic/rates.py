@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.base.fast_dataclass import dataclass
 from composer.cli.commands.ros.topic.qos_options import QosOptions, qos_options
 from composer.cli.commands.ros.topic.receiving import (
     Filter,
@@ -23,11 +24,10 @@ from composer.cli.support.options import Json
 from composer.cli.support.output.results import as_json
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import ros_session
-from composer.fast_dataclass import dataclass
 
 if TYPE_CHECKING:
-    from composer.remote.messages.rates import BandwidthStatistics, DelayStatistics, RateStatistics
-    from composer.remote.messages.topics import Received
+    from composer.client.messages.rates import BandwidthStatistics, DelayStatistics, RateStatistics
+    from composer.client.messages.topics import Received
 
 _REPORT_EVERY_S = 1.0
 _UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
@@ -53,7 +53,7 @@ def hz(
     timeout: ReceiveTimeout = None,
 ) -> None:
     """Print the average rate of a topic every second."""
-    from composer.remote.messages.rates import RateWindow
+    from composer.client.messages.rates import RateWindow
 
     rates = RateWindow(window)
     message_filter = MessageFilter(condition)
@@ -87,7 +87,7 @@ def bw(
 
     Sizes are those of serialized messages.
     """
-    from composer.remote.messages.rates import BandwidthWindow
+    from composer.client.messages.rates import BandwidthWindow
 
     sizes = BandwidthWindow(window)
 
@@ -121,12 +121,12 @@ def delay(
 
     The delay is the time between header.stamp and reception, by the clock of this computer.
     """
-    from composer.remote.messages.rates import DelayWindow
+    from composer.client.messages.rates import DelayWindow
 
     delays = DelayWindow(window)
 
     def add(item: Received) -> None:
-        from composer.remote.messages.values import age_s  # imports rclpy, which is available here
+        from composer.client.messages.values import age_s  # imports rclpy, which is available here
 
         delays.add(age_s(item.content, item.at_s))
 
@@ -179,9 +179,9 @@ def _measure(topic: str, measurement: _Measurement, qos: QosOptions, limits: _Li
         session,
         deadline,
     ):
-        from composer.remote.messages.topics import Topics, TopicSubscription
-        from composer.remote.name_matching import full_name
-        from composer.remote.session import Deadline, NoResponseError
+        from composer.client.messages.topics import Topics, TopicSubscription
+        from composer.client.name_matching import full_name
+        from composer.client.session import Deadline, NoResponseError
 
         topics = Topics(session, deadline)
         name = full_name("topic", topic)

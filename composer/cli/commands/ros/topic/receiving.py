@@ -11,7 +11,7 @@ from composer.cli.support.errors import UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, finite
 
 if TYPE_CHECKING:
-    from composer.expressions import Expression
+    from composer.language.expressions import Expression
 
 Topic = Annotated[str, typer.Argument(metavar="TOPIC", autocompletion=complete_topic)]
 
@@ -64,8 +64,8 @@ class MessageFilter:
         """Say whether the expression is true. Raises RosError if it cannot be evaluated."""
         if self._condition is None:
             return True
-        from composer.expressions import EvaluationError
-        from composer.remote.session import RosError
+        from composer.client.session import RosError
+        from composer.language.expressions import EvaluationError
 
         try:
             return bool(self._condition.evaluate({"message": message}))
@@ -74,7 +74,7 @@ class MessageFilter:
 
 
 def _compiled(condition: str) -> Expression:
-    from composer.expressions import ExpressionError, compile_expression
+    from composer.language.expressions import ExpressionError, compile_expression
 
     try:
         return compile_expression(condition)

@@ -1,0 +1,1 @@
+"""To and from what teams have: imports, exports, launch files, new files from templates."""

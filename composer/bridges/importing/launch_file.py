@@ -1,0 +1,193 @@
+"""Describe the nodes of a launch file, as :mod:`composer.launch.visitor` reports them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
+from composer.language.tree import Plain
+from composer.model import LogLevel
+from composer.model.names import join_node_name, parameter_name_problem
+from composer.model.resolve.declarations.parameters import rclpy_type
+
+_PORTS = (
+    "A launch file does not show topics, services and actions, so the nodes have no ports.",
+    "To add them, start it, and copy the ports from the output of 'compose import live'.",
+)
+_MS = 1000.0
+
+
+def describe_launch_file(
+    name: str, path: str, arguments: Iterable[str], found: Mapping[str, Any]
+) -> FoundSystem:
+    """Return the system that a launch file starts with these arguments."""
+    left_out = list(found["left_out"])
+    names = _names(found["nodes"], left_out)
+    nodes = tuple(
+        _node(item, node_name, left_out)
+        for item, node_name in zip(found["nodes"], names, strict=True)
+    )
+    sections = _sections(found["nodes"], left_out)
+    command = " ".join(["compose import launch", path, *arguments])
+    return FoundSystem(
+        name,
+        nodes,
+        (f"Imported by '{command}'.", *_PORTS),
+        tuple(dict.fromkeys(left_out)),
+        sections,
+    )
+
+
+def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
+    full_name = join_node_name(item["namespace"], name)
+    comments: tuple[str, ...] = ()
+    if item["note"]:
+        comments += (f"Started {item['note']} by the launch file.",)
+    keys: dict[str, Plain] = {"executable": _executable(item)}
+    if item["name"] is None:
+        comments += ("The launch file does not name its nodes; list them under 'nodes'.",)
+        if item["sections"]:
+            comments += (f"Its parameter files name: {', '.join(sorted(item['sections']))}.",)
+    log_level = _log_level(item["ros_arguments"])
+    if log_level is not None:
+        keys["log_level"] = log_level
+    lifecycle = _lifecycle(item["process"], full_name, left_out)
+    if lifecycle:
+        keys["lifecycle"] = lifecycle
+    left_out += (f"{text} (of {full_name})" for text in item["process"]["left_out"])
+    left_out += item["problems"]
+    return FoundNode(
+        name=name,
+        namespace=item["namespace"],
+        keys=keys,
+        parameters=tuple(_declared(item["parameters"], full_name, left_out)),
+        remappings=item["remappings"],
+        comments=comments,
+    )
+
+
+def _names(items: Iterable[Mapping[str, Any]], left_out: list[str]) -> list[str]:
+    """Return a name for each node: its own, or a free one if it has none or another has it."""
+    taken = {item["name"] for item in items}
+    full_names: set[str] = set()
+    names = []
+    for item in items:
+        name = item["name"]
+        if name is None:
+            name = _free(_identifier(Path(item["executable"]).name), taken)
+        elif join_node_name(item["namespace"], name) in full_names:
+            name = _free(name, taken)
+            left_out.append(f"the name '{item['name']}' of a second node: it is '{name}' here")
+        taken.add(name)
+        full_names.add(join_node_name(item["namespace"], name))
+        names.append(name)
+    return names
+
+
+def _identifier(program: str) -> str:
+    stem = program.partition(".")[0]
+    name = "".join(each if each.isalnum() and each.isascii() else "_" for each in stem)
+    return f"_{name}" if not name or name[0].isdigit() else name
+
+
+def _free(name: str, taken: set[str]) -> str:
+    number, free = 2, name
+    while free in taken:
+        free, number = f"{name}_{number}", number + 1
+    return free
+
+
+def _executable(item: Mapping[str, Any]) -> Plain:
+    if item["package"]:
+        found: dict[str, Plain] = {"package": item["package"], "name": item["executable"]}
+    else:
+        found = {"command": [item["executable"]]}
+    if item["name"] is None:
+        found["nodes"] = []
+    arguments = list(item["arguments"])
+    if item["ros_arguments"] and _log_level(item["ros_arguments"]) is None:
+        arguments += ["--ros-args", *item["ros_arguments"], "--"]
+    if arguments:
+        found["arguments"] = arguments
+    if item["environment"]:
+        found["environment"] = dict(item["environment"])
+    if item["lifecycle"]:
+        found["lifecycle"] = "managed"
+    process = item["process"]
+    if process["cwd"] is not None:
+        found["working_directory"] = process["cwd"]
+    for name in ("sigterm_timeout", "sigkill_timeout"):
+        if name in process:
+            found[f"{name}_ms"] = _milliseconds(process[name])
+    return found
+
+
+def _log_level(ros_arguments: list[str]) -> str | None:
+    """Return the level, if the arguments set that of all loggers and nothing else."""
+    match ros_arguments:
+        case ["--log-level", level] if level.lower() in [item.value for item in LogLevel]:
+            return str(level.lower())
+        case _:
+            return None
+
+
+def _lifecycle(process: Mapping[str, Any], full_name: str, left_out: list[str]) -> dict[str, Plain]:
+    """Return what follows when the process ends: a restart, or the end of the system."""
+    if process["ends_launch"]:
+        return {"on_failure": "shutdown"}
+    if "respawn_delay" not in process:
+        return {}
+    delay_ms = _milliseconds(process["respawn_delay"])
+    restart: dict[str, Plain] = {"backoff_ms": delay_ms, "backoff_max_ms": delay_ms}
+    if process["respawn_max_retries"] > 0:
+        restart["max_attempts"] = process["respawn_max_retries"]
+    else:
+        left_out.append(
+            f"respawn without a limit (of {full_name}): a restart is limited by 'max_attempts'"
+        )
+    return {"on_failure": "restart", "restart": restart}
+
+
+def _milliseconds(seconds: float) -> Plain:
+    return round(seconds * _MS) if (seconds * _MS).is_integer() else seconds * _MS
+
+
+def _declared(
+    values: Mapping[str, Plain], full_name: str, left_out: list[str]
+) -> Iterable[FoundParameter]:
+    for name, value in values.items():
+        kind = rclpy_type(value)
+        if kind is None or (parameter_name_problem(name) and "/" not in name):
+            left_out.append(f"parameter {name} of {full_name}: its type is not known")
+        else:
+            yield FoundParameter(name, kind, value)
+
+
+def _sections(
+    items: Iterable[Mapping[str, Any]], left_out: list[str]
+) -> dict[str, dict[str, Plain]]:
+    """Return the parameters of the nodes that the launch file does not name, by full names.
+
+    Programs may create them. A system has one set of parameters for each name, so what only some
+    programs give to that name is left out.
+    """
+    named = {join_node_name(item["namespace"], item["name"]) for item in items if item["name"]}
+    given: dict[str, list[Mapping[str, Plain]]] = {}
+    for item in items:
+        for name, values in item["sections"].items():
+            if name not in named:
+                given.setdefault(name, []).append(values)
+    found: dict[str, dict[str, Plain]] = {}
+    for name, (first, *others) in given.items():
+        shared = {
+            key: value
+            for key, value in first.items()
+            if all(key in values and values[key] == value for values in others)
+        }
+        if lost := sorted({key for values in (first, *others) for key in values} - shared.keys()):
+            left_out.append(f"parameters of {name} in some programs only: {', '.join(lost)}")
+        if shared:
+            found[name] = shared
+    return found

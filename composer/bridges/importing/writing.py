@@ -1,0 +1,214 @@
+"""Write descriptions as canonical YAML, with comments on their origin."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from composer.base.source import SourceFile, Span
+from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
+from composer.language.document.writer import write_document
+from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
+from composer.model import ChannelKind, PortKind
+from composer.model.qos import PRESETS, QosProfile
+
+_SECTIONS = {
+    PortKind.PUBLISHER: "publishers",
+    PortKind.SUBSCRIPTION: "subscriptions",
+    PortKind.SERVICE: "services",
+    PortKind.CLIENT: "clients",
+    PortKind.ACTION_SERVER: "action_servers",
+    PortKind.ACTION_CLIENT: "action_clients",
+}
+#: Presets that may describe a profile, the usual ones first.
+_PRESETS = ("command", "sensor_data", "state")
+_POLICIES = (
+    "history",
+    "depth",
+    "reliability",
+    "durability",
+    "deadline_ms",
+    "lifespan_ms",
+    "liveliness",
+    "liveliness_lease_duration_ms",
+)
+#: What was left out and is listed in a file.
+_MAX_LISTED = 200
+_NOWHERE = Span(SourceFile("", ""), 1, 1, 1)
+_NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_]+")
+
+_Comments = dict[tuple[str, ...], tuple[str, ...]]
+
+
+def write_system(found: FoundSystem, parameter_file: str | None = None) -> str:
+    """Return a system file. ``parameter_file`` is the file of :func:`write_parameters`, if any."""
+    comments: _Comments = {(): found.comments}
+    if found.left_out:
+        listed = found.left_out[:_MAX_LISTED]
+        more = (f"... and {len(found.left_out) - _MAX_LISTED} more",) * (listed != found.left_out)
+        comments[()] += ("", "Left out:", *(f"- {text}" for text in listed), *more)
+    nodes: dict[str, Plain] = {}
+    for key, node in node_keys(found.nodes).items():
+        nodes[key] = _node(key, node, ("nodes", key), comments)
+    content: dict[str, Plain] = {"system": found.name}
+    if parameter_file is not None:
+        content["parameter_files"] = [parameter_file]
+    return write_document(_map({**content, "nodes": nodes}), comments)
+
+
+def write_parameters(found: FoundSystem) -> str:
+    """Return the parameters of further nodes as a ROS parameter file."""
+    sections: dict[str, Plain] = {
+        name: {"ros__parameters": dict(values)} for name, values in found.sections.items()
+    }
+    comments: _Comments = {
+        (): (*found.comments[:1], "Of nodes that the programs of the system may create.")
+    }
+    return write_document(_map(sections, has_variables=False), comments)
+
+
+def write_node_type(type_name: str, found: FoundNode) -> str:
+    """Return the file of a node type.
+
+    The names of ports stay as they are: the namespace is that of each node with the type.
+    """
+    comments: _Comments = {(): found.comments}
+    content: dict[str, Plain] = {"node": type_name, **found.keys}
+    content |= _declarations(found, (), comments)
+    return write_document(_map(content), comments)
+
+
+def node_keys(nodes: Iterable[FoundNode]) -> dict[str, FoundNode]:
+    """Return the nodes by their keys: their names, with parts of the namespace where needed."""
+    nodes = tuple(nodes)
+    names = Counter(node.name for node in nodes)
+    found: dict[str, FoundNode] = {}
+    for node in nodes:
+        key = node.name
+        if names[node.name] > 1:
+            key = _key(node.full_name)
+        found[_free(key, found)] = node
+    return found
+
+
+def qos_value(profile: QosProfile) -> Plain:
+    """Return a profile as YAML: a preset, or the policies that differ from the defaults."""
+    profile = replace(profile, depth=max(profile.depth, 1))  # 0 leaves it to the middleware: 1
+    for name in _PRESETS:
+        if PRESETS[name] == profile:
+            return name
+    default = QosProfile()
+    return {
+        policy: _policy(getattr(profile, policy))
+        for policy in _POLICIES
+        if getattr(profile, policy) != getattr(default, policy)
+    }
+
+
+def _node(key: str, node: FoundNode, path: tuple[str, ...], comments: _Comments) -> Plain:
+    content: dict[str, Plain] = {}
+    if node.name != key:
+        content["name"] = node.name
+    if node.namespace != "/":
+        content["namespace"] = node.namespace
+    content |= node.keys
+    if node.comments:
+        comments[path] = node.comments
+    content |= _declarations(node, path, comments)
+    if node.remappings:
+        content["remappings"] = dict(node.remappings)
+    return content
+
+
+def _declarations(node: FoundNode, path: tuple[str, ...], comments: _Comments) -> dict[str, Plain]:
+    content: dict[str, Plain] = {}
+    if node.parameters:
+        content["parameters"] = {item.name: _parameter(item) for item in node.parameters}
+        for item in node.parameters:
+            if item.comments:
+                comments[*path, "parameters", item.name] = item.comments
+    keys: set[str] = set()  # a key is the name of one port of the node, whatever its kind
+    for kind, section in _SECTIONS.items():
+        ports = [port for port in node.ports if port.kind is kind]
+        written: dict[str, Plain] = {}
+        for port in ports:
+            relative = _relative(port.name, node) if path else port.name
+            key = _free(_key(_last_part(relative), relative), keys)
+            keys.add(key)
+            written[key] = _port(port, relative, key)
+            if port.comments:
+                comments[*path, section, key] = port.comments
+        if written:
+            content[section] = written
+    return content
+
+
+def _port(port: FoundPort, relative: str, key: str) -> Plain:
+    content: dict[str, Plain] = {"type": port.type}
+    if relative != key:
+        content[port.kind.channel.value] = relative
+    if port.qos is not None and port.kind.channel is ChannelKind.TOPIC:
+        content["qos"] = qos_value(port.qos)
+    if port.external:
+        content["external"] = True
+    return content
+
+
+def _relative(name: str, node: FoundNode) -> str:
+    """Return the name of a port as short as a file may write it."""
+    if name.startswith(f"{node.full_name}/"):
+        return f"~{name.removeprefix(node.full_name)}"
+    namespace = node.namespace.rstrip("/") + "/"
+    rest = name.removeprefix(namespace)
+    return rest if name.startswith(namespace) and "/" not in rest else name
+
+
+def _parameter(item: FoundParameter) -> Plain:
+    content: dict[str, Plain] = {"type": item.type}
+    if item.value is not None:
+        content["default"] = item.value
+    return {**content, **item.settings}
+
+
+def _policy(value: object) -> Plain:
+    return value if isinstance(value, bool | int | float) or value is None else str(value)
+
+
+def _last_part(name: str) -> str:
+    return name.rpartition("/")[2] or "port"
+
+
+def _key(text: str, whole: str = "") -> str:
+    """Return ``text`` as the key of a port or node: a Python name."""
+    key = _NOT_IN_KEYS.sub("_", text).strip("_") or _NOT_IN_KEYS.sub("_", whole).strip("_")
+    return f"_{key}" if key[:1].isdigit() else key or "unnamed"
+
+
+def _free(key: str, taken: Iterable[str]) -> str:
+    number, free = 2, key
+    while free in taken:
+        free, number = f"{key}_{number}", number + 1
+    return free
+
+
+def _map(content: dict[str, Plain], *, has_variables: bool = True) -> Mapping:
+    tree = _tree(content, _literal if has_variables else str)
+    return tree if isinstance(tree, Mapping) else Mapping((), _NOWHERE)
+
+
+def _tree(value: Plain, text: Callable[[str], str]) -> Tree:
+    if isinstance(value, dict):
+        entries = (
+            Entry(Scalar(text(key), _NOWHERE), _tree(item, text)) for key, item in value.items()
+        )
+        return Mapping(tuple(entries), _NOWHERE)
+    if isinstance(value, list):
+        return Sequence(tuple(_tree(item, text) for item in value), _NOWHERE)
+    return Scalar(text(value) if isinstance(value, str) else value, _NOWHERE)
+
+
+def _literal(text: str) -> str:
+    """Return a text in which nothing looks like a variable."""
+    return text.replace("${", "$${")

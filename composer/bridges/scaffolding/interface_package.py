@@ -1,0 +1,216 @@
+"""Complete an interface package so that pip and colcon can build it.
+
+The source has the definitions and a ``package.xml`` with at least a name. Dependencies come from
+the types of the fields.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from composer.base.fast_dataclass import dataclass
+from composer.base.resources import interfaces_folder
+from composer.interfaces import DefinitionError, Message, parse_definition
+from composer.interfaces.definitions import parts
+from composer.interfaces.sources import Bundle
+
+FOLDERS = ("msg", "srv", "action")
+#: What the generated code of each kind of interface uses, in addition to the types of its fields.
+_IMPLIED: Mapping[str, tuple[str, ...]] = {
+    "msg": (),
+    "srv": ("service_msgs",),
+    "action": ("action_msgs", "service_msgs"),
+}
+_CMAKE_MODULE = "cmake/ros_wheels.cmake"
+#: What only the interfaces of the composer need.
+_OWN_TYPES = ("ros-geometry-msgs", "ros-nav-msgs")
+#: In a source, a type is named without its folder: geometry_msgs/Pose.
+_FULL_TYPE = re.compile(r"(?m)^([a-z]\w*)/msg/")
+_WHEEL = re.compile(r"ros-([a-z0-9-]+)==")
+
+
+class InvalidPackage(Exception):
+    """The package cannot be completed; the text says why."""
+
+
+class NotForPip(InvalidPackage):
+    """Pip cannot build the package, but colcon can."""
+
+
+@dataclass(frozen=True, slots=True)
+class InterfacePackage:
+    """An interface package: its name, and the definitions by their relative paths."""
+
+    name: str
+    definitions: Mapping[str, str]
+    dependencies: tuple[str, ...]
+
+    def files(self, versions: Mapping[str, str] | None) -> dict[str, str]:
+        """Return all files of the package. Raises NotForPip.
+
+        ``versions`` are those of the ROS wheels that pip builds against, by ROS package; None is
+        for colcon alone.
+        """
+        template = interfaces_folder()
+        wheels = (template / _CMAKE_MODULE).read_text(encoding="utf-8")
+        files = {
+            **self.definitions,
+            "CMakeLists.txt": self._cmake(),
+            "package.xml": self._manifest(),
+            _CMAKE_MODULE: wheels,
+        }
+        if versions is not None:
+            files["pyproject.toml"] = self._pyproject(versions)
+        return files
+
+    def _cmake(self) -> str:
+        found = "\n".join(f"find_package({name} REQUIRED)" for name in self.dependencies)
+        listed = "\n".join(f'  "{path}"' for path in self.definitions)
+        depends = f"\n  DEPENDENCIES {' '.join(self.dependencies)}" if self.dependencies else ""
+        return f"""\
+cmake_minimum_required(VERSION 3.20)
+project({self.name})
+
+if(SKBUILD)  # pip, with the ros wheels from PyPI
+  include({_CMAKE_MODULE})
+  ros_wheels_use_prefix()
+endif()
+
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+{found}
+
+rosidl_generate_interfaces(${{PROJECT_NAME}}
+{listed}{depends}
+)
+
+if(SKBUILD)
+  ros_wheels_repair_include_directories(${{PROJECT_NAME}})
+endif()
+
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+"""
+
+    def _manifest(self) -> str:
+        depends = "\n".join(f"  <depend>{name}</depend>" for name in self.dependencies)
+        return f"""\
+<?xml version="1.0"?>
+<package format="3">
+  <name>{self.name}</name>
+  <version>0.1.0</version>
+  <description>The interfaces of {self.name}.</description>
+  <maintainer email="maintainer@example.invalid">maintainer</maintainer>
+  <license>see the source</license>
+
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+
+{depends}
+
+  <exec_depend>rosidl_default_runtime</exec_depend>
+
+  <member_of_group>rosidl_interface_packages</member_of_group>
+
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+
+    def _pyproject(self, versions: Mapping[str, str]) -> str:
+        requires = "\n".join(f'  "{item}",' for item in self._build_requirements(versions))
+        return f"""\
+[build-system]
+build-backend = "scikit_build_core.build"
+requires = [
+{requires}
+]
+
+[project]
+name = "{self.name.replace("_", "-")}"
+version = "0.1.0"
+requires-python = ">=3.11"
+
+[tool.scikit-build]
+minimum-version = "0.10"
+experimental = true
+wheel.install-dir = "/data"
+wheel.packages = []
+wheel.exclude = [
+  "**/__pycache__/**",
+  "**/{self.name}-*.egg-info/**",
+  "**/site-packages/{self.name}/**/*.c",
+]
+
+[tool.scikit-build.cmake.define]
+BUILD_TESTING = "OFF"
+"""
+
+    def _build_requirements(self, versions: Mapping[str, str]) -> list[str]:
+        """Return what the composer's own interfaces need, with the packages of our types."""
+        text = (interfaces_folder() / "pyproject.toml").read_text(encoding="utf-8")
+        own: list[str] = tomllib.loads(text)["build-system"]["requires"]
+        tools = [item for item in own if not item.startswith(_OWN_TYPES)]
+        known = {match[1].replace("-", "_") for item in tools if (match := _WHEEL.match(item))}
+        for name in self.dependencies:
+            if name in known:
+                continue
+            if name not in versions:
+                raise NotForPip(
+                    f"'{self.name}' uses types of '{name}', which pip has not installed"
+                )
+            tools.append(f"ros-{name.replace('_', '-')}=={versions[name]}")
+        return tools
+
+
+def read_package(name: str, folder: Path) -> InterfacePackage:
+    """Read the definitions of a package. Raises InvalidPackage, OSError."""
+    definitions = {
+        f"{kind}/{path.name}": path.read_text(encoding="utf-8")
+        for kind in FOLDERS
+        for path in sorted((folder / kind).glob(f"*.{kind}"))
+    }
+    if not definitions:
+        raise InvalidPackage(f"'{name}' has no .msg, .srv or .action file in {folder}")
+    return _package(name, definitions, folder)
+
+
+def bundled_package(name: str) -> InterfacePackage:
+    """Return a package of ROS from the definitions that come with the composer."""
+    bundle = Bundle()
+    definitions = {
+        f"{kind}/{full_name.rpartition('/')[2]}.{kind}": _source_text(found.text)
+        for kind in FOLDERS
+        for full_name in bundle.names(kind)
+        if full_name.startswith(f"{name}/") and (found := bundle.read(full_name)) is not None
+    }
+    return _package(name, definitions, Path(name))
+
+
+def _source_text(bundled: str) -> str:
+    """Return a definition as sources write it."""
+    return _FULL_TYPE.sub(r"\1/", bundled).rstrip("\n") + "\n"
+
+
+def _package(name: str, definitions: Mapping[str, str], folder: Path) -> InterfacePackage:
+    used: dict[str, None] = {}
+    for path, text in definitions.items():
+        kind, _, file = path.partition("/")
+        try:
+            interface = parse_definition(f"{name}/{kind}/{Path(file).stem}", text)
+        except DefinitionError as error:
+            raise InvalidPackage(f"{folder / path}:{error.line}: {error}") from error
+        used |= dict.fromkeys(_IMPLIED[kind])
+        for part in parts(interface).values():
+            used |= dict.fromkeys(_packages_of(part))
+    return InterfacePackage(name, definitions, tuple(sorted(item for item in used if item != name)))
+
+
+def _packages_of(message: Message) -> Iterable[str]:
+    for field in message.fields:
+        if not field.type.is_primitive:
+            yield field.type.name.partition("/")[0]

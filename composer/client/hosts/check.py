@@ -1,0 +1,117 @@
+"""Connect to all hosts of a system, and compare what they have with this computer."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import AsyncExitStack
+from pathlib import Path
+
+import asyncssh
+
+from composer.client.hosts.comparison import Kind, differences
+from composer.client.hosts.connection import (
+    HostError,
+    connect,
+    failure_of,
+    load_keys,
+    run_command,
+    shown,
+)
+from composer.client.hosts.inventory import Inventory, Question, read_answer, written_question
+from composer.client.hosts.remote_command import python_command
+from composer.model import Host
+
+_INVENTORY_WITHIN_S = 30.0
+_MOST_LINES = 12  # of one host and one kind: the reason for hundreds is the first few's
+
+
+class HostsDiffer(Exception):
+    """Hosts cannot be used: a message and a hint each."""
+
+    def __init__(self, problems: Sequence[tuple[str, str | None]]) -> None:
+        super().__init__("\n".join(text for text, _ in problems))
+        self.problems = tuple(problems)
+
+
+async def connect_all(
+    hosts: Sequence[Host], root: Path, stack: AsyncExitStack
+) -> Mapping[str, asyncssh.SSHClientConnection]:
+    """Connect to all hosts at once, until ``stack`` ends. Raises HostsDiffer with all errors."""
+
+    async def attempt(host: Host) -> asyncssh.SSHClientConnection:
+        load_keys(host, root)
+        connection = await connect(host, root)
+        stack.callback(connection.abort)
+        return connection
+
+    results = await asyncio.gather(*map(attempt, hosts), return_exceptions=True)
+    _raise_problems(results)
+    return {
+        host.name.value: result
+        for host, result in zip(hosts, results, strict=True)
+        if isinstance(result, asyncssh.SSHClientConnection)
+    }
+
+
+async def compare_all(
+    hosts: Sequence[Host],
+    connections: Mapping[str, asyncssh.SSHClientConnection],
+    question: Question,
+    here: Inventory,
+) -> None:
+    """Compare the inventories of all hosts with that of this computer. Raises HostsDiffer."""
+
+    async def compare(host: Host) -> list[tuple[str, str | None]]:
+        there = await _ask(host, connections[host.name.value], question)
+        return _described(host, here, there)
+
+    results = await asyncio.gather(*map(compare, hosts), return_exceptions=True)
+    _raise_problems(results)
+    found = [item for result in results if isinstance(result, list) for item in result]
+    if found:
+        raise HostsDiffer(found)
+
+
+async def _ask(
+    host: Host, connection: asyncssh.SSHClientConnection, question: Question
+) -> Inventory:
+    command = python_command(host, ("-m", "composer.client.hosts.inventory"), os.environ)
+    stdin = written_question(question)
+    done = await run_command(host, connection, command, stdin=stdin, within_s=_INVENTORY_WITHIN_S)
+    if done.status != 0:
+        raise failure_of(host, done.status, done.text + done.errors)
+    try:
+        return read_answer(done.text)
+    except ValueError as error:
+        raise HostError(
+            host,
+            "ros2-composer there answers in another way",
+            "install the same version of ros2-composer there",
+        ) from error
+
+
+def _described(host: Host, here: Inventory, there: Inventory) -> list[tuple[str, str | None]]:
+    found = differences(here, there)
+    described: list[tuple[str, str | None]] = []
+    for kind in Kind:
+        texts = [shown(item.text) for item in found if item.kind is kind]
+        lines = [f"{host.name} ({host.login}): {text}" for text in texts]
+        more = len(lines) - _MOST_LINES
+        if more > 0:
+            lines[_MOST_LINES:] = [f"{host.name} ({host.login}): and {more} more like this"]
+        described += [(line, None) for line in lines[:-1]]
+        described += [(line, kind.value) for line in lines[-1:]]
+    return described
+
+
+def _raise_problems(results: Sequence[object]) -> None:
+    problems: list[tuple[str, str | None]] = []
+    for result in results:
+        if isinstance(result, HostError):
+            problems.append((str(result), result.hint))
+        elif isinstance(result, BaseException):
+            raise result
+    if problems:
+        raise HostsDiffer(problems)

@@ -1,0 +1,267 @@
+"""The lifecycle of nodes in other processes.
+
+It uses the standard services (lifecycle_msgs) only, so it works with every lifecycle node. A
+transition is requested only if the node lists it as available: an invalid request ends the process
+of an rclpy lifecycle node.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from typing import Any
+
+from lifecycle_msgs.msg import Transition as TransitionMessage
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
+from rclpy.type_support import check_is_valid_srv_type
+
+from composer.base.fast_dataclass import dataclass
+from composer.client.name_matching import check_all_respond, find_node, not_found_error
+from composer.client.requests import (
+    Call,
+    call_all_with_retries,
+    call_once,
+    call_with_retries,
+)
+from composer.client.session import Deadline, NoResponseError, RosError, Session
+from composer.client.systems.proxies import LIFECYCLE, Proxies
+
+PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
+_PATTERN = re.compile(r"[*?\[]")
+#: The next transition on the way to a goal state, by goal and current state.
+_NEXT_TRANSITION = {
+    "unconfigured": {"inactive": "cleanup", "active": "deactivate"},
+    "inactive": {"unconfigured": "configure", "active": "deactivate"},
+    "active": {"unconfigured": "configure", "inactive": "activate"},
+    "finalized": dict.fromkeys(("unconfigured", "inactive", "active"), "shutdown"),
+}
+_STATE_SERVICE = "/get_state"
+_STATE_TYPE = "lifecycle_msgs/srv/GetState"
+
+
+class TransitionError(RosError):
+    """The transition is not available in the state of the node, or it failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """An available transition and its goal state."""
+
+    id: int
+    label: str
+    goal: str
+
+
+@dataclass(frozen=True, slots=True)
+class CompletedTransition:
+    """The primary states before and after one or more transitions."""
+
+    node: str
+    before: str
+    after: str
+
+    def __str__(self) -> str:
+        return f"{self.node}: {self.before} -> {self.after}"
+
+
+#: The transitions of each state (lifecycle_msgs), for nodes without services of their own.
+_AVAILABLE = {
+    "unconfigured": (
+        Transition(TransitionMessage.TRANSITION_CONFIGURE, "configure", "configuring"),
+        Transition(TransitionMessage.TRANSITION_UNCONFIGURED_SHUTDOWN, "shutdown", "shuttingdown"),
+    ),
+    "inactive": (
+        Transition(TransitionMessage.TRANSITION_CLEANUP, "cleanup", "cleaningup"),
+        Transition(TransitionMessage.TRANSITION_ACTIVATE, "activate", "activating"),
+        Transition(TransitionMessage.TRANSITION_INACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
+    ),
+    "active": (
+        Transition(TransitionMessage.TRANSITION_DEACTIVATE, "deactivate", "deactivating"),
+        Transition(TransitionMessage.TRANSITION_ACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
+    ),
+}
+
+
+class LifecycleClient:
+    """Queries and changes lifecycle nodes, all within one time limit."""
+
+    def __init__(self, session: Session, deadline: Deadline) -> None:
+        self._session = session
+        self._deadline = deadline
+        self._proxies = Proxies(session)
+        for service in (GetState, GetAvailableTransitions, ChangeState):
+            check_is_valid_srv_type(service)  # takes 0.1 s, during which discovery runs
+
+    def nodes(self) -> tuple[str, ...]:
+        """Return the full names of all lifecycle nodes, once discovery is complete."""
+        return self._session.wait_until_settled(self.known, self._deadline)
+
+    def find(self, name: str) -> str:
+        """Return the full name of a node. Raises NotFoundError, NoResponseError."""
+        return find_node(self._session, self._deadline, name, self.known, "lifecycle node")
+
+    def select(self, targets: Iterable[str]) -> tuple[str, ...]:
+        """Return the full names of the nodes that match the targets, each once, in order.
+
+        A target is a name as for :meth:`find`, or a pattern: ``/planning/*``, ``*_driver``. A
+        pattern without a slash is matched with the last parts of the names. Raises NotFoundError,
+        NoResponseError.
+        """
+        selected: dict[str, None] = {}
+        for target in targets:
+            if not _PATTERN.search(target):
+                selected[self.find(target)] = None
+                continue
+            known = self.nodes()
+            check_all_respond(self._session)
+            matches = [name for name in known if _matches(name, target)]
+            if not matches:
+                raise not_found_error("lifecycle node matching", target, known)
+            selected.update(dict.fromkeys(matches))
+        return tuple(selected)
+
+    def state(self, node: str) -> str:
+        """Return the label of the node's state. Raises NoResponseError."""
+        if self._manager(node):
+            return self._proxies.state(node)
+        response = self._call(call_with_retries, node, GetState, "get_state", GetState.Request())
+        return str(response.current_state.label)
+
+    def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
+        """Return the label of each node's state, None for nodes that did not respond in time."""
+        names = tuple(nodes)
+        reported: dict[str, str | None] = {
+            node: self._proxies.state(node) for node in names if self._manager(node)
+        }
+        services = {f"{node}/get_state": node for node in names if node not in reported}
+        responses = call_all_with_retries(
+            self._session, GetState, services, GetState.Request(), self._deadline
+        )
+        return reported | {
+            node: None if response is None else str(response.current_state.label)
+            for node, response in zip(services.values(), responses.values(), strict=True)
+        }
+
+    def transitions(self, node: str) -> tuple[Transition, ...]:
+        """Return the transitions that are available now. Raises NoResponseError."""
+        if self._manager(node):
+            return _AVAILABLE.get(self._proxies.state(node), ())
+        request = GetAvailableTransitions.Request()
+        response = self._call(
+            call_with_retries, node, GetAvailableTransitions, "get_available_transitions", request
+        )
+        return tuple(
+            Transition(item.transition.id, item.transition.label, item.goal_state.label)
+            for item in response.available_transitions
+        )
+
+    def change_state(self, node: str, label: str) -> CompletedTransition:
+        """Request the transition ``label`` of a node.
+
+        Raises TransitionError with the available transitions; NoResponseError.
+        """
+        before = self.state(node)
+        available = self.transitions(node)
+        transition = next((item for item in available if item.label == label), None)
+        if transition is None:
+            raise TransitionError(
+                f"'{label}' is not possible: {node} is {before}", _hint(before, available)
+            )
+        success, after = self._request(node, before, transition)
+        if not success:
+            raise TransitionError(
+                f"'{label}' of {node} failed: it is {after} now", "see its log for the reason"
+            )
+        return CompletedTransition(node, before, after)
+
+    def go_to_state(self, node: str, goal: str) -> CompletedTransition:
+        """Take a node to a primary state in as many transitions as it needs.
+
+        Raises TransitionError if the state cannot be reached or a transition fails;
+        NoResponseError.
+        """
+        before = state = self.state(node)
+        while state != goal:
+            label = _NEXT_TRANSITION.get(goal, {}).get(state)
+            if label is None:
+                raise TransitionError(
+                    f"'{goal}' cannot be reached: {node} is {state}",
+                    _hint(state, self.transitions(node)),
+                )
+            reached = self.change_state(node, label).after
+            if reached == state:
+                raise TransitionError(f"{node} is still {state} after '{label}'")
+            state = reached
+        return CompletedTransition(node, before, state)
+
+    def follow_to_state(self, node: str, goal: str) -> CompletedTransition:
+        """Take a node to a state to which its system may take it at the same time.
+
+        Raises the same as :meth:`go_to_state`.
+        """
+        before = self._settled_state(node)
+        try:
+            self.go_to_state(node, goal)
+        except TransitionError:
+            if self._settled_state(node) != goal:
+                raise
+        return CompletedTransition(node, before, goal)
+
+    def _settled_state(self, node: str) -> str:
+        """Return the state of a node once no transition runs, or at the end of the time limit."""
+
+        def primary() -> str | None:
+            state = self.state(node)
+            return state if state in PRIMARY_STATES else None
+
+        return self._session.wait_for(primary, self._deadline) or self.state(node)
+
+    def _request(self, node: str, before: str, transition: Transition) -> tuple[bool, str]:
+        """Request a transition; return whether it succeeded, and the state after it."""
+        manager = self._manager(node)
+        # The label makes the request fail cleanly if the state has changed in the meantime.
+        label = f"{node} {transition.label}" if manager else transition.label
+        message = TransitionMessage(id=transition.id, label=label)
+        request = ChangeState.Request(transition=message)
+        response = self._call(call_once, manager or node, ChangeState, "change_state", request)
+        success = bool(response.success)
+        if not manager:
+            return success, self.state(node)
+        return success, self._proxies.wait_for_state(
+            node, before if success else None, self._deadline
+        )
+
+    def _manager(self, node: str) -> str | None:
+        """Return the manager that provides the lifecycle services of a node, or None."""
+        return self._proxies.nodes(LIFECYCLE).get(node)
+
+    def known(self) -> tuple[str, ...]:
+        """Return the full names of the lifecycle nodes discovered so far."""
+        self._proxies.discover(self._deadline)
+        with_services = {
+            name.removesuffix(_STATE_SERVICE)
+            for name, types in self._session.graph.services()
+            if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
+        }
+        return tuple(sorted(with_services | self._proxies.nodes(LIFECYCLE).keys()))
+
+    def _call(self, send: Call, node: str, service: Any, name: str, request: Any) -> Any:
+        try:
+            return send(self._session, service, f"{node}/{name}", request, self._deadline)
+        except NoResponseError as error:
+            raise NoResponseError(
+                f"{node} did not respond within {self._deadline.timeout_s:g} s",
+                f"{error}; its process may be busy or gone. Use --timeout to wait longer",
+            ) from error
+
+
+def _matches(node: str, pattern: str) -> bool:
+    return fnmatchcase(node if "/" in pattern else node.rpartition("/")[2], pattern)
+
+
+def _hint(state: str, available: tuple[Transition, ...]) -> str:
+    if state not in PRIMARY_STATES:
+        return "a transition is in progress: wait, or see its log if it does not end"
+    names = ", ".join(dict.fromkeys(transition.label for transition in available))
+    return f"available transitions: {names or 'none, this state is final'}"

@@ -1,0 +1,206 @@
+"""Topics of any ROS graph: their endpoints, subscriptions that collect messages, and publishing."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, Self
+
+from rclpy.duration import Duration
+from rclpy.publisher import Publisher
+
+from composer.base.fast_dataclass import dataclass
+from composer.client.graph_names import GraphNames, type_mismatch_hint
+from composer.client.messages.values import Build, class_of
+from composer.client.name_matching import full_name
+from composer.client.session import Deadline, NoResponseError, RosError, Session
+from composer.model.qos import Durability, QosProfile, Reliability
+from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros_graph.endpoints import TopicInfo
+
+_SUBSCRIPTION_DEPTH = 1000
+_ACKNOWLEDGED_WITHIN_S = 1
+
+
+class NotAcknowledgedError(RosError):
+    """A reliable subscription has not acknowledged all messages in time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message, or its serialized bytes, and when it arrived (seconds, time.monotonic)."""
+
+    content: Any
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """What to publish and how often; ``times`` None means forever.
+
+    ``wait_for`` is the number of subscriptions to wait for before the first message.
+    """
+
+    topic: str
+    type_name: str
+    build: Build
+    qos: QosProfile
+    rate_hz: float = 1.0
+    times: int | None = None
+    wait_for: int = 0
+
+
+class Topics:
+    """Looks up topics, all within one time limit."""
+
+    def __init__(self, session: Session, deadline: Deadline) -> None:
+        self._session = session
+        self._deadline = deadline
+        self._names = GraphNames(session, deadline)
+
+    def info(self, name: str) -> TopicInfo:
+        """Return the publishers and subscriptions of a topic. Raises NotFoundError."""
+        types = self._names.types("topic", name)
+        absolute = full_name("topic", name)
+        return self._session.wait_until_settled(
+            lambda: self._session.graph.topic(absolute, types), self._deadline
+        )
+
+    def type_of(self, name: str) -> str:
+        """Return the type of a topic. Raises NotFoundError; RosError if there is more than one."""
+        return self._names.only_type("topic", name)
+
+    def compatible_qos(self, name: str) -> QosProfile:
+        """Return the strictest profile that all publishers of a topic satisfy."""
+        return strictest_compatible_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
+
+    def measuring_qos(self, name: str) -> QosProfile:
+        """Return such a profile with which no messages from before the subscription arrive."""
+        return measuring_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
+
+    def _offers(self, name: str) -> list[QosProfile]:
+        publishers = self._session.graph.topic(name, ()).publishers
+        return [publisher.qos for publisher in publishers]
+
+
+class TopicSubscription:
+    """A subscription that collects messages. Use it in a ``with`` block.
+
+    With ``raw``, the messages are serialized bytes.
+    """
+
+    def __init__(
+        self, session: Session, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
+    ) -> None:
+        self.topic = topic
+        self._session = session
+        self._type_name = type_name
+        self._received: deque[Received] = deque()
+        self._subscription = session.subscribe(
+            class_of(type_name),
+            topic,
+            lambda content: self._received.append(Received(content, time.monotonic())),
+            rclpy_profile(qos),
+            raw=raw,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._session.unsubscribe(self._subscription)
+
+    def no_message_error(self, timeout_s: float) -> NoResponseError:
+        """Return the error for a topic without messages, with the reason if it is known."""
+        hint = type_mismatch_hint(self._session, "topic", self.topic, self._type_name)
+        return NoResponseError(f"no message received on '{self.topic}' for {timeout_s:g} s", hint)
+
+    def take(self, deadline: Deadline) -> list[Received]:
+        """Return the collected messages; wait for the first one until the deadline."""
+        self._session.wait_for(lambda: self._received or None, deadline)
+        taken = list(self._received)
+        self._received.clear()
+        return taken
+
+
+def strictest_compatible_qos(offers: list[QosProfile], depth: int) -> QosProfile:
+    """Return the strictest profile of a subscription that is compatible with every offer.
+
+    See the offer/request rule in :mod:`composer.model.qos`.
+    """
+    reliable = all(offer.reliability is Reliability.RELIABLE for offer in offers)
+    transient = all(offer.durability is Durability.TRANSIENT_LOCAL for offer in offers)
+    return QosProfile(
+        depth=depth,
+        reliability=Reliability.RELIABLE if offers and reliable else Reliability.BEST_EFFORT,
+        durability=Durability.TRANSIENT_LOCAL if offers and transient else Durability.VOLATILE,
+    )
+
+
+def measuring_qos(offers: list[QosProfile], depth: int) -> QosProfile:
+    """Return the strictest compatible profile for measurements: latched messages do not arrive.
+
+    They would arrive at once, whenever they were published.
+    """
+    return replace(strictest_compatible_qos(offers, depth), durability=Durability.VOLATILE)
+
+
+def publish(session: Session, deadline: Deadline, publication: Publication) -> Iterator[Any]:
+    """Publish and yield each message, then wait for reliable subscriptions to acknowledge them.
+
+    The deadline is for the subscriptions; raises NoResponseError. Raises NotAcknowledgedError after
+    the last message. Expressions in messages see ``count`` (from 0) and ``now`` (seconds).
+    """
+    publisher = session.node.create_publisher(
+        class_of(publication.type_name), publication.topic, rclpy_profile(publication.qos)
+    )
+    try:
+        _wait_for_subscriptions(session, deadline, publisher.get_subscription_count, publication)
+        next_s = time.monotonic()
+        count = 0
+        while publication.times is None or count < publication.times:
+            message = publication.build({"count": count, "now": time.time()})
+            publisher.publish(message)
+            yield message
+            count += 1
+            next_s += 1.0 / publication.rate_hz
+            if publication.times is None or count < publication.times:
+                session.spin_until(next_s)
+        if not wait_until_acknowledged(publisher):
+            raise _not_acknowledged_error(publication.topic)
+    finally:
+        session.node.destroy_publisher(publisher)
+
+
+def wait_until_acknowledged(publisher: Publisher) -> bool:
+    """Wait a second at most; return whether all reliable subscriptions have all messages."""
+    return publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S))
+
+
+def _wait_for_subscriptions(
+    session: Session,
+    deadline: Deadline,
+    matched: Callable[[], int],
+    publication: Publication,
+) -> None:
+    if session.wait_for(lambda: matched() >= publication.wait_for or None, deadline) is None:
+        hint = (
+            "use --wait-matching-subscriptions 0 to publish at once; 'compose topic info -v' shows"
+            " QoS profiles"
+        )
+        raise NoResponseError(
+            f"found {matched()} of {publication.wait_for} subscriptions to"
+            f" '{publication.topic}' within {deadline.timeout_s:g} s",
+            type_mismatch_hint(session, "topic", publication.topic, publication.type_name) or hint,
+        )
+
+
+def _not_acknowledged_error(topic: str) -> NotAcknowledgedError:
+    return NotAcknowledgedError(
+        f"not every reliable subscription to '{topic}' acknowledged all messages within"
+        f" {_ACKNOWLEDGED_WITHIN_S} s",
+        "messages may be lost: a subscriber may be stopped, busy or gone, or the network may drop"
+        f" packets; 'compose topic info -v {topic}' lists the subscriptions",
+    )

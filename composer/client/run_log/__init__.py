@@ -1,0 +1,32 @@
+"""The log files of runs: written by ``compose run``, read by ``compose logs``.
+
+::
+
+    <ROS log folder>/compose/robot1.pipeline/2026-03-01-08-30-00-125-4711/   one run, named in UTC
+        run.json                     the system, and its process, which holds a lock on this file
+        log-000001.jsonl             the oldest file that is left, one JSON object per line
+        log-000002.jsonl             written to now
+
+See docs/decisions/0051-run-logs.md.
+"""
+
+from composer.client.run_log.reading import last_records
+from composer.client.run_log.record import Record
+from composer.client.run_log.rotation import RotatingFile
+from composer.client.run_log.runs import Run, RunFolder, current_domain, find_parts, find_runs
+from composer.client.run_log.selection import Selection, parse_since
+from composer.client.run_log.system_log import SystemLog
+
+__all__ = [
+    "Record",
+    "RotatingFile",
+    "Run",
+    "RunFolder",
+    "Selection",
+    "SystemLog",
+    "current_domain",
+    "find_parts",
+    "find_runs",
+    "last_records",
+    "parse_since",
+]

@@ -1,0 +1,145 @@
+"""Lifecycle requests to several nodes, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+
+from composer.base.fast_dataclass import dataclass
+from composer.client.lifecycle import CompletedTransition, LifecycleClient
+from composer.client.session import Deadline, RosError, Session
+from composer.client.systems.dependents import active_dependents, inactive_dependents, lowered
+from composer.client.systems.managers import Systems
+from composer.client.systems.system_reports import NodeReport, SystemReport
+from composer.runtime.process.instance_lock import local_systems
+
+_UPWARD = ("configure", "activate")
+#: The goal of each transition, by the state in which it is available.
+_GOALS = {
+    "configure": {"unconfigured": "inactive"},
+    "activate": {"inactive": "active"},
+    "deactivate": {"active": "inactive"},
+    "cleanup": {"inactive": "unconfigured"},
+    "shutdown": dict.fromkeys(("unconfigured", "inactive", "active"), "finalized"),
+}
+#: Managers publish their last report to each new subscription, and again every second.
+_REPORT_WITHIN_S = 2.0
+_RANK = {"unconfigured": 0, "inactive": 1, "active": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class LifecycleRequest:
+    """A transition by its label, or else a goal state."""
+
+    transition: str | None
+    state: str | None
+
+    def goal(self, state: str) -> str | None:
+        """Return the goal for a node in ``state``; None if the transition is not available."""
+        if self.state is not None:
+            return self.state
+        return _GOALS.get(self.transition or "", {}).get(state)
+
+
+@dataclass(frozen=True, slots=True)
+class NodeOutcome:
+    """The result of a request for one node, or the error."""
+
+    result: CompletedTransition | None
+    error: RosError | None
+
+
+def nodes_of_system(
+    session: Session, deadline: Deadline, name: str, request: LifecycleRequest
+) -> tuple[str, ...]:
+    """Return the nodes of a running system in the order of the request.
+
+    First the nodes to take down, in the reverse order of the bring-up, then the nodes to bring up,
+    in its order. Raises NotFoundError, NoResponseError.
+    """
+    systems = Systems(session, deadline)
+    nodes = systems.report(systems.find(name)).nodes
+    names = [node.node for node in nodes]
+    if request.state is None:
+        return tuple(names if request.transition in _UPWARD else names[::-1])
+    goal = _RANK.get(request.state, -1)
+    going_down = [node.node for node in nodes if _RANK.get(node.state, 0) > goal]
+    return (*going_down[::-1], *(node for node in names if node not in going_down))
+
+
+class LifecycleBatch:
+    """A request to several nodes, one after the other, and the nodes that depend on them.
+
+    ``active_dependents`` are the active nodes that depend on those that the request takes down, in
+    the reverse order of the bring-up. Managers report dependencies; a node without a manager has
+    none.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        deadline: Deadline,
+        targets: Iterable[str],
+        request: LifecycleRequest,
+    ) -> None:
+        """Find the nodes. Raises NotFoundError, NoResponseError."""
+        self._client = LifecycleClient(session, deadline)
+        self._request = request
+        self._nodes = self._client.select(targets)
+        reports = _system_reports(session, deadline)
+        #: Systems whose dependencies are unknown, because their managers do not respond.
+        self.silent_systems = [name for name, report in reports.items() if report is None]
+        self.active_dependents: tuple[str, ...] = ()
+        self._inactive_dependents: tuple[str, ...] = ()
+        for report in filter(None, reports.values()):
+            goals = self._goals(report.nodes)
+            down = lowered(report.nodes, goals)
+            up = {name: goal for name, goal in goals.items() if name not in down}
+            self.active_dependents += active_dependents(report.nodes, down)
+            self._inactive_dependents += inactive_dependents(report.nodes, up)
+
+    def run(self, *, dependents: bool) -> Iterator[NodeOutcome]:
+        """Carry out the request for each node; continue after an error.
+
+        With ``dependents``, active dependents are deactivated before it, and inactive ones that can
+        be active after it are activated, unless there was an error.
+        """
+        failed = False
+        for node in self.active_dependents if dependents else ():
+            outcome = _outcome(partial(self._client.follow_to_state, node, "inactive"))
+            failed = failed or outcome.error is not None
+            yield outcome
+        for node in self._nodes:
+            outcome = _outcome(partial(self._change, node))
+            failed = failed or outcome.error is not None
+            yield outcome
+        for node in self._inactive_dependents if dependents and not failed else ():
+            yield _outcome(partial(self._client.follow_to_state, node, "active"))
+
+    def _goals(self, nodes: Iterable[NodeReport]) -> dict[str, str]:
+        """Return the states to which the request takes nodes of a system from other ones."""
+        goals = {}
+        for node in nodes:
+            goal = self._request.goal(node.state)
+            if node.node in self._nodes and goal is not None and goal != node.state:
+                goals[node.node] = goal
+        return goals
+
+    def _change(self, node: str) -> CompletedTransition:
+        if self._request.state is not None:
+            return self._client.go_to_state(node, self._request.state)
+        return self._client.change_state(node, self._request.transition or "")
+
+
+def _outcome(change: Callable[[], CompletedTransition]) -> NodeOutcome:
+    try:
+        return NodeOutcome(change(), None)
+    except RosError as error:
+        return NodeOutcome(None, error)
+
+
+def _system_reports(session: Session, deadline: Deadline) -> dict[str, SystemReport | None]:
+    """Return the reports of the known systems, None for those that do not respond."""
+    systems = Systems(session, deadline)
+    limit = Deadline(min(_REPORT_WITHIN_S, deadline.left_s))
+    return systems.reports({*systems.discover(), *local_systems()}, limit)

@@ -1,0 +1,93 @@
+"""Running systems as their managers report them, and other lifecycle nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+
+from composer.base.fast_dataclass import dataclass
+from composer.client.lifecycle import LifecycleClient
+from composer.client.session import Deadline, Session
+from composer.client.systems.managers import DISCOVERY_S, Systems
+from composer.client.systems.system_reports import (
+    PartialReport,
+    SystemReport,
+    with_callbacks_of_processes,
+)
+from composer.plan.drift import ObservedProcess
+from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.ros.manager_protocol import NAME
+
+#: How long to wait for the responses of other nodes after discovery.
+_RESPONSE_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessList:
+    """Systems by the namespaces of their managers, and the states of other lifecycle nodes.
+
+    A partial report is that of a system of another version. None stands for a system or node that
+    did not respond.
+    """
+
+    systems: dict[str, SystemReport | PartialReport | None]
+    others: dict[str, str | None] = field(default_factory=dict)
+
+
+def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> ProcessList:
+    """Return all systems and lifecycle nodes, once discovery is complete."""
+    systems = Systems(session, deadline, callbacks=callbacks)
+    client = LifecycleClient(session, deadline)
+    discovery = Deadline(min(DISCOVERY_S, deadline.left_s))
+    local = sorted(local_systems())
+    systems.subscribe(local)
+    names, nodes = session.wait_until_settled(
+        lambda: (systems.discover(), client.known()), deadline
+    )
+    reports = systems.reports({*local, *names}, discovery)
+    managed = {node.node for report in reports.values() if report for node in report.nodes}
+    partial = {
+        name: systems.partial_report(name) for name, report in reports.items() if report is None
+    }
+    managed |= {node for known in partial.values() if known for node in known.states}
+    others = [node for node in nodes if node not in managed]
+    limited = LifecycleClient(session, Deadline(min(_RESPONSE_S, deadline.left_s)))
+    whole = with_callbacks_of_processes({name: item for name, item in reports.items() if item})
+    return ProcessList({**reports, **whole, **partial}, limited.states(others) if others else {})
+
+
+def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> ProcessList:
+    """Return one system. Raises NotFoundError, NoResponseError."""
+    systems = Systems(session, deadline, callbacks=callbacks)
+    found = systems.find(name)
+    discovery = Deadline(min(DISCOVERY_S, deadline.left_s))
+    report = systems.reports([found], discovery)[found]
+    if report is None:
+        partial = systems.partial_report(found)
+        if partial is not None:
+            return ProcessList({found: partial})
+        report = systems.report(found)
+    return ProcessList({found: systems.whole(report) if callbacks else report})
+
+
+def observed_processes(
+    reports: Mapping[str, SystemReport | PartialReport | None],
+) -> tuple[ObservedProcess, ...]:
+    """Return the processes of systems, with their nodes and managers, by the reports of all."""
+    known = {name: report for name, report in reports.items() if isinstance(report, SystemReport)}
+    nodes: dict[str, dict[str, None]] = {}
+    for report in known.values():
+        for node in report.nodes:
+            nodes.setdefault(_process_of(report, node.process, known), {})[node.node] = None
+    processes = []
+    for name, found in sorted(nodes.items()):
+        host, pid = (known[name].host, known[name].pid) if name in known else ("", "")
+        processes.append(ObservedProcess(name, host, pid, (*found, f"{name}/{NAME}")))
+    return tuple(processes)
+
+
+def _process_of(report: SystemReport, process: str, known: Mapping[str, SystemReport]) -> str:
+    """Return the namespace of the manager of a process that a report names."""
+    name = f"{report.name}/{process}"
+    is_own = not process or (name not in known and report.name.endswith(f"/{process}"))
+    return report.name if is_own else name

@@ -1,0 +1,234 @@
+"""The types of values, and the types that field paths lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import takewhile
+from typing import TypeAlias
+
+from composer.base.diagnostics import shown, suggestion
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
+from composer.interfaces import (
+    FLOATS,
+    INTEGER_RANGES,
+    TEXTS,
+    FieldType,
+    Interfaces,
+    Message,
+)
+from composer.language.expressions import map_key
+from composer.language.tree import Plain
+
+
+@dataclass(frozen=True, slots=True)
+class Anything:
+    """A type that is unknown before run time. It fits everywhere."""
+
+
+ANYTHING = Anything()
+BOOL = FieldType("bool")
+INTEGER = FieldType("int64")
+NUMBER = FieldType("float64")
+STRING = FieldType("string")
+
+
+@dataclass(frozen=True, slots=True)
+class Word(FieldType):
+    """A string that is one of a few ``words``."""
+
+    words: tuple[str, ...] = ()
+
+    def problem(self, text: object) -> tuple[str, str | None] | None:
+        """Return why the value is never equal to ``text``, and a hint; None if it may be."""
+        if not isinstance(text, str) or text in self.words:
+            return None
+        return f"the value is never '{shown(text)}'", suggestion(text, self.words)
+
+
+#: How an action ends.
+STATUS = Word("string", words=("succeeded", "canceled", "aborted"))
+
+ValueType: TypeAlias = "FieldType | Message | Mapping[str, ValueType] | Anything"
+Scope: TypeAlias = Mapping[str, ValueType]
+
+#: rcl_interfaces/msg/ParameterType, as parameters are declared in YAML.
+_PARAMETER_TYPES: Mapping[str, FieldType] = {
+    "bool": BOOL,
+    "integer": INTEGER,
+    "double": NUMBER,
+    "string": STRING,
+    "byte_array": FieldType("byte", is_array=True),
+    "bool_array": FieldType("bool", is_array=True),
+    "integer_array": FieldType("int64", is_array=True),
+    "double_array": FieldType("float64", is_array=True),
+    "string_array": FieldType("string", is_array=True),
+}
+_SECONDS = frozenset(("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"))
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A problem, its span and a hint.
+
+    ``missing`` is true for a field or element that does not exist, false for a value that does not
+    fit.
+    """
+
+    message: str
+    span: Span
+    hint: str | None = None
+    missing: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PathProblem:
+    """A path that cannot be resolved; ``index`` is the invalid part."""
+
+    message: str
+    index: int
+    hint: str | None = None
+
+
+def parameter_type(declared: str, choices: Iterable[Plain] = ()) -> ValueType:
+    """Return the type of a parameter declared as ``declared``, one of ``choices`` if given."""
+    if declared == "string" and choices:
+        return Word("string", words=tuple(str(choice) for choice in choices))
+    return _PARAMETER_TYPES.get(declared, ANYTHING)
+
+
+def type_of(value: Plain) -> ValueType:
+    """Return the type of a value in YAML, such as the initial state of a node.
+
+    An integer state may become 0.5 later; until then it fits wherever a number does.
+    """
+    match value:
+        case bool():
+            return BOOL
+        case int():
+            return INTEGER
+        case float():
+            return NUMBER
+        case str() if "${" not in value:
+            return STRING
+        case dict():
+            return {name: type_of(content) for name, content in value.items()}
+        case _:
+            return ANYTHING
+
+
+def resolve_path(
+    root: ValueType, parts: tuple[str | int, ...], interfaces: Interfaces
+) -> ValueType | PathProblem:
+    """Return the type that ``parts`` lead to from ``root``, or the problem."""
+    found, index = root, 0
+    while index < len(parts):
+        name, taken = _next_name(found, parts[index:])
+        step = _element(found, name) if isinstance(name, int) else _field(found, name, interfaces)
+        if isinstance(step, _PathFailure):
+            return PathProblem(step.message, index, step.hint)
+        found, index = step, index + taken
+    return found
+
+
+def _next_name(type_: ValueType, parts: tuple[str | int, ...]) -> tuple[str | int, int]:
+    """Return the next field, key or index of a path, and the number of its parts."""
+    if not isinstance(type_, Mapping) or isinstance(parts[0], int):
+        return parts[0], 1
+    names = takewhile(lambda part: isinstance(part, str), parts)
+    return map_key(type_, [str(name) for name in names])
+
+
+def fields_of(type_: ValueType, interfaces: Interfaces) -> Message | None:
+    """Return the definition of a message type; None for other types and unknown messages."""
+    if isinstance(type_, Message):
+        return type_
+    if isinstance(type_, FieldType) and not type_.is_array and not type_.is_primitive:
+        return interfaces.message(type_.name)
+    return None
+
+
+def is_number(type_: ValueType) -> bool:
+    """Return whether values of the type are numbers."""
+    return is_integer(type_) or (
+        isinstance(type_, FieldType) and not type_.is_array and type_.name in FLOATS
+    )
+
+
+def is_integer(type_: ValueType) -> bool:
+    """Return whether values of the type are integers."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in INTEGER_RANGES
+
+
+def is_string(type_: ValueType) -> bool:
+    """Return whether values of the type are strings."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in TEXTS
+
+
+def is_bool(type_: ValueType) -> bool:
+    """Return whether values of the type are bools."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name == "bool"
+
+
+def is_array(type_: ValueType) -> bool:
+    """Return whether values of the type are lists."""
+    return isinstance(type_, FieldType) and type_.is_array
+
+
+def is_seconds(type_: ValueType) -> bool:
+    """Return whether a number is converted to it as seconds: Time and Duration."""
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in _SECONDS
+
+
+def described(type_: ValueType) -> str:
+    """Return the name of the type in messages."""
+    match type_:
+        case Message(name=name):
+            return name
+        case FieldType():
+            return str(type_)
+        case Anything():
+            return "unknown type"
+        case _:
+            return "a map"
+
+
+@dataclass(frozen=True, slots=True)
+class _PathFailure:
+    message: str
+    hint: str | None = None
+
+
+def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _PathFailure:
+    if isinstance(type_, Mapping):
+        found = type_.get(name)
+        return (
+            found
+            if found is not None
+            else _PathFailure(f"'{name}' does not exist", suggestion(name, type_))
+        )
+    if isinstance(type_, FieldType) and type_.is_array:
+        return _PathFailure(
+            f"{type_} has no field '{name}'", "it is a list: use an index, as in [0]"
+        )
+    if isinstance(type_, FieldType) and type_.is_primitive:
+        return _PathFailure(f"{type_} has no field '{name}'", "it is a value, not a message")
+    message = fields_of(type_, interfaces)
+    if message is None:  # an unknown type or message
+        return ANYTHING
+    field = message.field(name)
+    if field is not None:
+        return field.type
+    hint = suggestion(name, message.field_names)
+    return _PathFailure(f"{message.name} has no field '{name}'", hint)
+
+
+def _element(type_: ValueType, index: int) -> ValueType | _PathFailure:
+    if isinstance(type_, Anything):
+        return ANYTHING
+    if not isinstance(type_, FieldType) or not type_.is_array:
+        return _PathFailure(f"{described(type_)} has no elements")
+    limit = type_.array_size if type_.array_size is not None else type_.array_bound
+    if limit is not None and not -limit <= index < limit:
+        return _PathFailure(f"{type_} has no element {index}")
+    return type_.element

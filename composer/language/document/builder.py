@@ -1,0 +1,288 @@
+"""Build a located tree from YAML events, within limits and without recursion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field
+
+import yaml
+
+from composer.base.diagnostics import Diagnostic, Label, Rule, line_subject, shown
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
+from composer.language.document import rules
+from composer.language.document.error_limit import LimitedDiagnostics
+from composer.language.document.events import Mark, collection_span, scalar_span, span_at
+from composer.language.document.limits import MAX_DEPTH, MAX_VALUES
+from composer.language.document.scalars import NumberRefused, check_value, resolve_plain
+from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe
+
+
+class Stopped(Exception):
+    """Parsing cannot continue; ``diagnostic`` says why."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class _Anchored:
+    """The value of an anchor, and the size that each alias adds."""
+
+    tree: Tree
+    values: int
+    height: int
+
+
+@dataclass(slots=True)
+class _Open:
+    """A map or list that is not complete yet."""
+
+    start: Span
+    is_map: bool
+    is_flow: bool
+    anchor: str | None
+    items: list[Tree] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+    keys: dict[str, Scalar] = field(default_factory=dict)
+    key: Scalar | None = None  # None for an invalid key, whose value is dropped
+    awaits_value: bool = False
+    text_in_braces: Scalar | None = None
+    values: int = 1
+    height: int = 1
+
+    def tree(self) -> Tree:
+        """Return the finished map or list."""
+        if self.text_in_braces is not None and len(self.entries) == 1:
+            return self.text_in_braces
+        if self.is_map:
+            first = self.entries[0].key.span if self.entries else self.start
+            return Mapping(tuple(self.entries), collection_span(self.start, first, self.is_flow))
+        first = self.items[0].span if self.items else self.start
+        return Sequence(tuple(self.items), collection_span(self.start, first, self.is_flow))
+
+
+class TreeBuilder:
+    """Handles the events of one document; ``root`` is the tree after the last one.
+
+    ``resolve`` returns the value of an unquoted scalar. It raises NumberRefused.
+    """
+
+    def __init__(
+        self, source: SourceFile, resolve: Callable[[str], ScalarValue] = resolve_plain
+    ) -> None:
+        self.root: Tree | None = None
+        self.diagnostics = LimitedDiagnostics()
+        self._source = source
+        self._resolve = resolve
+        self._open: list[_Open] = []
+        self._anchors: dict[str, _Anchored | None] = {}  # None while the value is being read
+        self._values = 0
+
+    @property
+    def open_bracket(self) -> Span | None:
+        """The location of the innermost '[' or '{' that has not been closed."""
+        return next((part.start for part in reversed(self._open) if part.is_flow), None)
+
+    def handle(self, event: yaml.Event) -> None:
+        """Handle the next event. Raises Stopped."""
+        match event:
+            case yaml.ScalarEvent():
+                self._on_scalar(event)
+            case yaml.MappingStartEvent() | yaml.SequenceStartEvent():
+                self._on_start(event)
+            case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
+                self._on_end()
+            case yaml.AliasEvent():
+                self._on_alias(event)
+            case yaml.DocumentStartEvent() if self.root is not None:
+                self._on_second_document(event)
+
+    def _on_second_document(self, event: yaml.DocumentStartEvent) -> None:
+        span = span_at(self._source, event.start_mark, 3)
+        message = "a second document starts here"
+        hint = "put each system or node type into its own file"
+        raise Stopped(Diagnostic(rules.YAML_SYNTAX, message, span, hint=hint))
+
+    def _on_scalar(self, event: yaml.ScalarEvent) -> None:
+        self._count(1, event.start_mark)
+        scalar = self._scalar(event)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = _Anchored(scalar, 1, 0)
+        parent = self._open[-1] if self._open else None
+        if parent is None or not parent.is_map or parent.awaits_value:
+            self._add(scalar, 1, 0)
+            if parent is not None and parent.is_flow and scalar.value is None:
+                self._check_value_in_braces(parent, scalar)
+            return
+        parent.values += 1
+        parent.awaits_value = True
+        parent.key = self._key(scalar, event, parent)
+
+    def _on_start(self, event: yaml.CollectionStartEvent) -> None:
+        self._count(1, event.start_mark)
+        if event.tag is not None:
+            self._report_tag(event.tag, event.start_mark)
+        is_map = isinstance(event, yaml.MappingStartEvent)
+        start = span_at(self._source, event.start_mark)
+        if len(self._open) >= MAX_DEPTH:
+            message = f"maps and lists are nested more than {MAX_DEPTH} levels deep"
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, start))
+        if event.anchor is not None:
+            self._anchors[event.anchor] = None
+        self._open.append(_Open(start, is_map, bool(event.flow_style), event.anchor))
+
+    def _on_end(self) -> None:
+        ended = self._open.pop()
+        tree = ended.tree()
+        if ended.anchor is not None:
+            self._anchors[ended.anchor] = _Anchored(tree, ended.values, ended.height)
+        self._add(tree, ended.values, ended.height)
+
+    def _on_alias(self, event: yaml.AliasEvent) -> None:
+        anchor = event.anchor or ""
+        name = shown(anchor)
+        span = span_at(self._source, event.start_mark, len(anchor) + 1)
+        anchored = self._anchors.get(anchor)
+        if anchored is None:
+            inside = anchor in self._anchors
+            message = (
+                f"'*{name}' is part of the value that it repeats" if inside else _undefined(name)
+            )
+            hint = None if inside else f"mark the value with '&{name}', or quote the text"
+            raise Stopped(Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint=hint))
+        if self._open and self._open[-1].is_map and not self._open[-1].awaits_value:
+            message = f"found the alias '*{name}', expected a key"
+            raise Stopped(
+                Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint="write out the key")
+            )
+        self._count(anchored.values, event.start_mark)
+        if len(self._open) + anchored.height > MAX_DEPTH:
+            message = f"with '*{name}', values are nested more than {MAX_DEPTH} levels deep"
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
+        self._add(anchored.tree, anchored.values, anchored.height)
+
+    def _add(self, tree: Tree, values: int, height: int) -> None:
+        """Add a complete value to its parent."""
+        if not self._open:
+            self._finish(tree)
+            return
+        parent = self._open[-1]
+        parent.values += values
+        parent.height = max(parent.height, height + 1)
+        if not parent.is_map:
+            parent.items.append(tree)
+        elif parent.awaits_value:
+            if parent.key is not None:
+                parent.entries.append(Entry(parent.key, tree))
+            parent.awaits_value = False
+        else:
+            hint = "quote a string with braces or brackets"
+            self._report(
+                rules.UNSUPPORTED_YAML,
+                f"a key must be a string, found {describe(tree)}",
+                tree.span,
+                hint,
+            )
+            parent.awaits_value, parent.key = True, None
+
+    def _finish(self, tree: Tree) -> None:
+        self.root = tree
+
+    def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
+        if event.tag is not None:
+            self._report_tag(event.tag, event.start_mark)
+        span, verbatim, offset = scalar_span(self._source, event)
+        value: ScalarValue = event.value
+        if not event.style:  # unquoted: None from PyYAML's parser, "" from libyaml's
+            if event.tag is None:
+                value = self._plain(event.value, span)
+        else:
+            value, diagnostics = check_value(event.value, span)
+            self.diagnostics += diagnostics
+        return Scalar(value, span, verbatim, offset)
+
+    def _plain(self, text: str, span: Span) -> ScalarValue:
+        try:
+            return self._resolve(text)
+        except NumberRefused as refusal:
+            hint = "leave the key out for no limit; quote the value if it is a string"
+            self._report(rules.BAD_NUMBER, f"'{shown(text)}' {refusal}", span, hint)
+            return 1  # a placeholder, so that no other diagnostic follows
+
+    def _key(self, scalar: Scalar, event: yaml.ScalarEvent, parent: _Open) -> Scalar | None:
+        if scalar.value == "<<" and not event.style:
+            hint = "write out the keys; put what nodes share into a node type or qos_profiles"
+            self._report(
+                rules.UNSUPPORTED_YAML, "YAML merge keys are not supported", scalar.span, hint
+            )
+            return None
+        if scalar.value is None and not event.value:
+            self._report(
+                rules.UNSUPPORTED_YAML, "a key is missing before this ':'", scalar.span, None
+            )
+            return None
+        key = scalar
+        if not isinstance(scalar.value, str):
+            text = shown(event.value)
+            message = f"a key must be a string, found {describe(scalar)}"
+            self._report(rules.UNSUPPORTED_YAML, message, scalar.span, f"quote it: '{text}'")
+            key = Scalar(event.value, scalar.span, scalar.verbatim, scalar.content_offset)
+        first = parent.keys.setdefault(str(key.value), key)
+        if first is key:
+            return key
+        label = Label(first.span, "first here")
+        message = f"duplicate key '{shown(key.value)}'"
+        hint = "rename one of them, or merge their values"
+        self.diagnostics.append(Diagnostic(rules.DUPLICATE_KEY, message, key.span, (label,), hint))
+        return None
+
+    def _check_value_in_braces(self, parent: _Open, value: Scalar) -> None:
+        """Report ``{message.data}`` and ``{rate_hz:10}``: to YAML, keys without values."""
+        key = parent.key
+        if not parent.is_map or key is None or key.content_offset or not key.verbatim:
+            return
+        if _follows_colon(self._source.line(value.span.line), value.span.column - 1):
+            return
+        name, colon, rest = str(key.value).partition(":")
+        if colon and name and rest and name.isidentifier():
+            message = f"there is no space after the colon of '{shown(key.value)}'"
+            hint = f"write '{shown(f'{name}: {rest}')}'"
+            self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
+            value = Scalar(self._plain(rest, key.span), key.part(len(name) + 1, len(rest)))
+            parent.entries[-1] = Entry(Scalar(name, key.part(0, len(name))), value)
+            return
+        text = f"{{{key.value}}}"
+        message = f"'{shown(text)}' is a map whose key has no value"
+        hint = f'quote it if it is an expression: "{shown(text)}"'
+        self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
+        parent.text_in_braces = Scalar(text, parent.start, verbatim=False)
+
+    def _report_tag(self, tag: str, mark: Mark | None) -> None:
+        hint = "remove it, and quote the value if it is a string"
+        message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not supported"
+        self._report(rules.UNSUPPORTED_YAML, message, span_at(self._source, mark), hint)
+
+    def _count(self, values: int, mark: Mark | None) -> None:
+        self._values += values
+        if self._values > MAX_VALUES:
+            message = f"this file has more than {MAX_VALUES:,} values"
+            span = span_at(self._source, mark)
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
+
+    def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
+        # What else is reported on the line of a key without its value may follow from it.
+        lines = (line_subject(span),) if rule is rules.KEY_WITHOUT_VALUE else ()
+        self.diagnostics.append(Diagnostic(rule, message, span, hint=hint, subjects=lines))
+
+
+def _follows_colon(line: str, end: int) -> bool:
+    """Return whether the last character before ``end``, apart from blanks, is a colon."""
+    while end > 0 and line[end - 1].isspace():
+        end -= 1
+    return line[end - 1 : end] == ":"
+
+
+def _undefined(name: str) -> str:
+    return f"'*{name}' is an alias, but no value before it is marked '&{name}'"

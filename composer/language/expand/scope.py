@@ -1,0 +1,168 @@
+"""The variables of a file: declarations, arguments and values, and in which order to read them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from collections.abc import Mapping as Map
+from dataclasses import field
+
+from composer.base.diagnostics import nearest, shown
+from composer.base.fast_dataclass import dataclass
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+#: Maximum number of comparisons for hints in one file, to limit the time.
+_MAX_COMPARISONS = 20_000
+
+#: Maximum number of names in a hint.
+_MAX_NAMES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Sized:
+    """A tree without variables, its number of values and its nesting depth."""
+
+    tree: Tree
+    values: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A declared variable; ``value`` is None if an argument is required."""
+
+    key: Scalar
+    value: Tree | None
+
+
+@dataclass(slots=True)
+class Scope:
+    """The names in a file and their values.
+
+    ``values`` are the variables evaluated so far. A declared variable without a value, because it
+    was not given or is part of a cycle, stays as written.
+    """
+
+    declared: dict[str, Declared]
+    is_known: bool  # False if the section is malformed, so that the declarations are unknown
+    values: dict[str, Sized] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+    outer: Scope | None = None
+    _compared: int = 0
+
+    def inner(self, declared: dict[str, Declared], *, is_known: bool = True) -> Scope:
+        """Return a nested scope in which these names take precedence."""
+        values = {
+            name: measure(variable.value)
+            for name, variable in declared.items()
+            if variable.value is not None
+        }
+        return Scope(declared, self.is_known and is_known, values, outer=self)
+
+    def find(self, name: str) -> Sized | None:
+        """Return the value of ``name`` if it is known, and count it as used."""
+        if name in self.declared or self.outer is None:
+            self.used.add(name)
+            return self.values.get(name)
+        return self.outer.find(name)
+
+    def declares(self, name: str) -> bool:
+        """Return whether ``name`` is a declared variable."""
+        return name in self.declared or (self.outer is not None and self.outer.declares(name))
+
+    def hint(self, name: str) -> str | None:
+        """Return the nearest declared name as a hint, or None after too many comparisons.
+
+        That name counts as used.
+        """
+        if self.outer is not None:
+            close = nearest(name, self.declared)
+            if close is not None:
+                return f"did you mean '{close}'?"
+            names = ", ".join(f"'{shown(known)}'" for known in list(self.declared)[:_MAX_NAMES])
+            sets = f"'for_each' sets {names}" if names else None
+            return self.outer.hint(name) or sets
+        self._compared += len(self.declared)
+        close = nearest(name, self.declared) if self._compared <= _MAX_COMPARISONS else None
+        if close is None:
+            return None
+        self.used.add(close)
+        return f"did you mean '{close}'?"
+
+
+def read_scope(tree: Mapping, is_node_type: bool) -> Scope:
+    """Return the variables that a file declares, not yet evaluated.
+
+    A system declares values, a node type defaults.
+    """
+    section = tree.get("variables")
+    if section is None:
+        return Scope({}, is_known=True)
+    if not isinstance(section, Mapping):
+        return Scope({}, is_known=False)
+    read = _default if is_node_type else _value
+    return Scope({entry.name: Declared(entry.key, read(entry)) for entry in section}, is_known=True)
+
+
+def _value(entry: Entry) -> Tree | None:
+    return entry.value
+
+
+def _default(entry: Entry) -> Tree | None:
+    return entry.value.get("default") if isinstance(entry.value, Mapping) else None
+
+
+def measure(tree: Tree) -> Sized:
+    """Return an expanded tree with its size."""
+    match tree:
+        case Scalar():
+            return Sized(tree, 1, 0)
+        case Sequence():
+            parts = [measure(item) for item in tree.items]
+        case Mapping():
+            parts = [measure(entry.value) for entry in tree]
+    keys = len(parts) if isinstance(tree, Mapping) else 0
+    values = 1 + keys + sum(part.values for part in parts)
+    return Sized(tree, values, 1 + max((part.height for part in parts), default=0))
+
+
+def dependency_order(uses: Map[str, Iterable[str]]) -> tuple[list[str], list[list[str]]]:
+    """Return the names, each after those that it uses, and the cycles.
+
+    The order leaves out names on a cycle and names that use them. Of cycles that share names, one
+    is returned. The time is linear in the number of uses.
+    """
+    needs = {name: dict.fromkeys(used for used in uses[name] if used in uses) for name in uses}
+    users: dict[str, list[str]] = {name: [] for name in uses}
+    for name, used in needs.items():
+        for other in used:
+            users[other].append(name)
+    missing = {name: len(used) for name, used in needs.items()}
+    ready = deque(name for name, count in missing.items() if count == 0)
+    order = []
+    while ready:
+        name = ready.popleft()
+        order.append(name)
+        for user in users[name]:
+            missing[user] -= 1
+            if missing[user] == 0:
+                ready.append(user)
+    return order, _cycles({name: needs[name] for name, count in missing.items() if count})
+
+
+def _cycles(needs: Map[str, Iterable[str]]) -> list[list[str]]:
+    """Return the cycles among names that each need another of them."""
+    following = {name: next(used for used in needs[name] if used in needs) for name in needs}
+    walk_of: dict[str, str] = {}  # by name: the start of the walk that first visited it
+    cycles = []
+    for start in needs:
+        name = start
+        while name not in walk_of:
+            walk_of[name] = start
+            name = following[name]
+        if walk_of[name] == start:
+            cycle = [name]
+            while following[cycle[-1]] != name:
+                cycle.append(following[cycle[-1]])
+            cycles.append(cycle)
+    return cycles

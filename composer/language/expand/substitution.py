@@ -1,0 +1,259 @@
+"""Find the references to variables (``${name}``) in a tree, and replace them, within limits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import field
+
+from composer.base.diagnostics import Diagnostic, Label, Rule, shown
+from composer.base.fast_dataclass import dataclass
+from composer.language.document.error_limit import LimitedDiagnostics
+from composer.language.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
+from composer.language.document.rules import DUPLICATE_KEY, TOO_LARGE
+from composer.language.expand import rules
+from composer.language.expand.scope import Scope, Sized
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
+
+_MARK = "${"
+_PIECE = re.compile(
+    r"(?P<literal>\$\$\{)"  # a literal ``${``
+    r"|\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)\}"
+    r"|\$\{[^}]*\}?"  # a malformed reference
+)
+#: Depth of the names of nodes, which are checked first.
+_KEY_DEPTH = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A ``${name}`` and its offset in the text. ``name`` is None if it is malformed."""
+
+    name: str | None
+    start: int
+    written: str
+
+
+def pieces(text: str) -> list[str | Reference]:
+    """Split ``text`` into texts and references. ``$${`` is a literal ``${``."""
+    found: list[str | Reference] = []
+    end = 0
+    for match in _PIECE.finditer(text):
+        found.append(text[end : match.start()])
+        if match["literal"] is not None:
+            found.append(_MARK)
+        else:
+            found.append(Reference(match["name"], match.start(), match[0]))
+        end = match.end()
+    found.append(text[end:])
+    return [piece for piece in found if piece != ""]
+
+
+def has_reference(text: str) -> bool:
+    """Return whether ``text`` contains a reference or an escape."""
+    return _MARK in text
+
+
+def references(tree: Tree) -> Iterator[str]:
+    """Yield the names that the texts of ``tree`` refer to."""
+    match tree:
+        case Scalar(value=str() as text) if has_reference(text):
+            for piece in pieces(text):
+                if isinstance(piece, Reference) and piece.name is not None:
+                    yield piece.name
+        case Sequence():
+            for item in tree.items:
+                yield from references(item)
+        case Mapping():
+            for entry in tree:
+                yield from references(entry.key)
+                yield from references(entry.value)
+
+
+class TooLarge(Exception):
+    """The expanded file exceeds a limit; ``diagnostic`` says where."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+@dataclass(slots=True)
+class Growth:
+    """The size of an expanded file."""
+
+    values: int = 0
+    characters: int = 0
+    copies: int = 0
+
+
+@dataclass(slots=True)
+class Substitution:
+    """Replaces the variables of one file in its trees, and counts the size."""
+
+    scope: Scope
+    diagnostics: LimitedDiagnostics = field(default_factory=LimitedDiagnostics)
+    growth: Growth = field(default_factory=Growth)
+    unknown: set[str] = field(default_factory=set)  # names of undeclared variables
+
+    def within(self, scope: Scope) -> Substitution:
+        """Return a substitution for another scope that shares the counts."""
+        return Substitution(scope, self.diagnostics, self.growth, self.unknown)
+
+    def evaluate(self, tree: Tree, depth: int = 0) -> Sized:
+        """Return ``tree``, nested in ``depth`` maps and lists, with its variables replaced.
+
+        Values keep the location where they were written. Raises TooLarge.
+        """
+        self.growth.values = 0
+        return self.add(tree, depth)
+
+    def grow(self, values: int, tree: Tree) -> None:
+        """Count values that are inserted at ``tree``. Raises TooLarge."""
+        self.growth.values += values
+        if self.growth.values > MAX_VALUES:
+            message = f"with its variables expanded, this file has more than {MAX_VALUES:,} values"
+            raise self._too_large(tree, message)
+
+    def grow_copies(self, copies: int, tree: Tree) -> None:
+        """Count the copies that ``tree`` makes. Raises TooLarge."""
+        self.growth.copies += copies
+        if self.growth.copies > MAX_COPIES:
+            message = f"with this, the file makes more than {MAX_COPIES:,} copies"
+            raise self._too_large(tree, message, "use fewer values")
+
+    def add(self, tree: Tree, depth: int) -> Sized:
+        """Return ``tree`` with its variables replaced, adding to the counts."""
+        match tree:
+            case Scalar():
+                return self._scalar(tree, depth)
+            case Sequence():
+                return self._sequence(tree, depth)
+            case Mapping():
+                return self._mapping(tree, depth)
+
+    def _sequence(self, tree: Sequence, depth: int) -> Sized:
+        self.grow(1, tree)
+        parts = [self.add(item, depth + 1) for item in tree.items]
+        if any(part.tree is not item for part, item in zip(parts, tree.items, strict=True)):
+            tree = Sequence(tuple(part.tree for part in parts), tree.span)
+        return _sized(tree, parts, keys=0)
+
+    def _mapping(self, tree: Mapping, depth: int) -> Sized:
+        self.grow(1 + len(tree.entries), tree)
+        parts = [self.add(entry.value, depth + 1) for entry in tree]
+        keys = [self.key(entry.key) for entry in tree]
+        made = list(zip(keys, parts, tree.entries, strict=True))
+        if any(key is not entry.key or part.tree is not entry.value for key, part, entry in made):
+            self._check_keys(tree, keys)
+            entries = tuple(Entry(key, part.tree) for key, part, _ in made)
+            tree = Mapping(entries, tree.span)
+        return _sized(tree, parts, keys=len(parts))
+
+    def key(self, key: Scalar) -> Scalar:
+        """Return a key with its variables replaced, at its location. Raises TooLarge."""
+        if not isinstance(key.value, str) or not has_reference(key.value):
+            return key
+        name = self.add(key, _KEY_DEPTH).tree
+        if not isinstance(name, Scalar):
+            message = f"'{shown(key.value)}' is {describe(name)}, which cannot be a name"
+            self.diagnostics.append(Diagnostic(rules.MALFORMED_VARIABLE, message, key.span))
+            return key
+        text = name.value if isinstance(name.value, str) else shown(name.value)
+        return Scalar(text, key.span, verbatim=False)
+
+    def _check_keys(self, tree: Mapping, keys: list[Scalar]) -> None:
+        """Report keys that are equal once their variables are replaced."""
+        first: dict[object, Scalar] = {}
+        for key, entry in zip(keys, tree.entries, strict=True):
+            earlier = first.setdefault(key.value, key)
+            if earlier is not key and (key is not entry.key or not earlier.verbatim):
+                message = f"the key '{shown(key.value)}' is repeated"
+                label = Label(earlier.span, "the other one")
+                self.diagnostics.append(Diagnostic(DUPLICATE_KEY, message, key.span, (label,)))
+
+    def _scalar(self, scalar: Scalar, depth: int) -> Sized:
+        if not isinstance(scalar.value, str) or not has_reference(scalar.value):
+            self.grow(1, scalar)
+            return Sized(scalar, 1, 0)
+        match pieces(scalar.value):
+            case [Reference() as reference]:
+                return self._whole(reference, scalar, depth)
+            case parts:
+                self.grow(1, scalar)
+                text = "".join(self._part(part, scalar) for part in parts)
+                return Sized(Scalar(text, scalar.span, verbatim=False), 1, 0)
+
+    def _whole(self, reference: Reference, scalar: Scalar, depth: int) -> Sized:
+        """Return the value of a scalar that is a single reference."""
+        found = self._find(reference, scalar)
+        if found is None:
+            self.grow(1, scalar)
+            return Sized(scalar, 1, 0)
+        self.grow(found.values, scalar)
+        if depth + found.height > MAX_DEPTH:
+            raise self._too_large(
+                scalar,
+                f"with its variables expanded, this is nested more than {MAX_DEPTH} levels deep",
+            )
+        return found
+
+    def _part(self, part: str | Reference, scalar: Scalar) -> str:
+        """Return the text of a part of a scalar."""
+        if isinstance(part, str):
+            return part
+        found = self._find(part, scalar)
+        if found is None:
+            return part.written
+        if not isinstance(found.tree, Scalar):
+            kind = "map" if isinstance(found.tree, Mapping) else "list"
+            message = f"'{part.written}' is a {kind}, which cannot be inserted into a string"
+            self._report(rules.MALFORMED_VARIABLE, message, part, scalar)
+            return part.written
+        text = found.tree.value if isinstance(found.tree.value, str) else shown(found.tree.value)
+        self.growth.characters += len(text)
+        if self.growth.characters > MAX_BYTES:
+            raise self._too_large(
+                scalar, f"variables put more than {MAX_BYTES:,} characters into the file"
+            )
+        return text
+
+    def _find(self, reference: Reference, scalar: Scalar) -> Sized | None:
+        name = reference.name
+        if name is None:
+            message = f"'{shown(reference.written)}' is not a variable: expected '${{name}}'"
+            hint = "write '$${' for a literal '${', and '{...}' for an expression"
+            self._report(rules.MALFORMED_VARIABLE, message, reference, scalar, hint)
+            return None
+        found = self.scope.find(name)
+        if not self.scope.declares(name) and self.scope.is_known:
+            self.unknown.add(name)
+            message = f"there is no variable '{shown(name)}'"
+            hint = self.scope.hint(name) or "declare it under 'variables'"
+            subject = ("variable", f"{scalar.span.file.path}: {name}")
+            span = scalar.part(reference.start, len(reference.written))
+            self.diagnostics.append(
+                Diagnostic(rules.UNKNOWN_VARIABLE, message, span, hint=hint, subjects=(subject,))
+            )
+        return found
+
+    def _too_large(
+        self, tree: Tree, message: str, hint: str = "use shorter values, or fewer variables"
+    ) -> TooLarge:
+        return TooLarge(Diagnostic(TOO_LARGE, message, tree.span, hint=hint))
+
+    def _report(
+        self,
+        rule: Rule,
+        message: str,
+        reference: Reference,
+        scalar: Scalar,
+        hint: str | None = None,
+    ) -> None:
+        span = scalar.part(reference.start, len(reference.written))
+        self.diagnostics.append(Diagnostic(rule, message, span, hint=hint))
+
+
+def _sized(tree: Tree, parts: list[Sized], keys: int) -> Sized:
+    values = 1 + keys + sum(part.values for part in parts)
+    return Sized(tree, values, 1 + max((part.height for part in parts), default=0))

@@ -1,0 +1,58 @@
+"""Check the structure of files with JSON Schema: keys and types of values.
+
+Editors use the same schemas (``schemas/``). Errors of jsonschema are reported with the location of
+the key or value, in terms of the language.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+from composer.base.diagnostics import Diagnostic
+from composer.base.resources import schemas_folder
+from composer.language.schema import rules  # noqa: F401 - registers the rules
+from composer.language.schema.fast_check import Check, compile_check
+from composer.language.tree import Mapping, plain
+
+__all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
+
+#: The kinds of files, each with a schema of that name and marked by a key of that name.
+KINDS = ("system", "node")
+SCHEMAS = (*KINDS, "project")
+#: The schema of the output of ``compose validate --format json``.
+REPORT = "report"
+
+
+def kind_of(tree: Mapping) -> str | None:
+    """Return ``system`` or ``node``, whichever key comes first; None without either."""
+    return next((entry.name for entry in tree if entry.name in KINDS), None)
+
+
+def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
+    """Return the schema diagnostics of a file of ``kind``.
+
+    The tree has its variables expanded. A load-time variable without value is valid anywhere.
+    """
+    content = plain(tree)
+    if _compiled(kind)(content):
+        return []
+    # jsonschema takes a tenth of a second to import, and most files are valid.
+    from composer.language.schema.validation import explain  # noqa: PLC0415
+
+    return explain(content, tree, kind, schema(kind))
+
+
+def schema(name: str) -> dict[str, Any]:
+    """Return the JSON Schema (draft-07) called ``name``, of SCHEMAS or REPORT. Raises KeyError."""
+    if name not in (*SCHEMAS, REPORT):
+        raise KeyError(name)
+    text = (schemas_folder() / f"{name}.schema.json").read_text(encoding="utf-8")
+    content: dict[str, Any] = json.loads(text)
+    return content
+
+
+@cache
+def _compiled(kind: str) -> Check:
+    return compile_check(schema(kind))

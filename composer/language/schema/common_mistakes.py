@@ -1,0 +1,104 @@
+"""Common wrong keys, such as those of other tools, and the keys to suggest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+
+from composer.base.diagnostics import nearest, suggestion
+
+_INTENDED: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("frequency", "freq", "hz", "rate", "frequency_hz"), ("rate_hz",)),
+    **dict.fromkeys(("period", "interval", "interval_ms", "period_s", "every"), ("period_ms",)),
+    **dict.fromkeys(("subscriber", "subscribers", "subscribes"), ("subscriptions", "to")),
+    "subscription": ("subscriptions", "to"),
+    "publisher": ("publishers", "from"),
+    "publishes": ("publishers", "publish"),
+    **dict.fromkeys(("source", "sources"), ("from",)),
+    **dict.fromkeys(("target", "targets", "sink", "sinks", "destination"), ("to",)),
+    "from": ("server",),
+    "to": ("clients",),
+    "server": ("services", "action_servers"),
+    "client": ("clients", "action_clients"),
+    "actions": ("action_servers",),
+    **dict.fromkeys(("params", "arguments", "args"), ("parameters",)),
+    **dict.fromkeys(("remap", "remaps"), ("remappings",)),
+    "ns": ("namespace",),
+    **dict.fromkeys(("msg_type", "message_type", "srv_type", "action_type", "msg"), ("type",)),
+    "interface": ("type",),
+    **dict.fromkeys(("qos_profile", "profile"), ("qos",)),
+    **dict.fromkeys(("queue_size", "queue_depth", "queue"), ("depth",)),
+    "lease_duration": ("liveliness_lease_duration_ms",),
+    **dict.fromkeys(("min", "min_value", "from_value"), ("minimum",)),
+    **dict.fromkeys(("max", "max_value", "to_value"), ("maximum",)),
+    **dict.fromkeys(("enum", "options", "values", "one_of"), ("choices",)),
+    **dict.fromkeys(("value", "default_value", "initial"), ("default",)),
+    "doc": ("description",),
+    "if": ("when",),
+    "condition": ("when", "accept"),
+    "print": ("log",),
+    **dict.fromkeys(("reply", "response", "answer"), ("respond", "on_response")),
+    "send": ("publish", "call"),
+    "on_error": ("on_failure",),
+    "on_goal": ("accept",),
+    **dict.fromkeys(("depends", "after", "requires"), ("depends_on",)),
+    "auto_start": ("autostart",),
+    **dict.fromkeys(("plugin", "python", "script"), ("behavior", "class")),
+    **dict.fromkeys(("exec", "exe", "binary"), ("executable", "name")),
+    **dict.fromkeys(("pkg", "ros_package"), ("package",)),
+    **dict.fromkeys(("args", "argv"), ("arguments",)),
+    **dict.fromkeys(("env", "env_vars"), ("environment",)),
+    **dict.fromkeys(("cwd", "workdir"), ("working_directory",)),
+    "num_threads": ("threads",),
+    "memory": ("state",),
+    "components": ("nodes",),
+    "links": ("connections",),
+}
+
+_ADVICE: dict[tuple[str, str], str] = {
+    ("node", "behavior"): "remove it; the type determines the behavior of a node",
+    ("inline node", "variables"): "only a node with a 'type' has variables",
+    ("inline node", "topics"): "declare topics under 'publishers' and 'subscriptions'",
+    ("node type", "topics"): "declare topics under 'publishers' and 'subscriptions'",
+    ("inline node", "package"): "write 'executable: {package: ..., name: ...}'",
+    ("node type", "package"): "write 'executable: {package: ..., name: ...}'",
+    ("node", "class"): "remove it; the type determines the class of a node",
+    ("publisher", "publish"): "publish from a subscription, a timer or a service",
+    ("subscription", "callback"): "declare the reaction here: when, set, log, publish, call",
+    ("timer", "callback"): "declare the reaction here: when, set, log, publish, call",
+    ("service", "when"): "remove it; every request gets a response",
+}
+
+
+def intended_key(name: str, valid: Iterable[str]) -> str | None:
+    """Return the key among ``valid`` that ``name`` is most likely meant to be, or None."""
+    return _intended_key(name, frozenset(valid))
+
+
+# The same mistake is often repeated.
+@lru_cache(maxsize=1024)
+def _intended_key(name: str, keys: frozenset[str]) -> str | None:
+    known = next((key for key in _INTENDED.get(name.casefold(), ()) if key in keys), None)
+    return known or nearest(name, keys)
+
+
+def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
+    """Return the hint for the unknown key ``name`` in a map with the title ``owner``."""
+    keys = set(valid)
+    if (owner, name) in _ADVICE:
+        return _ADVICE[owner, name]
+    key = intended_key(name, keys)
+    return f"did you mean '{key}'?" if key is not None else suggestion(name, keys, limit=12)
+
+
+def value_advice(path: Sequence[str | int], value: object) -> str | None:
+    """Return the hint for a ``value`` of the wrong type at ``path``, or None."""
+    *_, parent, key = ("", "", *path)
+    if parent == "parameters" and isinstance(value, dict) and value:
+        return f"write a nested name with a dot: '{key}.{next(iter(value))}: ...'"
+    items = value if isinstance(value, list) else [value]
+    if key == "parameters" and any(isinstance(item, str) for item in items):
+        return "list parameter files under 'parameter_files' of the system"
+    if key == "namespace" and isinstance(value, list) and value:
+        return f"write '{'/'.join(map(str, value))}'"
+    return None

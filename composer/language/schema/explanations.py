@@ -1,0 +1,319 @@
+"""Explain errors of jsonschema in terms of the language, with their locations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from composer.base.diagnostics import Diagnostic, Label, nearest, shown
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
+from composer.language.document.error_limit import LimitedDiagnostics, TooManyErrors
+from composer.language.document.limits import MAX_ERRORS
+from composer.language.schema import rules
+from composer.language.schema.common_mistakes import advice, intended_key, value_advice
+from composer.language.schema.expectations import expected, type_hint
+from composer.language.schema.locations import TreeIndex, TreeValue
+from composer.language.tree import Entry, describe
+
+if TYPE_CHECKING:
+    from jsonschema import ValidationError
+
+Path = tuple[str | int, ...]
+
+#: Keys that determine which other keys are valid, and the titles of schemas that have them.
+_DECIDING = frozenset({"type", "topic", "service", "action"})
+_DECIDED = frozenset({"inline node", "connection"})
+
+#: The ends of each form of connection, by the title of its schema.
+_ENDS = {
+    "topic connection": ("from", "to"),
+    "service connection": ("server", "clients"),
+    "action connection": ("server", "clients"),
+}
+
+#: Example values for missing keys, by the title of the schema.
+_EXAMPLES = {
+    **dict.fromkeys(
+        (("publisher", "type"), ("subscription", "type")),
+        "std_msgs/msg/String",
+    ),
+    **dict.fromkeys((("service", "type"), ("client", "type")), "std_srvs/srv/Trigger"),
+    **dict.fromkeys(
+        (("action server", "type"), ("action client", "type")),
+        "composer_interfaces/action/Navigate",
+    ),
+    ("parameter", "type"): "double",
+    ("feedback", "count"): "10",
+    ("feedback", "period_ms"): "100",
+    ("system", "nodes"): "{talker: {type: timer_source}}",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _SchemaError:
+    """An error of jsonschema with its location."""
+
+    path: Path
+    validator: str
+    required: Any  # the value of the keyword in the schema
+    instance: Any
+    schema: dict[str, Any]
+    place: TreeValue
+    index: TreeIndex
+
+    @property
+    def owner(self) -> str:
+        """The name of the value for messages: ``timer 'tick'``."""
+        title = self.schema.get("title")
+        name = self.path[-1] if self.path else None
+        if title is None:
+            return f"'{shown(name)}'" if isinstance(name, str) else "this"
+        if not isinstance(name, str) or name == title:
+            return f"a {title}" if not self.path else f"this {title}"
+        return f"{title} '{shown(name)}'"
+
+    @property
+    def owner_span(self) -> Span:
+        """The location of the value or its key; for a whole file, that of its first key."""
+        first = next(iter(self.index.root), None)
+        if not self.path and first is not None:
+            return first.key.span
+        return self.place.owner_span
+
+    @property
+    def subject(self) -> str:
+        """The key of a value of the wrong type, for messages: `` for 'period_ms'``."""
+        if not self.path:
+            return ""
+        if isinstance(self.path[-1], str):
+            return f" for '{shown(self.path[-1])}'"
+        return f" in '{shown(self.path[-2])}'" if len(self.path) > 1 else ""
+
+    @property
+    def unknown(self) -> list[str]:
+        """The keys that the schema does not have."""
+        unknown = (key for key in self.instance if key not in self.schema["properties"])
+        return list(islice(unknown, MAX_ERRORS + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class _MisspelledKeys:
+    """The intended names of misspelled keys, to avoid follow-up errors."""
+
+    keys: set[tuple[Path, str]]
+    deciding: set[Path]  # where the intended key determines which other keys are valid
+    missing: dict[Path, str]  # the one required key that is missing where one key is unknown
+
+    @classmethod
+    def among(cls, errors: Sequence[_SchemaError]) -> _MisspelledKeys:
+        keys = set()
+        deciding = set()
+        unknown = [item for item in errors if item.validator == "additionalProperties"]
+        single = {item.path for item in unknown if len(item.unknown) == 1}
+        missing = {
+            item.path: names[0]
+            for item in errors
+            if item.validator == "required" and item.path in single
+            if len(names := [name for name in item.required if name not in item.instance]) == 1
+        }
+        for error in errors:
+            if error.validator != "additionalProperties":
+                continue
+            found = {_intended_key(error, name) for name in error.unknown} - {None}
+            keys |= {(error.path, str(key)) for key in found}
+            if error.schema.get("title") in _DECIDED and found & _DECIDING:
+                deciding.add(error.path)
+        return cls(keys, deciding, missing)
+
+    def covers(self, error: _SchemaError) -> bool:
+        """Return whether ``error`` may only follow from a misspelled key."""
+        if error.validator == "additionalProperties" and error.path in self.deciding:
+            return False
+        return bool(self.deciding) and any(
+            error.path[:length] in self.deciding for length in range(1, len(error.path) + 1)
+        )
+
+
+def explain_errors(errors: Iterable[ValidationError], index: TreeIndex) -> list[Diagnostic]:
+    """Return the diagnostics for ``errors``, without those that only follow from another."""
+    located = [_located(error, index) for error in islice(errors, MAX_ERRORS + 1)]
+    misspelled = _MisspelledKeys.among(located)
+    diagnostics = LimitedDiagnostics()
+    try:
+        for error in located:
+            if not misspelled.covers(error):
+                diagnostics += _EXPLAINERS[error.validator](error, misspelled)
+    except TooManyErrors as stopped:
+        return stopped.diagnostics
+    return list(dict.fromkeys(diagnostics))
+
+
+def _located(error: ValidationError, index: TreeIndex) -> _SchemaError:
+    path = tuple(error.absolute_path)
+    schema = error.schema if isinstance(error.schema, dict) else {}
+    return _SchemaError(
+        path,
+        str(error.validator),
+        error.validator_value,
+        error.instance,
+        schema,
+        index.find(path),
+        index,
+    )
+
+
+def _intended_key(error: _SchemaError, name: str) -> str | None:
+    key = intended_key(name, error.schema["properties"])
+    return key if key is not None and key not in error.instance else None
+
+
+def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+    entries = error.index.entries(error.place.tree)
+    if _has_other_ends(error):
+        yield _other_ends(error, entries)
+        return
+    valid = error.schema["properties"]
+    unused = [key for key in valid if key not in error.instance]
+    for name in error.unknown:
+        if error.path in misspelled.deciding and _intended_key(error, name) not in _DECIDING:
+            continue
+        message = f"'{shown(name)}' is not a key of {error.owner}"
+        hint = advice(name, error.schema.get("title", ""), unused)
+        meant = _intended_key(error, name)
+        needed = misspelled.missing.get(error.path)
+        if needed is not None and f"'{needed}'" not in str(hint):
+            hint = f"it needs the key '{needed}'"
+        subjects = () if meant is None else (("key", meant),)
+        span = entries[name].key.span
+        yield Diagnostic(rules.UNKNOWN_KEY, message, span, hint=hint, subjects=subjects)
+
+
+def _has_other_ends(error: _SchemaError) -> bool:
+    """Return whether a connection only has ends of another form: a topic with a server."""
+    title = error.schema.get("title", "")
+    if title not in _ENDS:
+        return False
+    others = {end for ends in _ENDS.values() for end in ends} - set(_ENDS[title])
+    found = others.intersection(error.instance)
+    # A single key may also be a slip.
+    is_meant = len(found) > 1 or (title == "topic connection" and len(found) == 1)
+    return is_meant and set(_ENDS[title]).isdisjoint(error.instance)
+
+
+def _other_ends(error: _SchemaError, entries: dict[str, Entry]) -> Diagnostic:
+    """Report the key with the name of a connection that has the ends of another form."""
+    title = error.schema["title"]
+    kind = title.removesuffix(" connection")
+    given = [end for end in dict.fromkeys(sum(_ENDS.values(), ())) if end in error.instance]
+    ends = " and ".join(f"'{end}'" for end in given)
+    own = " and ".join(f"'{end}'" for end in _ENDS[title])
+    fitting = [name for name in _ENDS if given[0] in _ENDS[name]]
+    forms = " or ".join(f"'{name.removesuffix(' connection')}'" for name in fitting)
+    article = "an" if kind == "action" else "a"
+    message = f"{article} {title} has {own}, not {ends}"
+    hint = f"write {forms} instead of '{kind}', or {own}"
+    return Diagnostic(rules.UNKNOWN_KEY, message, entries[kind].key.span, hint=hint)
+
+
+def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+    if error.path in misspelled.missing:
+        return
+    for name in error.required:
+        if name not in error.instance and (error.path, name) not in misspelled.keys:
+            message = f"{error.owner} needs the key '{name}'"
+            example = _EXAMPLES.get((error.schema.get("title", ""), name))
+            hint = f"for example '{name}: {example}'" if example is not None else None
+            yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
+
+
+def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+    names = [name for choice in error.required for name in choice["required"]]
+    if _has_other_ends(error):
+        return
+    if not any((error.path, name) in misspelled.keys for name in names):
+        message = f"{error.owner} needs {_any_of(names)}"
+        example = _EXAMPLES.get((error.schema.get("title", ""), names[0]))
+        hint = f"for example '{names[0]}: {example}'" if example is not None else None
+        yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
+
+
+def _excluding_keys(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    entries = error.index.entries(error.place.tree)
+    first, second = sorted(
+        (entries[name].key for name in error.required["required"]),
+        key=lambda key: (key.span.line, key.span.column),
+    )
+    message = f"{error.owner} has both '{first.value}' and '{second.value}'"
+    label = Label(first.span, "the other one")
+    hint = "keep one of them"
+    yield Diagnostic(rules.KEYS_EXCLUDE_EACH_OTHER, message, second.span, (label,), hint)
+
+
+def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    required = expected(error.schema)
+    found = describe(error.place.tree)
+    message = f"expected {required}{error.subject}, found {found}"
+    hint = value_advice(error.path, error.instance) or type_hint(error.schema, error.instance)
+    yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
+
+
+def _unknown_word(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    return _no_word_of(error, error.required)
+
+
+def _no_word_or_variable(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    """Explain a value of ``oneOf: [{enum: ...}, a variable]``."""
+    return _no_word_of(error, [word for part in error.required for word in part.get("enum", ())])
+
+
+def _no_word_of(error: _SchemaError, words: list[str]) -> Iterator[Diagnostic]:
+    found = describe(error.place.tree)
+    message = f"expected {_any_of(words)}{error.subject}, found {found}"
+    close = nearest(error.instance, words) if isinstance(error.instance, str) else None
+    hint = f"did you mean '{close}'?" if close is not None else None
+    yield Diagnostic(rules.UNKNOWN_WORD, message, error.place.value_span, hint=hint)
+
+
+_LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
+
+
+def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    limit = f"{_LIMITS[error.validator]} {error.required}"
+    message = f"expected {limit}{error.subject}, found {shown(error.instance)}"
+    yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
+
+
+def _empty_collection(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    name = error.path[-1] if error.path else "this"
+    least, found = error.required, len(error.instance)
+    message, hint = f"'{shown(name)}' is empty", "add at least one"
+    if least > 1:
+        entries = "is empty" if not found else f"has only {found}"
+        message = f"'{shown(name)}' needs at least {least} entries, and {entries}"
+        hint = f"add {least - found} or more"
+    yield Diagnostic(rules.EMPTY_COLLECTION, message, error.owner_span, hint=hint)
+
+
+def _any_of(names: Iterable[str]) -> str:
+    *most, last = (f"'{name}'" for name in names)
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+_EXPLAINERS: dict[str, Callable[[_SchemaError, _MisspelledKeys], Iterator[Diagnostic]]] = {
+    "additionalProperties": _unknown_keys,
+    "required": _missing_keys,
+    "anyOf": _missing_choice,
+    "not": _excluding_keys,
+    "type": _wrong_type,
+    "pattern": _wrong_type,
+    "enum": _unknown_word,
+    "oneOf": _no_word_or_variable,
+    **dict.fromkeys(_LIMITS, _out_of_range),
+    "minItems": _empty_collection,
+    "minProperties": _empty_collection,
+}
+
+#: The keywords with an explanation. A test checks that these are all keywords of the schemas.
+KEYWORDS = frozenset(_EXPLAINERS)

@@ -1,0 +1,71 @@
+"""The two kinds of files, diagnostics for a file of the wrong kind, and misspelled sections."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from composer.base.diagnostics import Diagnostic, error, nearest, shown
+from composer.base.source import SourceFile
+from composer.language.schema import kind_of, rules, schema
+from composer.language.schema.common_mistakes import intended_key
+from composer.language.tree import Entry, Mapping, Scalar
+
+SYSTEM = "system"
+NODE = "node"
+
+RULE = error("RC040", "wrong-kind-of-file")
+
+_WORDS = {SYSTEM: "a system", NODE: "a node type"}
+
+
+def check_kind(
+    tree: Mapping, source: SourceFile, allowed: tuple[str, ...] = (SYSTEM, NODE)
+) -> Diagnostic | None:
+    """Return a diagnostic if the kind of a file is not one of ``allowed``."""
+    kind = kind_of(tree)
+    if kind in allowed:
+        return None
+    entry = (tree.entry(kind) if kind is not None else None) or next(iter(tree), None)
+    expected = " or ".join(_WORDS[name] for name in allowed)
+    if kind is None:
+        message = f"'{source.path}' is neither a system nor a node type"
+    else:
+        message = f"'{source.path}' is {_WORDS.get(kind, kind)}, not {expected}"
+    keys = " or ".join(f"'{name}: <name>'" for name in allowed)
+    return Diagnostic(
+        RULE,
+        message,
+        entry.key.span if entry is not None else tree.span,
+        hint=f"{expected} begins with {keys}",
+    )
+
+
+def with_intended_sections(tree: Mapping, kind: str) -> tuple[Mapping, list[Diagnostic]]:
+    """Return a file of ``kind`` with its sections under their right names, and the diagnostics.
+
+    Unknown keys that resemble no section stay as they are: ``check_schema`` reports them.
+    """
+    title, sections = _sections(kind)
+    if all(entry.name in sections for entry in tree):
+        return tree, []
+    missing = [name for name in sections if tree.entry(name) is None]
+    diagnostics = []
+    entries = []
+    for entry in tree:
+        meant = nearest(entry.name, missing) if entry.name not in sections else None
+        if meant is None or meant != intended_key(entry.name, missing):
+            entries.append(entry)
+            continue
+        missing.remove(meant)
+        message = f"'{shown(entry.name)}' is not a key of a {title}"
+        hint = f"did you mean '{meant}'?"
+        diagnostics.append(Diagnostic(rules.UNKNOWN_KEY, message, entry.key.span, hint=hint))
+        entries.append(Entry(Scalar(meant, entry.key.span, verbatim=False), entry.value))
+    return Mapping(tuple(entries), tree.span), diagnostics
+
+
+@cache
+def _sections(kind: str) -> tuple[str, tuple[str, ...]]:
+    """Return the title of a kind of file, and its sections."""
+    content = schema(kind)
+    return content["title"], tuple(content["properties"])

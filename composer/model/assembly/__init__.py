@@ -1,0 +1,71 @@
+"""Merge several files into one tree: ``include`` of systems and ``extends`` of node types.
+
+Every key and value keeps the file and location where it was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Map
+from dataclasses import field
+from pathlib import Path
+
+from composer.base.diagnostics import Diagnostic
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
+from composer.language.document.rules import TOO_LARGE
+from composer.language.expand.rules import CYCLE, DUPLICATE_NAME
+from composer.language.tree import Mapping
+from composer.model.assembly.include_entries import IncludeReader
+from composer.model.assembly.includes import IncludeResolver, system_file
+from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit
+from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits, LimitExceeded
+from composer.project import Project
+
+__all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit"]
+
+
+#: Rules about nodes that are missing or have the wrong names.
+_PARTIAL_RULES = (INVALID_INCLUDE, CYCLE, DUPLICATE_NAME, TOO_LARGE)
+
+
+@dataclass(frozen=True, slots=True)
+class AssembledSystem:
+    """A merged system. ``tree`` is None if the system exceeds a limit.
+
+    ``folders`` are the folders of all files and ``included`` the places that include them, by file
+    name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
+    ``diagnostics``.
+    """
+
+    tree: Mapping | None
+    diagnostics: list[Diagnostic]
+    is_partial: bool = False
+    folders: Map[str, Path] = field(default_factory=dict)
+    included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+
+
+def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) -> AssembledSystem:
+    """Return the system ``tree`` with its variables and copies expanded, merged with its includes.
+
+    ``folder`` is the folder of its file; all included files must be in ``project``. Each file is
+    checked against the schema.
+    """
+    diagnostics: list[Diagnostic] = []
+    limits = IncludeLimits()
+    resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
+    try:
+        merged = resolver.merge(system_file(tree, source, folder), {})
+    except LimitExceeded as stopped:
+        return AssembledSystem(None, [stopped.diagnostic])
+    is_partial = (
+        resolver.is_partial
+        or any(item.rule in _PARTIAL_RULES for item in diagnostics)
+        or _has_unexpanded_names(merged)
+    )
+    included = {path: tuple(places.values()) for path, places in resolver.included.items()}
+    return AssembledSystem(merged, diagnostics, is_partial, resolver.folders, included)
+
+
+def _has_unexpanded_names(tree: Mapping) -> bool:
+    nodes = tree.get("nodes")
+    return isinstance(nodes, Mapping) and any("${" in entry.name for entry in nodes)

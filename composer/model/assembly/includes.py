@@ -1,0 +1,183 @@
+"""Merge a system with everything that it includes."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from pathlib import Path
+
+from composer.base.diagnostics import Diagnostic, Label, shown
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
+from composer.language.document.limits import MAX_INCLUDE_DEPTH
+from composer.language.expand import expand
+from composer.language.expand.rules import CYCLE
+from composer.language.expand.scope import measure
+from composer.language.schema import check_schema
+from composer.language.schema.kinds import SYSTEM, with_intended_sections
+from composer.language.tree import Entry, Mapping, Sequence, Tree
+from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
+from composer.model.assembly.limits import IncludeLimits, LimitExceeded
+from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
+from composer.model.assembly.namespacing import add_namespace
+from composer.model.assembly.wildcards import Wildcards
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A file that is being merged, and the place where it includes the next one."""
+
+    file: SystemFile
+    span: Span
+
+
+@dataclass(slots=True)
+class IncludeResolver:
+    """Merges systems with the files that they include.
+
+    ``is_partial`` is true if an included file is unavailable. ``folders`` are the folders of all
+    files and ``included`` the places that include them, each once, by file name.
+    """
+
+    reader: IncludeReader
+    limits: IncludeLimits
+    diagnostics: list[Diagnostic]
+    is_partial: bool = False
+    folders: dict[str, Path] = field(default_factory=dict)
+    included: dict[str, dict[str, Span]] = field(default_factory=dict)
+    _stack: list[_Frame] = field(default_factory=list)
+
+    def merge(self, file: SystemFile, arguments: dict[str, Entry]) -> Mapping:
+        """Return ``file`` with ``arguments`` for its variables, merged with its includes.
+
+        Raises LimitExceeded.
+        """
+        self.folders[file.source.path] = file.path.parent
+        tree, misspelled = with_intended_sections(file.tree, SYSTEM)
+        self.diagnostics += misspelled
+        expanded, found = expand(tree, arguments)
+        if self._stack:
+            self.limits.add(measure(expanded).values, self._stack[-1].span)
+        found += check_schema(expanded, SYSTEM)
+        self.diagnostics += found
+        includes = expanded.get(INCLUDE)
+        if any(_is_in_section(item.primary, INCLUDE, expanded) for item in found):
+            self.is_partial = True
+        parts = [
+            part
+            for item in (includes.items if isinstance(includes, Sequence) else ())
+            if (part := self._part(item, file)) is not None
+        ]
+        conflicts: list[Diagnostic] = []
+        joined = join_parts(expanded, parts, conflicts)
+        # The copies of an include with an error may have the same names because of it, and an
+        # entry with an error may differ from another one because of it.
+        if not self.is_partial:
+            wrong = {_line(item) for item in self.diagnostics}
+            self.diagnostics += (item for item in conflicts if not _lines(item) & wrong)
+        return self._expand_wildcards(joined)
+
+    def _part(self, item: Tree, includer: SystemFile) -> Part | None:
+        include = read_include(item, self.diagnostics)
+        if include is None:
+            self.is_partial = True
+            return None
+        self.limits.include(include.file.span)
+        file = self.reader.read(include.file, includer.path.parent, includer.source)
+        if file is None:
+            self.is_partial = True
+            return None
+        self._stack.append(_Frame(includer, include.file.span))
+        try:
+            return None if self._is_cycle(file) else self._merge_included(file, include)
+        finally:
+            self._stack.pop()
+
+    def _merge_included(self, file: SystemFile, include: Include) -> Part:
+        span = include.file.span
+        if len(self._stack) > MAX_INCLUDE_DEPTH:
+            message = f"files include each other more than {MAX_INCLUDE_DEPTH} deep"
+            raise LimitExceeded(message, span, "include the file directly")
+        self.included.setdefault(file.source.path, {}).setdefault(str(span), span)
+        tree = self.merge(file, include.arguments)
+        if include.overrides is not None:
+            # In a partial tree, an unknown name is not known to be an error.
+            diagnostics: list[Diagnostic] = [] if self.is_partial else self.diagnostics
+            tree = apply_overrides(tree, include.overrides, file.source, diagnostics)
+            diagnostics += check_schema(tree, SYSTEM)
+        merged = add_namespace(tree, include.placement, self._folder(), file.path.parent)
+        return Part(merged, include.naming)
+
+    def _is_cycle(self, file: SystemFile) -> bool:
+        """Return whether ``file`` is being merged already, and report the cycle."""
+        numbers = [
+            number for number, frame in enumerate(self._stack) if frame.file.path == file.path
+        ]
+        if not numbers:
+            return False
+        self.is_partial = True
+        self.diagnostics.append(_cycle(self._stack[numbers[0] :]))
+        return True
+
+    def _folder(self) -> Path:
+        return self._stack[-1].file.path.parent
+
+    def _expand_wildcards(self, tree: Mapping) -> Mapping:
+        """Return the system with node names in place of patterns."""
+        nodes = tree.get("nodes")
+        names = tuple(entry.name for entry in nodes) if isinstance(nodes, Mapping) else ()
+        wildcards = Wildcards(names, self.limits)
+        changes = {
+            "nodes": wildcards.in_nodes,
+            "processes": wildcards.in_processes,
+            "connections": wildcards.in_connections,
+        }
+        return Mapping(
+            tuple(
+                Entry(entry.key, changes[entry.name](entry.value))
+                if entry.name in changes
+                else entry
+                for entry in tree
+            ),
+            tree.span,
+        )
+
+
+def _cycle(frames: list[_Frame]) -> Diagnostic:
+    """Report a cycle, starting at its first file by name: one diagnostic for all entry points."""
+    paths = [frame.file.source.path for frame in frames]
+    first = paths.index(min(paths))
+    frames = frames[first:] + frames[:first]
+    paths = paths[first:] + paths[:first]
+    cycle = " -> ".join(map(shown, [*paths, paths[0]]))
+    spans = [frame.span for frame in frames]
+    labels = tuple(Label(span, "through this") for span in spans[1:])
+    if len(frames) == 1:
+        message = f"'{shown(paths[0])}' includes itself"
+        return Diagnostic(CYCLE, message, spans[0], hint="remove the include")
+    return Diagnostic(CYCLE, f"this includes itself: {cycle}", spans[0], labels)
+
+
+def system_file(tree: Mapping, source: SourceFile, folder: Path) -> SystemFile:
+    """Return the file of the including system."""
+    return SystemFile(folder / Path(source.path).name, source, tree)
+
+
+def _line(diagnostic: Diagnostic) -> tuple[str, int]:
+    return diagnostic.primary.file.path, diagnostic.primary.line
+
+
+def _lines(conflict: Diagnostic) -> set[tuple[str, int]]:
+    """Return the lines of the entries in conflict, as they are usually written."""
+    spans = (conflict.primary, *(label.span for label in conflict.related))
+    return {(span.file.path, span.line) for span in spans}
+
+
+def _is_in_section(span: Span, name: str, tree: Mapping) -> bool:
+    """Return whether a span is in the section ``name`` of a file."""
+    starts = sorted(entry.key.span.line for entry in tree if entry.key.span.file == span.file)
+    section = tree.entry(name)
+    if section is None or section.key.span.file != span.file:
+        return False
+    start = section.key.span.line
+    end = next((line for line in starts if line > start), span.line + 1)
+    return start <= span.line < end

@@ -1,0 +1,137 @@
+"""Merge a node type with the types that it extends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Map
+from dataclasses import replace
+from pathlib import Path
+
+from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, SourceFile
+from composer.language.document import read_document
+from composer.language.document.limits import MAX_INCLUDE_DEPTH
+from composer.language.expand.rules import CYCLE
+from composer.language.expand.scope import measure
+from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
+from composer.language.tree import Mapping, Scalar
+from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, LimitExceeded
+from composer.model.assembly.merging import merge_maps
+from composer.project import Project
+from composer.project.node_types import NodeTypes
+
+EXTENDS = "extends"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeTypeFile:
+    """The file of a node type."""
+
+    path: Path
+    source: SourceFile
+    tree: Mapping
+
+    @property
+    def base(self) -> Located[str] | None:
+        """The type that it extends; None if there is none, or if it is not a text."""
+        written = self.tree.get(EXTENDS)
+        if isinstance(written, Scalar) and isinstance(written.value, str):
+            return Located(written.value, written.span)
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Inherited:
+    """A node type merged with its base types, and their files, its own first.
+
+    ``tree`` is None if a base type cannot be found or read.
+    """
+
+    tree: Mapping | None
+    diagnostics: list[Diagnostic]
+    files: tuple[NodeTypeFile, ...]
+
+    @property
+    def folders(self) -> Map[str, Path]:
+        """The folders of the files, by file name."""
+        return {file.source.path: file.path.parent for file in self.files}
+
+
+def inherit(file: NodeTypeFile) -> Inherited:
+    """Return the node type in ``file`` merged with the types that it extends.
+
+    Variables are not expanded yet: a type may override the variables of its base.
+    """
+    diagnostics: list[Diagnostic] = []
+    files = [_with_intended_sections(file, diagnostics)]
+    limits = IncludeLimits()
+    try:
+        while (name := files[-1].base) is not None:
+            base = _base(name, files, limits, diagnostics)
+            if base is None:
+                return Inherited(None, diagnostics, tuple(files))
+            files.append(_with_intended_sections(base, diagnostics))
+    except LimitExceeded as stopped:
+        return Inherited(None, [stopped.diagnostic], tuple(files))
+    tree = files[-1].tree
+    for child in reversed(files[:-1]):
+        tree = merge_maps(tree, _without_extends(child.tree))
+    return Inherited(tree, diagnostics, tuple(files))
+
+
+def _with_intended_sections(file: NodeTypeFile, diagnostics: list[Diagnostic]) -> NodeTypeFile:
+    tree, found = with_intended_sections(file.tree, NODE)
+    diagnostics += found
+    return replace(file, tree=tree)
+
+
+def _base(
+    name: Located[str],
+    files: list[NodeTypeFile],
+    limits: IncludeLimits,
+    diagnostics: list[Diagnostic],
+) -> NodeTypeFile | None:
+    """Return the file of the type ``name`` that the last of ``files`` extends."""
+    node_types = NodeTypes.of(Project.at(files[-1].path.parent))
+    path = node_types.find(name.value)
+    if path is None:
+        message = f"there is no node type '{shown(name.value)}' to extend"
+        hint = suggestion(name.value, node_types.names())
+        diagnostics.append(Diagnostic(UNKNOWN_BASE, message, name.span, hint=hint))
+        return None
+    known = [number for number, file in enumerate(files) if file.path.resolve() == path.resolve()]
+    if known:
+        diagnostics.append(_cycle(files[known[0] :]))
+        return None
+    if len(files) > MAX_INCLUDE_DEPTH:
+        message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
+        raise LimitExceeded(message, name.span, "extend the base type directly")
+    tree, source, found = read_document(path)
+    diagnostics += found
+    if tree is None:
+        return None
+    limits.read(len(source.text), name.span)
+    limits.add(measure(tree).values, name.span)
+    wrong_kind = check_kind(tree, source, (NODE,))
+    if wrong_kind is not None:
+        diagnostics.append(wrong_kind)
+        return None
+    return NodeTypeFile(path, source, tree)
+
+
+def _cycle(files: list[NodeTypeFile]) -> Diagnostic:
+    """Report a cycle, starting at its first file by name: one diagnostic for all entry points."""
+    paths = [file.source.path for file in files]
+    first = paths.index(min(paths))
+    files = files[first:] + files[:first]
+    names = [shown(file.path.stem) for file in files]
+    cycle = " -> ".join([*names, names[0]])
+    spans = [file.base.span for file in files if file.base is not None]
+    labels = tuple(Label(span, "through this") for span in spans[1:])
+    through = f": {cycle}" if len(files) > 1 else ""
+    message = f"node type '{names[0]}' extends itself{through}"
+    return Diagnostic(CYCLE, message, spans[0], labels)
+
+
+def _without_extends(tree: Mapping) -> Mapping:
+    return Mapping(tuple(entry for entry in tree if entry.name != EXTENDS), tree.span)

@@ -1,0 +1,146 @@
+"""Quality of service without rclpy: profiles, presets and the offer/request rule.
+
+Policies and values are spelled as rclpy spells them; durations are in milliseconds and None means
+"no limit" (rmw's infinite duration).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+
+from composer.base.fast_dataclass import dataclass
+
+
+class History(StrEnum):
+    """How many samples to keep."""
+
+    KEEP_LAST = "keep_last"
+    KEEP_ALL = "keep_all"
+
+
+class Reliability(StrEnum):
+    """Whether lost samples are sent again."""
+
+    RELIABLE = "reliable"
+    BEST_EFFORT = "best_effort"
+
+
+class Durability(StrEnum):
+    """Whether late joiners get earlier samples."""
+
+    VOLATILE = "volatile"
+    TRANSIENT_LOCAL = "transient_local"
+
+
+class Liveliness(StrEnum):
+    """How a publisher asserts that it is alive."""
+
+    AUTOMATIC = "automatic"
+    MANUAL_BY_TOPIC = "manual_by_topic"
+
+
+@dataclass(frozen=True, slots=True)
+class QosProfile:
+    """A complete QoS profile. The defaults are those of ``rclpy.qos.QoSProfile(depth=10)``."""
+
+    history: History = History.KEEP_LAST
+    depth: int = 10
+    reliability: Reliability = Reliability.RELIABLE
+    durability: Durability = Durability.VOLATILE
+    deadline_ms: float | None = None
+    lifespan_ms: float | None = None
+    liveliness: Liveliness = Liveliness.AUTOMATIC
+    liveliness_lease_duration_ms: float | None = None
+
+    @property
+    def queue_depth(self) -> int | None:
+        """Maximum number of queued messages; None if the history keeps all."""
+        return None if self.history is History.KEEP_ALL else max(self.depth, 1)
+
+
+#: The predefined profiles.
+#:
+#: ``sensor_data``, ``services_default`` and ``parameters`` are those of rmw/qos_profiles.h.
+#: ``command`` and ``state`` are two common patterns: commands that must arrive, and a latest value
+#: that late joiners get. In ROS, ``system_default`` leaves the choice to the middleware, and Fast
+#: DDS chooses differently for publishers (reliable, transient local) and subscriptions (best
+#: effort, volatile). A declared system is explicit, so here it is rclpy's default for topics.
+PRESETS: Mapping[str, QosProfile] = {
+    "sensor_data": QosProfile(depth=5, reliability=Reliability.BEST_EFFORT),
+    "command": QosProfile(),
+    "state": QosProfile(depth=1, durability=Durability.TRANSIENT_LOCAL),
+    "services_default": QosProfile(),
+    "parameters": QosProfile(depth=1000),
+    "system_default": QosProfile(),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Incompatibility:
+    """A policy in which an offer is weaker than the request, so that endpoints never match."""
+
+    policy: str
+    offered: str
+    requested: str
+    reason: str
+
+
+def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incompatibility, ...]:
+    """Return all policies that prevent two endpoints from matching.
+
+    A publisher or server offers, a subscription or client requests, and the offer must be at least
+    as strong. The rule is that of DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
+    states it. History, depth and lifespan never matter.
+    """
+    return tuple(_incompatibilities(offered, requested))
+
+
+def _incompatibilities(offered: QosProfile, requested: QosProfile) -> Iterator[Incompatibility]:
+    if (offered.reliability, requested.reliability) == (
+        Reliability.BEST_EFFORT,
+        Reliability.RELIABLE,
+    ):
+        reason = "the publisher does not send lost messages again"
+        yield _incompatibility("reliability", offered.reliability, requested.reliability, reason)
+    if (offered.durability, requested.durability) == (
+        Durability.VOLATILE,
+        Durability.TRANSIENT_LOCAL,
+    ):
+        reason = "the publisher does not keep messages for late joiners"
+        yield _incompatibility("durability", offered.durability, requested.durability, reason)
+    if _is_longer(offered.deadline_ms, requested.deadline_ms):
+        reason = "the publisher offers a longer deadline than the subscription requests"
+        yield _incompatibility("deadline_ms", offered.deadline_ms, requested.deadline_ms, reason)
+    if (offered.liveliness, requested.liveliness) == (
+        Liveliness.AUTOMATIC,
+        Liveliness.MANUAL_BY_TOPIC,
+    ):
+        reason = "the publisher does not assert its liveliness manually"
+        yield _incompatibility("liveliness", offered.liveliness, requested.liveliness, reason)
+    if _is_longer(offered.liveliness_lease_duration_ms, requested.liveliness_lease_duration_ms):
+        reason = "the publisher may be silent for longer than the subscription allows"
+        yield _incompatibility(
+            "liveliness_lease_duration_ms",
+            offered.liveliness_lease_duration_ms,
+            requested.liveliness_lease_duration_ms,
+            reason,
+        )
+
+
+def _is_longer(offered_ms: float | None, requested_ms: float | None) -> bool:
+    if requested_ms is None:
+        return False
+    return offered_ms is None or offered_ms > requested_ms
+
+
+def _incompatibility(
+    policy: str, offered: str | float | None, requested: str | float | None, reason: str
+) -> Incompatibility:
+    return Incompatibility(policy, _shown(offered), _shown(requested), reason)
+
+
+def _shown(value: str | float | None) -> str:
+    if value is None:
+        return "no limit"
+    return value if isinstance(value, str) else f"{value:g} ms"

@@ -1,0 +1,176 @@
+"""Parameter declarations, and the values that a system sets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as Map
+from dataclasses import replace
+
+from composer.base.source import Located
+from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
+from composer.model import USE_SIM_TIME, Parameter, ParameterType, UnknownKey
+from composer.model.resolve.tree_values import (
+    OPAQUE,
+    entries,
+    flag,
+    is_opaque,
+    key,
+    number,
+    plain_text,
+    text_or_opaque,
+)
+
+#: The type of a parameter whose bare value has no clear type, such as an empty list.
+UNKNOWN_TYPE = ""
+_USE_SIM_TIME_DESCRIPTION = "Whether the node uses the time of /clock."
+
+
+def read_parameters(tree: Tree | None) -> tuple[Parameter, ...]:
+    """Return the declared ``parameters`` of a node type or an inline node.
+
+    A bare value declares a parameter of its type with that default.
+    """
+    return tuple(_declaration(entry) for entry in entries(tree))
+
+
+def with_use_sim_time(
+    parameters: tuple[Parameter, ...], given: Map[str, Entry]
+) -> tuple[Parameter, ...]:
+    """Return the parameters, with ``use_sim_time`` added if a value is given for it."""
+    entry = given.get(USE_SIM_TIME)
+    if entry is None or any(item.name.value == USE_SIM_TIME for item in parameters):
+        return parameters
+    kind = Located(str(ParameterType.BOOL), entry.key.span)
+    own = Parameter(
+        key(entry), kind, None, None, entry.key.span, description=_USE_SIM_TIME_DESCRIPTION
+    )
+    return (*parameters, own)
+
+
+def with_values(parameters: Iterable[Parameter], given: Map[str, Entry]) -> tuple[Parameter, ...]:
+    """Return the parameters with the given values."""
+    return tuple(
+        _with_value(item, given[item.name.value].value) if item.name.value in given else item
+        for item in parameters
+    )
+
+
+def undeclared(parameters: Iterable[Parameter], given: Map[str, Entry]) -> list[Entry]:
+    """Return the given values of other parameters."""
+    known = {item.name.value for item in parameters}
+    return [entry for name, entry in given.items() if name not in known]
+
+
+def unknown_parameters(
+    parameters: Iterable[Parameter], given: Map[str, Entry]
+) -> tuple[UnknownKey, ...]:
+    """Return the given names that are none of the parameters."""
+    names = tuple(item.name.value for item in parameters)
+    return tuple(
+        UnknownKey("parameters", key(entry), names) for entry in undeclared(parameters, given)
+    )
+
+
+def bare_parameter(entry: Entry) -> Parameter:
+    """Return the parameter that a value without a declaration declares."""
+    kind = _bare_type(plain(entry.value))
+    if entry.name == USE_SIM_TIME and kind != OPAQUE:
+        kind = ParameterType.BOOL
+    value = _value(entry.value, kind)
+    return Parameter(
+        name=key(entry),
+        type=Located(str(kind), entry.value.span),
+        value=value,
+        default=value,
+        span=entry.key.span,
+    )
+
+
+def inferred_type(value: Plain) -> str | None:
+    """Return the parameter type of ``value``; None for null, maps and mixed lists."""
+    if isinstance(value, list) and {type(item) for item in value} == {int, float}:
+        return "double_array"
+    return rclpy_type(value)
+
+
+def rclpy_type(value: object) -> str | None:
+    """Return the type that rclpy infers from ``value``; None if it refuses it.
+
+    Unlike in YAML files, a list of integers and doubles is refused.
+    """
+    if isinstance(value, list):
+        kinds = {_SCALAR_TYPES.get(type(item)) for item in value}
+        kind = kinds.pop() if len(kinds) == 1 else None
+        return f"{kind}_array" if kind is not None else None
+    return _SCALAR_TYPES.get(type(value))
+
+
+def promoted(value: Plain, kind: str) -> Plain:
+    """Return ``value`` with integers converted to doubles if ``kind`` is a double type."""
+    if kind == ParameterType.DOUBLE and _is_whole(value):
+        return _as_double(value)
+    if kind == ParameterType.DOUBLE_ARRAY and isinstance(value, list):
+        return [_as_double(item) if _is_whole(item) else item for item in value]
+    return value
+
+
+_SCALAR_TYPES: Map[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
+
+
+def _is_whole(value: Plain) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _as_double(value: Plain) -> Plain:
+    try:
+        return float(value)  # type: ignore[arg-type]  # only called with integers
+    except OverflowError:
+        return value
+
+
+def _declaration(entry: Entry) -> Parameter:
+    if not isinstance(entry.value, Mapping):
+        return bare_parameter(entry)
+    tree = entry.value
+    kind = text_or_opaque(tree.get("type"), entry.key.span)
+    default = _value(tree.get("default"), kind.value)
+    choices = tree.get("choices")
+    return Parameter(
+        name=key(entry),
+        type=kind,
+        value=default,
+        default=default,
+        span=entry.key.span,
+        minimum=number(tree.get("minimum")),
+        maximum=number(tree.get("maximum")),
+        step=number(tree.get("step")),
+        choices=_choices(choices, kind.value) if isinstance(choices, Sequence) else None,
+        read_only=flag(tree.get("read_only"), default=False),
+        unit=plain_text(tree.get("unit")),
+        description=plain_text(tree.get("description")),
+    )
+
+
+def _bare_type(value: Plain) -> str:
+    items = value if isinstance(value, list) else [value]
+    if value is None or any(isinstance(item, str) and is_opaque(item) for item in items):
+        return OPAQUE
+    return inferred_type(value) or UNKNOWN_TYPE
+
+
+def _with_value(parameter: Parameter, tree: Tree) -> Parameter:
+    value = _value(tree, parameter.type.value)
+    return replace(parameter, value=value) if value is not None else parameter
+
+
+def _value(tree: Tree | None, kind: str) -> Located[Plain] | None:
+    """Return a value; None for null and maps, which ROS parameters cannot hold."""
+    if tree is None or isinstance(tree, Mapping):
+        return None
+    if isinstance(tree, Scalar) and tree.value is None:
+        return None
+    return Located(promoted(plain(tree), kind), tree.span)
+
+
+def _choices(tree: Sequence, kind: str) -> Located[tuple[Plain, ...]]:
+    return Located(tuple(promoted(plain(item), kind) for item in tree.items), tree.span)

@@ -1,0 +1,194 @@
+"""Declarations of ports and timers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from composer.base.diagnostics import Diagnostic
+from composer.base.source import Located, Span
+from composer.language.templates import Computed, Text
+from composer.language.tree import Entry, Mapping, Scalar, Tree
+from composer.model import (
+    Event,
+    FeedbackSteps,
+    Isolation,
+    Period,
+    PeriodUnit,
+    Port,
+    PortKind,
+    Timer,
+    TimerClock,
+)
+from composer.model.resolve.declarations.reactions import (
+    RULE,
+    Events,
+    expression,
+    nested,
+    reaction,
+    template,
+)
+from composer.model.resolve.qos import QosTable, implicit_qos
+from composer.model.resolve.tree_values import (
+    choice,
+    entries,
+    flag,
+    integer,
+    key,
+    number,
+    plain_text,
+    text,
+    text_or_opaque,
+)
+
+#: Default timeout of clients for the server and its response.
+DEFAULT_TIMEOUT_MS = 5000.0
+
+_CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
+_INLINE_EVENTS = {
+    PortKind.SUBSCRIPTION: Event.MESSAGE,
+    PortKind.SERVICE: Event.REQUEST,
+    PortKind.ACTION_SERVER: Event.GOAL,
+}
+_NESTED_EVENTS = {
+    PortKind.CLIENT: (("on_response", Event.RESPONSE), ("on_failure", Event.FAILURE)),
+    PortKind.ACTION_CLIENT: (
+        ("on_feedback", Event.FEEDBACK),
+        ("on_result", Event.RESULT),
+        ("on_failure", Event.FAILURE),
+    ),
+}
+
+
+def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> tuple[Port, ...]:
+    """Return the ports that a node declares.
+
+    Their full names are the declared ones until the node has a name and a namespace.
+    """
+    return tuple(
+        replace(
+            _port(kind, entry, qos, diagnostics),
+            isolation=_isolation(_mapping(entry), node),
+        )
+        for kind in PortKind
+        for entry in entries(node.get(kind.section))
+    )
+
+
+def _isolation(port: Mapping, node: Mapping) -> Isolation:
+    """Return whether messages are copied: those of a class are, since it may use them again."""
+    written = choice(port.get("isolation"), Isolation)
+    if written is not None:
+        return written.value
+    return Isolation.SHARE if node.get("class") is None else Isolation.COPY
+
+
+def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ...]:
+    """Return the timers that a node declares."""
+    return tuple(_timer(entry, diagnostics) for entry in entries(node.get("timers")))
+
+
+def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnostic]) -> Port:
+    span = entry.key.span
+    tree = _mapping(entry)
+    ros_name = text(tree.get(kind.channel.value)) or key(entry)
+    accept = expression(tree.get("accept"), diagnostics)
+    return Port(
+        kind=kind,
+        name=key(entry),
+        interface=text_or_opaque(tree.get("type"), span),
+        ros_name=ros_name,
+        full_name=ros_name.value,
+        qos=qos.resolve(tree.get("qos"), implicit_qos(kind.channel, span)),
+        span=span,
+        reactions=_reactions(kind, entry, tree, diagnostics),
+        timeout_ms=_timeout(kind, tree, span),
+        result_timeout_ms=number(tree.get("result_timeout_ms")),
+        accept=accept.value if accept is not None else None,
+        accept_span=accept.span if accept is not None else None,
+        feedback=_feedback(tree.entry("feedback"), diagnostics),
+        result=template(tree.get("result"), diagnostics),
+        budget_ms=number(tree.get("budget_ms")),
+        reentrant=flag(tree.get("reentrant"), default=False),
+        always_on=flag(tree.get("always_on"), default=False),
+        external=flag(tree.get("external"), default=False),
+        required=_required(tree.get("required")),
+        description=plain_text(tree.get("description")),
+    )
+
+
+def _mapping(entry: Entry) -> Mapping:
+    return entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+
+
+def _required(tree: Tree | None) -> bool | None:
+    return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, bool) else None
+
+
+def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None:
+    timeout_ms = number(tree.get("timeout_ms"))
+    if timeout_ms is None and kind in _CLIENTS:
+        return Located(DEFAULT_TIMEOUT_MS, span)
+    return timeout_ms
+
+
+def _reactions(
+    kind: PortKind, entry: Entry, tree: Mapping, diagnostics: list[Diagnostic]
+) -> Events:
+    if kind in _INLINE_EVENTS:
+        found = reaction(tree, entry.key.span, diagnostics)
+        return ((_INLINE_EVENTS[kind], found),) if found is not None else ()
+    return tuple(
+        found
+        for name, event in _NESTED_EVENTS.get(kind, ())
+        for found in nested(tree.entry(name), event, diagnostics)
+    )
+
+
+def _feedback(entry: Entry | None, diagnostics: list[Diagnostic]) -> FeedbackSteps | None:
+    if entry is None or not isinstance(entry.value, Mapping):
+        return None
+    count = integer(entry.value.get("count"))
+    period_ms = number(entry.value.get("period_ms"))
+    content = template(entry.value.get("message"), diagnostics)
+    if count is None or period_ms is None:
+        return None
+    return FeedbackSteps(count, period_ms, content, entry.key.span)
+
+
+def _timer(entry: Entry, diagnostics: list[Diagnostic]) -> Timer:
+    span = entry.key.span
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
+    clock = choice(tree.get("clock"), TimerClock)
+    return Timer(
+        name=key(entry),
+        period=_period(tree, span, diagnostics),
+        span=span,
+        reaction=reaction(tree, span, diagnostics),
+        clock=TimerClock.ROS if clock is None else clock.value,
+        budget_ms=number(tree.get("budget_ms")),
+        reentrant=flag(tree.get("reentrant"), default=False),
+        always_on=flag(tree.get("always_on"), default=False),
+        description=plain_text(tree.get("description")),
+    )
+
+
+def _period(tree: Mapping, span: Span, diagnostics: list[Diagnostic]) -> Period:
+    """Return the period of a timer, without a value if it is invalid (reported elsewhere)."""
+    for unit in PeriodUnit:
+        written = tree.get(unit.value)
+        if written is not None:
+            return _written_period(written, unit, diagnostics)
+    return Period(None, PeriodUnit.MILLISECONDS, span)
+
+
+def _written_period(tree: Tree, unit: PeriodUnit, diagnostics: list[Diagnostic]) -> Period:
+    value = number(tree)
+    if value is not None:
+        return Period(value.value, unit, tree.span)
+    compiled = template(tree, diagnostics) if isinstance(tree, Scalar) else None
+    if isinstance(compiled, Computed):
+        return Period(compiled.expression, unit, compiled.span)
+    if isinstance(compiled, Text):
+        message = f"'{unit}' takes a number or one '{{expression}}', not text around it"
+        diagnostics.append(Diagnostic(RULE, message, tree.span))
+    return Period(None, unit, tree.span)

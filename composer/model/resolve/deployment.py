@@ -1,0 +1,107 @@
+"""Read where the nodes of a system run: its processes, its hosts, and its discovery."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as Map
+
+from composer.base.source import Located
+from composer.language.tree import Entry, Mapping, Sequence, Tree
+from composer.model import Host, Process
+from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
+from composer.model.resolve.tree_values import (
+    choice,
+    entries,
+    environment,
+    flag,
+    integer,
+    key,
+    number,
+    text,
+    texts,
+)
+
+
+def read_processes(tree: Tree | None) -> tuple[Process, ...]:
+    """Return the processes."""
+    return tuple(_process(entry) for entry in entries(tree))
+
+
+def processes_of_nodes(processes: Iterable[Process]) -> Map[str, Located[str]]:
+    """Return the process of each node that a process names; the first one that does."""
+    found: dict[str, Located[str]] = {}
+    for process in processes:
+        for node in process.nodes:
+            found.setdefault(node.value, process.name)
+    return found
+
+
+def _process(entry: Entry) -> Process:
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    cpus = tree.get("cpus")
+    numbers = map(integer, cpus.items if isinstance(cpus, Sequence) else ())
+    priority = integer(tree.get("priority"))
+    return Process(
+        name=key(entry),
+        span=entry.key.span,
+        nodes=texts(tree.get("nodes")) if tree.get("nodes") is not None else (),
+        cpus=tuple(number.value for number in numbers if number is not None),
+        priority=None if priority is None else priority.value,
+        environment=environment(tree.get("environment")),
+        memory_mb=number(tree.get("memory_mb")),
+        host=text(tree.get("host")),
+    )
+
+
+def read_hosts(tree: Tree | None) -> tuple[Host, ...]:
+    """Return the hosts."""
+    return tuple(_host(entry) for entry in entries(tree))
+
+
+def _host(entry: Entry) -> Host:
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    port = integer(tree.get("port"))
+    setup = tree.get("setup")
+    return Host(
+        name=key(entry),
+        span=entry.key.span,
+        address=text(tree.get("address")) or key(entry),
+        port=None if port is None else port.value,
+        user=text(tree.get("user")),
+        workspace=text(tree.get("workspace")),
+        python=_plain(tree.get("python")),
+        setup=() if setup is None else tuple(item.value for item in texts(setup)),
+        environment=environment(tree.get("environment")),
+        identity_file=_plain(tree.get("identity_file")),
+        known_hosts=_plain(tree.get("known_hosts")),
+    )
+
+
+def _plain(tree: Tree | None) -> str | None:
+    found = text(tree)
+    return None if found is None else found.value
+
+
+def read_discovery(entry: Entry | None) -> Discovery | None:
+    """Return the discovery; None if it is not set, or has no valid kind."""
+    if entry is None or not isinstance(entry.value, Mapping):
+        return None
+    tree = entry.value
+    kind = choice(tree.get("kind"), DiscoveryKind)
+    if kind is None:
+        return None
+    port = integer(tree.get("port"))
+    return Discovery(
+        kind=kind,
+        span=entry.key.span,
+        interfaces=_texts(tree.get("interfaces")),
+        addresses=_texts(tree.get("address")),
+        port=DEFAULT_SERVER_PORT if port is None else port.value,
+        start=flag(tree.get("start"), default=False),
+        peers=_texts(tree.get("peers")),
+        given=tuple(key(item) for item in entries(tree)),
+    )
+
+
+def _texts(tree: Tree | None) -> tuple[Located[str], ...]:
+    return () if tree is None else texts(tree)

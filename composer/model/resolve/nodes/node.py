@@ -1,0 +1,291 @@
+"""Resolve a node of a system: its declaration, names and parameter values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from collections.abc import Mapping as Map
+from dataclasses import replace
+from pathlib import Path
+
+from composer.base.diagnostics import Diagnostic
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.model import (
+    DRIVEN_BY_MANAGER,
+    USE_SIM_TIME,
+    Dependency,
+    LogLevel,
+    Node,
+    ParameterSection,
+    Port,
+    PrimaryState,
+    Remapping,
+    Supervision,
+    Transforms,
+    UnknownKey,
+)
+from composer.model.names import expand_name, remapped_name
+from composer.model.resolve.connections import PortConnection, PortConnections, connection_of
+from composer.model.resolve.declarations.declaration import (
+    Declaration,
+    declare,
+    refined,
+    refines,
+    unknown_keys,
+)
+from composer.model.resolve.declarations.implementation import Implementation, read_external
+from composer.model.resolve.nodes.node_parameters import (
+    GivenValues,
+    node_parameters,
+)
+from composer.model.resolve.nodes.node_settings import (
+    NodeNames,
+    node_names,
+    read_introspection,
+    read_supervision,
+)
+from composer.model.resolve.nodes.node_type_loader import NodeTypeLoader
+from composer.model.resolve.overrides import Overrides
+from composer.model.resolve.parameter_files import ParameterFiles
+from composer.model.resolve.qos import QosTable
+from composer.model.resolve.source_folders import SourceFolders
+from composer.model.resolve.tree_values import (
+    choice,
+    entries,
+    flag,
+    is_opaque,
+    key,
+    plain_text,
+    text,
+    text_or_opaque,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SystemContext:
+    """What resolving any node of a system needs."""
+
+    folders: SourceFolders
+    namespace: Located[str]  # absolute
+    types: NodeTypeLoader
+    qos: QosTable
+    port_connections: PortConnections
+    overrides: Overrides
+    supervision: Supervision
+    introspection: Tree | None
+    parameter_files: ParameterFiles
+    parameter_sections: Callable[[], tuple[ParameterSection, ...]]  # all of the files
+    use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
+    processes: Map[str, Located[str]]  # by the nodes that they name
+    diagnostics: list[Diagnostic]
+
+
+@dataclass(frozen=True, slots=True)
+class _Declared:
+    """A declaration, and whether it is complete."""
+
+    declaration: Declaration
+    unknown: tuple[UnknownKey, ...] = ()
+    type_found: bool = True
+    complete: bool = True
+    type_files: tuple[Path, ...] = ()
+    own_type_name: Located[str] | None = None
+
+
+_NOTHING = Declaration("", Implementation(), (), (), (), (), ())
+
+
+def resolve_node(entry: Entry, context: SystemContext) -> Node:
+    """Return the node of an entry in ``nodes``."""
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    type_entry = tree.entry("type")
+    made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
+    declared = made.declaration
+    external = read_external(tree.entry("external"))
+    is_passed_on = external is not None and not declared.only_declared
+    gets_undeclared = declared.gets_undeclared or is_passed_on
+    names = node_names(entry, tree, declared.implementation.executable, context.namespace)
+    given = _given_values(entry.name, tree, declared, context)
+    parameters = node_parameters(
+        declared.parameters,
+        given,
+        names,
+        gets_undeclared=gets_undeclared,
+        is_program=declared.implementation.executable is not None and external is None,
+    )
+    is_complete = made.complete and not declared.implementation.conflicting
+    remappings = _remappings(tree.get("remappings"))
+    lifecycle = tree.get("lifecycle")
+    lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
+    return Node(
+        name=key(entry),
+        namespace=names.namespace,
+        own_name=names.own_name,
+        span=entry.key.span,
+        type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
+        type_found=made.type_found,
+        type_files=made.type_files,
+        own_type_name=made.own_type_name,
+        description=plain_text(tree.get("description")) or declared.description,
+        behavior=declared.implementation.behavior,
+        hosted_class=declared.implementation.hosted_class,
+        executable=declared.implementation.executable,
+        conflicting=declared.implementation.conflicting,
+        external=external,
+        inner_nodes=names.inner,
+        keeps_names=names.are_kept,
+        gets_undeclared=gets_undeclared,
+        parameters=parameters.parameters,
+        overridden_parameters=parameters.overridden_parameters,
+        undeclared_parameters=parameters.undeclared_parameters,
+        parameter_sections=parameters.sections,
+        ports=place_ports(declared.ports, names, remappings, context.port_connections),
+        timers=declared.timers,
+        transforms=place_transforms(declared.transforms, names, remappings),
+        state=declared.state,
+        reactions=declared.reactions,
+        remappings=remappings,
+        executor=text(tree.get("executor")),
+        process=text(tree.get("process")) or context.processes.get(entry.name),
+        log_level=choice(tree.get("log_level"), LogLevel),
+        required=flag(tree.get("required"), default=True),
+        depends_on=_dependencies(lifecycle.get("depends_on")),
+        autostart=state(lifecycle.get("autostart")),
+        supervision=read_supervision(lifecycle, context.supervision),
+        introspection=DRIVEN_BY_MANAGER
+        if external is not None or declared.implementation.executable is not None
+        else read_introspection(
+            declared.introspection, context.introspection, tree.get("introspection")
+        ),
+        unknown=(*made.unknown, *(parameters.unknown if is_complete else ())),
+        given=tuple(map(key, tree)),
+        complete=is_complete,
+    )
+
+
+def _given_values(
+    name: str, tree: Mapping, declared: Declaration, context: SystemContext
+) -> GivenValues:
+    """Return the values for the parameters of the node with the key ``name``."""
+    is_inline = tree.entry("type") is None
+    declares_clock = any(item.name.value == USE_SIM_TIME for item in declared.parameters)
+    clock = () if is_inline and declares_clock else context.use_sim_time
+    return GivenValues(
+        {item.name: item for item in clock},
+        context.parameter_files,
+        context.parameter_sections,
+        {} if is_inline else {item.name: item for item in entries(tree.get("parameters"))},
+        context.overrides.by_node.get(name, {}),
+    )
+
+
+def place_ports(
+    ports: Iterable[Port],
+    names: NodeNames,
+    remappings: Iterable[Remapping],
+    port_connections: PortConnections,
+) -> tuple[Port, ...]:
+    """Return the ports with their full names in a node, and the settings of connections.
+
+    The name of a connection takes precedence over a remapping, which takes precedence over the
+    declared name.
+    """
+
+    def expanded(ros_name: str) -> str:
+        return (
+            ros_name
+            if is_opaque(ros_name)
+            else expand_name(ros_name, names.ros_name, names.namespace.value)
+        )
+
+    renamed: dict[str, str] = {}
+    for remapping in remappings:
+        source = remapped_name(remapping.source.value)
+        renamed.setdefault(expanded(source), expanded(remapping.target.value))
+    return tuple(
+        _place_port(port, port_connections.get((names.key, port.name.value), ()), expanded, renamed)
+        for port in ports
+    )
+
+
+def place_transforms(
+    transforms: Transforms | None, names: NodeNames, remappings: Iterable[Remapping]
+) -> Transforms | None:
+    """Return the frames of a node with the full names of /tf and /tf_static in that node."""
+    if transforms is None:
+        return None
+    return replace(transforms, ports=place_ports(transforms.ports, names, remappings, {}))
+
+
+def _place_port(
+    port: Port,
+    port_connections: Iterable[PortConnection],
+    expanded: Callable[[str], str],
+    renamed: dict[str, str],
+) -> Port:
+    connection = connection_of(port, port_connections)
+    if connection is None:
+        own = expanded(port.ros_name.value)
+        return replace(port, full_name=renamed.get(own, own))
+    return replace(
+        port,
+        full_name=connection.full_name,
+        connected_at=connection.span,
+        qos=connection.qos or port.qos,
+        declared_qos=None if connection.qos is None else port.qos,
+        delivery=connection.delivery,
+        isolation=connection.isolation or port.isolation,
+    )
+
+
+def _inline(tree: Mapping, context: SystemContext) -> _Declared:
+    return _Declared(declare(tree, context.folders, context.qos, context.diagnostics))
+
+
+def _typed(type_entry: Entry, tree: Mapping, context: SystemContext) -> _Declared:
+    name = text(type_entry.value)
+    path = context.types.find(name) if name is not None else None
+    if path is None:
+        return _Declared(_NOTHING, type_found=False, complete=False)
+    made = context.types.instantiate(path, tree.get("variables"), type_entry.value.span)
+    if made is None:
+        return _Declared(_NOTHING, complete=False)
+    unknown = unknown_keys(made.tree, tree) if made.complete else ()
+    declaration = made.declaration
+    if refines(tree):
+        # Compiling the type's expressions again only repeats diagnostics, which are deduplicated.
+        merged = refined(made.tree, tree)
+        declaration = declare(merged, made.folders, context.qos, context.diagnostics)
+    return _Declared(
+        declaration,
+        unknown,
+        complete=made.complete,
+        type_files=made.files,
+        own_type_name=text(made.tree.get("node")),
+    )
+
+
+def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:
+    found = ((key(entry), text(entry.value)) for entry in entries(tree))
+    return tuple(Remapping(source, target) for source, target in found if target is not None)
+
+
+def _dependencies(tree: Tree | None) -> tuple[Dependency, ...]:
+    """Return the dependencies, from a list of names or a map of names to states."""
+    if isinstance(tree, Mapping):
+        return tuple(_dependency(entry) for entry in tree)
+    names = (text(item) for item in (tree.items if isinstance(tree, Sequence) else ()))
+    return tuple(Dependency(name) for name in names if name is not None)
+
+
+def _dependency(entry: Entry) -> Dependency:
+    needed = state(entry.value)
+    return Dependency(key(entry), needed.value if needed is not None else PrimaryState.ACTIVE)
+
+
+def state(tree: Tree | None) -> Located[PrimaryState] | None:
+    """Return a lifecycle state with its location."""
+    if isinstance(tree, Scalar) and tree.value in {item.value for item in PrimaryState}:
+        return Located(PrimaryState(str(tree.value)), tree.span)
+    return None

@@ -1,0 +1,148 @@
+"""Overrides from the command line: ``--set``, ``--namespace``, ``--use-sim-time``."""
+
+from __future__ import annotations
+
+from dataclasses import field
+
+from composer.base.diagnostics import Diagnostic, Label, error, shown
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, SourceFile, Span
+from composer.language.document import parse_document
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.model import USE_SIM_TIME
+
+SET = "--set"
+NAMESPACE = "--namespace"
+USE_SIM_TIME_OPTION = "--use-sim-time"
+
+RULE = error("RC041", "invalid-override")
+
+
+@dataclass(frozen=True, slots=True)
+class Override:
+    """A parameter value from the command line, located there."""
+
+    node: Located[str]
+    parameter: Entry
+
+
+@dataclass(frozen=True, slots=True)
+class Overrides:
+    """All overrides of a command line, parsed."""
+
+    parameters: tuple[Override, ...] = ()
+    namespace: Located[str] | None = None
+    use_sim_time: Entry | None = None
+    by_node: dict[str, dict[str, Entry]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        by_node: dict[str, dict[str, Entry]] = {}
+        for item in self.parameters:
+            by_node.setdefault(item.node.value, {})[item.parameter.name] = item.parameter
+        object.__setattr__(self, "by_node", by_node)
+
+
+@dataclass(frozen=True, slots=True)
+class OverrideOptions:
+    """Override options as given. Each of ``settings`` is ``node.parameter=value``."""
+
+    settings: tuple[str, ...] = ()
+    namespace: str | None = None
+    use_sim_time: bool = False
+
+
+NO_OVERRIDES = OverrideOptions()
+
+
+def read_overrides(options: OverrideOptions) -> tuple[Overrides, list[Diagnostic]]:
+    """Parse the override options of a command line.
+
+    Values of settings are YAML as in a file. The last one for a parameter takes effect.
+    """
+    texts = [setting.replace("\r", " ").replace("\n", " ") for setting in options.settings]
+    source = SourceFile(SET, "\n".join(texts))
+    diagnostics: list[Diagnostic] = []
+    found = (_override(text, source, line, diagnostics) for line, text in enumerate(texts, start=1))
+    parameters = tuple(item for item in found if item is not None)
+    clock = _use_sim_time() if options.use_sim_time else None
+    return Overrides(parameters, _namespace(options.namespace), clock), diagnostics
+
+
+def _namespace(namespace: str | None) -> Located[str] | None:
+    if namespace is None:
+        return None
+    source = SourceFile(NAMESPACE, namespace)
+    return Located(namespace, Span(source, 1, 1, max(len(namespace), 1)))
+
+
+def _use_sim_time() -> Entry:
+    source = SourceFile(USE_SIM_TIME_OPTION, USE_SIM_TIME_OPTION)
+    span = Span(source, 1, 1, len(USE_SIM_TIME_OPTION))
+    return Entry(Scalar(USE_SIM_TIME, span, verbatim=False), Scalar(True, span, verbatim=False))
+
+
+def _override(
+    text: str, source: SourceFile, line: int, diagnostics: list[Diagnostic]
+) -> Override | None:
+    target, equals, _ = text.partition("=")
+    node, dot, parameter = target.partition(".")
+    if not (equals and dot and node and parameter):
+        span = Span(source, line, 1, max(len(text), 1))
+        message = f"'{shown(text)}' is not of the form node.parameter=value"
+        diagnostics.append(Diagnostic(RULE, message, span))
+        return None
+    value = _value(text, len(target) + 1, source, line, diagnostics)
+    if value is None:
+        return None
+    name = Scalar(parameter, Span(source, line, len(node) + 2, len(parameter)))
+    return Override(Located(node, Span(source, line, 1, len(node))), Entry(name, value))
+
+
+def _value(
+    text: str, start: int, source: SourceFile, line: int, diagnostics: list[Diagnostic]
+) -> Tree | None:
+    """Return the value after the equals sign."""
+    # Parse a one-line document of the same width, so that the columns are right.
+    key = "v" * (start - 2)
+    document = SourceFile(SET, f"{key}: {text[start:]}")
+    tree, found = parse_document(document)
+    diagnostics.extend(_moved_diagnostic(item, source, line) for item in found)
+    value = tree.get(key) if tree is not None else None
+    return _moved(value, source, line) if value is not None else None
+
+
+def _moved(tree: Tree, source: SourceFile, line: int) -> Tree:
+    span = _moved_span(tree.span, source, line)
+    match tree:
+        case Scalar():
+            return Scalar(tree.value, span, tree.verbatim, tree.content_offset)
+        case Sequence():
+            return Sequence(tuple(_moved(item, source, line) for item in tree.items), span)
+        case Mapping():
+            return Mapping(
+                tuple(
+                    Entry(
+                        Scalar(entry.key.value, _moved_span(entry.key.span, source, line)),
+                        _moved(entry.value, source, line),
+                    )
+                    for entry in tree
+                ),
+                span,
+            )
+
+
+def _moved_span(span: Span, source: SourceFile, line: int) -> Span:
+    return Span(source, line, span.column, span.length)
+
+
+def _moved_diagnostic(diagnostic: Diagnostic, source: SourceFile, line: int) -> Diagnostic:
+    return Diagnostic(
+        diagnostic.rule,
+        diagnostic.message,
+        _moved_span(diagnostic.primary, source, line),
+        tuple(
+            Label(_moved_span(label.span, source, line), label.message)
+            for label in diagnostic.related
+        ),
+        diagnostic.hint,
+    )

@@ -1,0 +1,230 @@
+"""Resolve a whole file: a system, or a single node type."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+from composer.base.diagnostics import Diagnostic
+from composer.base.source import Located, SourceFile, Span
+from composer.language.document.error_limit import LimitedDiagnostics
+from composer.language.tree import Entry, Mapping, Scalar, Sequence
+from composer.model import (
+    DEFAULT_SUPERVISION,
+    USE_SIM_TIME,
+    Delivery,
+    Executor,
+    ExecutorKind,
+    Node,
+    PrimaryState,
+    System,
+    UnknownKey,
+)
+from composer.model.names import join
+from composer.model.resolve.connections import read_chains, read_connections
+from composer.model.resolve.declarations.declaration import declare
+from composer.model.resolve.declarations.parameters import (
+    unknown_parameters,
+    with_use_sim_time,
+    with_values,
+)
+from composer.model.resolve.deployment import (
+    processes_of_nodes,
+    read_discovery,
+    read_hosts,
+    read_processes,
+)
+from composer.model.resolve.nodes.node import (
+    SystemContext,
+    place_ports,
+    place_transforms,
+    resolve_node,
+    state,
+)
+from composer.model.resolve.nodes.node_parameters import sections_of, without_sections_of_others
+from composer.model.resolve.nodes.node_settings import (
+    NodeNames,
+    read_introspection,
+    read_supervision,
+)
+from composer.model.resolve.nodes.node_type_loader import NodeTypeLoader
+from composer.model.resolve.overrides import Overrides
+from composer.model.resolve.parameter_files import read_parameter_files
+from composer.model.resolve.qos import qos_table
+from composer.model.resolve.source_folders import SourceFolders
+from composer.model.resolve.tree_values import (
+    choice,
+    entries,
+    flag,
+    integer,
+    is_opaque,
+    key,
+    plain_text,
+    text_or_opaque,
+)
+
+ROOT = "/"
+DEFAULT_THREADS = 2
+
+
+def resolve_system(
+    tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
+) -> tuple[System, list[Diagnostic]]:
+    """Return the system of an expanded tree. See :func:`composer.model.resolve.resolve`."""
+    diagnostics = LimitedDiagnostics()
+    qos = qos_table(tree.get("qos_profiles"))
+    namespace = _system_namespace(tree, overrides)
+    joined, port_connections = read_connections(tree.get("connections"), namespace.value, qos)
+    types = NodeTypeLoader(folders, qos, diagnostics)
+    written = tree.get("lifecycle")
+    lifecycle = written if isinstance(written, Mapping) else Mapping((), tree.span)
+    system_supervision = read_supervision(lifecycle, DEFAULT_SUPERVISION)
+    written = tree.get("parameter_files")
+    files = read_parameter_files(written, folders.home, folders.node_types.project, diagnostics)
+    clock = _use_sim_time(tree, overrides)
+    processes = read_processes(tree.get("processes"))
+    context = SystemContext(
+        folders,
+        namespace,
+        types,
+        qos,
+        port_connections,
+        overrides,
+        system_supervision,
+        tree.get("introspection"),
+        files,
+        cache(partial(sections_of, files)),
+        clock,
+        processes_of_nodes(processes),
+        diagnostics,
+    )
+    nodes = without_sections_of_others(
+        [resolve_node(entry, context) for entry in entries(tree.get("nodes"))]
+    )
+    autostart = state(lifecycle.get("autostart"))
+    delivery = choice(tree.get("delivery"), Delivery)
+    system = System(
+        name=_name(tree, "system"),
+        source=source,
+        nodes=nodes,
+        span=_name_span(tree, "system"),
+        namespace=namespace.value,
+        namespace_span=namespace.span,
+        description=plain_text(tree.get("description")),
+        connections=joined,
+        chains=read_chains(tree.get("chains")),
+        qos_profiles=qos.named,
+        qos_references=tuple(qos.references),
+        executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
+        processes=processes,
+        hosts=read_hosts(tree.get("hosts")),
+        discovery=read_discovery(tree.entry("discovery")),
+        autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
+        supervision=system_supervision,
+        delivery=delivery.value if delivery is not None else Delivery.AUTO,
+        use_sim_time=any(flag(entry.value, default=False) for entry in clock),
+        implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
+        unknown=_unknown_nodes(nodes, overrides),
+        parameter_files=frozenset(section.name.span.file for section in files.sections),
+        unmatched_parameters=files.unmatched(nodes),
+    )
+    return system, diagnostics
+
+
+def resolve_node_type(
+    tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
+) -> tuple[System, list[Diagnostic]]:
+    """Return a system with a single node of a node type, to validate the type alone."""
+    diagnostics = LimitedDiagnostics()
+    qos = qos_table(None)
+    declared = declare(tree, folders, qos, diagnostics)
+    name = _name(tree, "node")
+    span = _name_span(tree, "node")
+    namespace = _system_namespace(Mapping((), span), overrides)
+    given = overrides.by_node.get(name.value, {})
+    own = with_use_sim_time(declared.parameters, given)
+    names = NodeNames(name.value, namespace)
+    alone = Node(
+        name=name,
+        namespace=namespace,
+        span=span,
+        description=declared.description,
+        behavior=declared.implementation.behavior,
+        hosted_class=declared.implementation.hosted_class,
+        executable=declared.implementation.executable,
+        conflicting=declared.implementation.conflicting,
+        complete=not declared.implementation.conflicting,
+        gets_undeclared=declared.gets_undeclared,
+        parameters=with_values(own, given),
+        ports=place_ports(declared.ports, names, (), {}),
+        timers=declared.timers,
+        transforms=place_transforms(declared.transforms, names, ()),
+        state=declared.state,
+        reactions=declared.reactions,
+        introspection=read_introspection(declared.introspection),
+        unknown=() if declared.gets_undeclared else unknown_parameters(own, given),
+    )
+    system = System(
+        name=name,
+        source=source,
+        nodes=(alone,),
+        span=span,
+        description=declared.description,
+        qos_references=tuple(qos.references),
+        node_type=True,
+        unknown=_unknown_nodes((alone,), overrides),
+    )
+    return system, diagnostics
+
+
+def _name(tree: Mapping, kind: str) -> Located[str]:
+    return text_or_opaque(tree.get(kind), _name_span(tree, kind))
+
+
+def _name_span(tree: Mapping, kind: str) -> Span:
+    entry = tree.entry(kind)
+    return entry.value.span if entry is not None else tree.span
+
+
+def _system_namespace(tree: Mapping, overrides: Overrides) -> Located[str]:
+    """Return the absolute namespace of the system. The command line overrides the file."""
+    entry = tree.get("namespace")
+    if overrides.namespace is None and entry is None:
+        return Located(ROOT, tree.span)
+    written = overrides.namespace or text_or_opaque(entry, tree.span)
+    return written if is_opaque(written.value) else written.map(lambda name: join(ROOT, name))
+
+
+def _use_sim_time(tree: Mapping, overrides: Overrides) -> tuple[Entry, ...]:
+    """Return the ``use_sim_time`` entry for all nodes. The command line overrides the file."""
+    written = overrides.use_sim_time or tree.entry(USE_SIM_TIME)
+    if written is None or not isinstance(written.value, Scalar):
+        return ()
+    return (written,) if isinstance(written.value.value, bool) else ()
+
+
+def _unknown_nodes(nodes: tuple[Node, ...], overrides: Overrides) -> tuple[UnknownKey, ...]:
+    names = tuple(item.name.value for item in nodes)
+    known = set(names)
+    return tuple(
+        UnknownKey("nodes", item.node, names)
+        for item in overrides.parameters
+        if item.node.value not in known
+    )
+
+
+def _executor(entry: Entry) -> Executor:
+    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    threads = integer(tree.get("threads"))
+    kind = choice(tree.get("kind"), ExecutorKind)
+    cpus = tree.get("cpus")
+    numbers = map(integer, cpus.items if isinstance(cpus, Sequence) else ())
+    priority = integer(tree.get("priority"))
+    return Executor(
+        name=key(entry),
+        kind=kind.value if kind is not None else ExecutorKind.EVENTS,
+        span=entry.key.span,
+        threads=threads.value if threads is not None else DEFAULT_THREADS,
+        threads_span=threads.span if threads is not None else None,
+        cpus=tuple(number.value for number in numbers if number is not None),
+        priority=None if priority is None else priority.value,
+    )

@@ -1,0 +1,102 @@
+"""Read typed values from a located tree, skipping values of the wrong type.
+
+The schema has already reported those.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TypeVar
+
+from composer.base.source import Located, Span
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+
+E = TypeVar("E", bound=StrEnum)
+
+#: Placeholder for a missing text. Like any text with a load-time variable without value, it is not
+#: checked, so that one mistake gives one diagnostic.
+OPAQUE = "${}"
+
+
+def is_opaque(text: str) -> bool:
+    """Return whether ``text`` has a load-time variable without value."""
+    return "${" in text
+
+
+def entries(tree: Tree | None) -> tuple[Entry, ...]:
+    """Return the entries of a map; none for other values."""
+    return tree.entries if isinstance(tree, Mapping) else ()
+
+
+def text(tree: Tree | None) -> Located[str] | None:
+    """Return a text with its location."""
+    if isinstance(tree, Scalar) and isinstance(tree.value, str):
+        return Located(tree.value, tree.span)
+    return None
+
+
+def texts(tree: Tree | None) -> tuple[Located[str], ...]:
+    """Return a single text, or the texts of a list."""
+    items = tree.items if isinstance(tree, Sequence) else (tree,)
+    found = (text(item) for item in items)
+    return tuple(item for item in found if item is not None)
+
+
+def plain_text(tree: Tree | None) -> str:
+    """Return a text without its location; empty by default."""
+    found = text(tree)
+    return found.value if found is not None else ""
+
+
+def text_or_opaque(tree: Tree | None, span: Span) -> Located[str]:
+    """Return a required text, or a placeholder at ``span``."""
+    return text(tree) or Located(OPAQUE, tree.span if tree is not None else span)
+
+
+def integer(tree: Tree | None) -> Located[int] | None:
+    """Return an integer with its location."""
+    if (
+        isinstance(tree, Scalar)
+        and isinstance(tree.value, int)
+        and not isinstance(tree.value, bool)
+    ):
+        return Located(tree.value, tree.span)
+    return None
+
+
+def number(tree: Tree | None) -> Located[float] | None:
+    """Return a number with its location; an integer stays an integer."""
+    if isinstance(tree, Scalar) and isinstance(tree.value, int | float):
+        return None if isinstance(tree.value, bool) else Located(tree.value, tree.span)
+    return None
+
+
+def choice(tree: Tree | None, kind: type[E]) -> Located[E] | None:
+    """Return the member of an enumeration, or None."""
+    written = text(tree)
+    known = {item.value: item for item in kind}
+    if written is None or written.value not in known:
+        return None
+    return written.map(known.__getitem__)
+
+
+def flag(tree: Tree | None, default: bool) -> bool:
+    """Return a boolean; ``default`` for other values."""
+    return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, bool) else default
+
+
+def key(entry: Entry) -> Located[str]:
+    """Return the key of an entry with its location."""
+    return Located(entry.name, entry.key.span)
+
+
+def word(tree: Tree) -> str:
+    """Return a scalar as a program sees it in its arguments or environment."""
+    if not isinstance(tree, Scalar) or tree.value is None:
+        return ""
+    return str(tree.value).lower() if isinstance(tree.value, bool) else str(tree.value)
+
+
+def environment(tree: Tree | None) -> tuple[tuple[Located[str], str], ...]:
+    """Return the environment variables of a map."""
+    return tuple((key(item), word(item.value)) for item in entries(tree))

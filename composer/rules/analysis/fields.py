@@ -1,0 +1,221 @@
+"""Problems with message fields, in expressions and in the messages that reactions fill."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from composer.base.fast_dataclass import dataclass
+from composer.interfaces import Action, Message, Service
+from composer.interfaces.field_types import (
+    ANYTHING,
+    BOOL,
+    INTEGER,
+    NUMBER,
+    STATUS,
+    STRING,
+    FieldChecker,
+    Problem,
+    ValueType,
+    constant_problem,
+    described,
+    is_bool,
+    is_number,
+    is_string,
+    parameter_type,
+    type_of,
+)
+from composer.language.expressions import Expression
+from composer.language.templates import Constant, Items, Template
+from composer.language.tree import Plain
+from composer.model import Event, Node, Parameter, PeriodError, Port, Reaction, Timer
+from composer.rules.analysis.context import Context
+from composer.rules.analysis.expressions import COMMON_NAMES, EVENT_NAMES, ReactionSite, reactions
+from composer.rules.analysis.parameters import has_wrong_default, wrong_choices
+
+
+class _NameTypes(dict[str, ValueType]):
+    """Names and their types; an unknown name has an unknown type.
+
+    Unknown names are reported by other rules, which know what is valid.
+    """
+
+    def __missing__(self, name: str) -> ValueType:
+        return ANYTHING
+
+    def __contains__(self, name: object) -> bool:
+        # A name with dots is that of a parameter, not a field of a shorter name.
+        return super().__contains__(name) or "." not in str(name)
+
+    def get(self, name: str, _default: Any = None) -> Any:
+        return self[name]
+
+
+_KINDS = (is_number, is_bool, is_string)
+
+
+@dataclass(frozen=True, slots=True)
+class FieldProblem:
+    """A problem, and the port whose type it depends on, as node and port."""
+
+    problem: Problem
+    port: tuple[str, str] | None = None
+
+
+def field_problems(context: Context) -> tuple[FieldProblem, ...]:
+    """Return all problems with fields and their values."""
+    return tuple(_problems(context))
+
+
+def _problems(context: Context) -> Iterator[FieldProblem]:
+    known = {node.name.value: _node_names(node) for node in context.system.nodes}
+    for site in reactions(context.system):
+        scope = _scope(context, known[site.node.name.value], site.event, site.port)
+        checker = FieldChecker(context.interfaces, scope)
+        own = None if site.port is None else (site.node.name.value, site.port.name.value)
+        for problem in _reaction(context, checker, site):
+            yield FieldProblem(problem, own)
+        yield from _sends(context, checker, site.node, site.reaction)
+    for node in context.system.nodes:
+        for port in node.ports:
+            if port.accept is not None or port.feedback is not None or port.result is not None:
+                scope = _scope(context, known[node.name.value], Event.GOAL, port)
+                for problem in _action_server(
+                    context, FieldChecker(context.interfaces, scope), port
+                ):
+                    yield FieldProblem(problem, (node.name.value, port.name.value))
+        for timer in node.timers:
+            if isinstance(timer.period.value, Expression):
+                checker = FieldChecker(context.interfaces, known[node.name.value])
+                for problem in _period(timer.period.value, timer, node, checker):
+                    yield FieldProblem(problem)
+
+
+def _period(
+    expression: Expression, timer: Timer, node: Node, checker: FieldChecker
+) -> Iterator[Problem]:
+    """Check an expression that must be a number, or a string that contains one."""
+    problems = list(checker.number(expression, timer.period.span))
+    try:
+        timer.period.evaluate(node.initial_parameters)
+    except PeriodError:
+        yield from problems
+    else:
+        yield from (problem for problem in problems if problem.missing)
+
+
+def _node_names(node: Node) -> _NameTypes:
+    parameters = _NameTypes(
+        {
+            item.name.value: ANYTHING
+            if has_wrong_default(item) or wrong_choices(item)
+            else parameter_type(item.type.value, _choices(item))
+            for item in node.parameters
+        }
+    )
+    state = _NameTypes({name.value: type_of(value) for name, value in node.state})
+    types: dict[str, ValueType] = dict.fromkeys(COMMON_NAMES, ANYTHING)
+    types |= {"parameters": parameters, "state": state}
+    types |= {"count": INTEGER, "now": NUMBER, "node": STRING}
+    return _NameTypes(types)
+
+
+def _choices(parameter: Parameter) -> tuple[Plain, ...]:
+    return () if parameter.choices is None else parameter.choices.value
+
+
+def _scope(context: Context, names: _NameTypes, event: Event, port: Port | None) -> _NameTypes:
+    scope = _NameTypes(names)
+    definition = context.interface(port) if port is not None else None
+    for name in EVENT_NAMES.get(event, ()):
+        scope[name] = _type_of_name(name, definition)
+    return scope
+
+
+def _type_of_name(name: str, definition: Message | Service | Action | None) -> ValueType:
+    if name == "status":
+        return STATUS
+    if name == "failure":
+        return STRING
+    if isinstance(definition, Message):
+        return definition
+    found = getattr(definition, name, None)  # request, response, goal, feedback, result
+    return found if isinstance(found, Message) else ANYTHING
+
+
+def _reaction(context: Context, checker: FieldChecker, site: ReactionSite) -> Iterator[Problem]:
+    reaction = site.reaction
+    if reaction.when is not None:
+        yield from checker.condition(reaction.when, reaction.when_span or reaction.span)
+    initial = {name.value: type_of(value) for name, value in site.node.state}
+    for name, content in reaction.state:
+        found = list(checker.text(content))
+        yield from found or _state(content, initial.get(name.value, ANYTHING), checker)
+    if reaction.log is not None:
+        yield from checker.text(reaction.log)
+    if reaction.respond is not None:
+        definition = context.interface(site.port) if site.port is not None else None
+        if isinstance(definition, Service):
+            yield from checker.template(reaction.respond, definition.response)
+        else:
+            yield from checker.text(reaction.respond)
+
+
+def _state(content: Template, initial: ValueType, checker: FieldChecker) -> Iterator[Problem]:
+    """Compare a new value with the initial value of its state variable."""
+    expected = NUMBER if initial == INTEGER else initial
+    if expected not in (BOOL, NUMBER, STRING):
+        return
+    kind = "number" if expected == NUMBER else str(expected)
+    if isinstance(content, Constant):
+        problem = None
+        if content.value is not None:
+            problem = constant_problem(content.value, expected, checker.interfaces)
+        message, hint = problem if problem is not None else ("", None)
+    elif isinstance(content, Items):
+        message, hint = f"a list where {expected} is expected", None
+    else:
+        found = checker.type_of(content)
+        fits = found == ANYTHING or any(is_a(expected) and is_a(found) for is_a in _KINDS)
+        message, hint = "" if fits else f"{described(found)} where {expected} is expected", None
+    if message:
+        message = message.replace(f"where {expected} is", f"where a {kind} is")
+        yield Problem(f"{message}, as the initial value is one", content.span, hint)
+
+
+def _sends(
+    context: Context, checker: FieldChecker, node: Node, reaction: Reaction
+) -> Iterator[FieldProblem]:
+    for send in (*reaction.publish, *reaction.call):
+        at = (node.name.value, send.port.value)
+        for problem in _sent(context, checker, node.port(send.port.value), send.content):
+            yield FieldProblem(problem, at)
+
+
+def _sent(
+    context: Context, checker: FieldChecker, port: Port | None, content: Template
+) -> Iterator[Problem]:
+    match context.interface(port) if port is not None else None:
+        case Message() as message:
+            yield from checker.template(content, message)
+        case Service() as service:
+            yield from checker.template(content, service.request)
+        case Action() as action:
+            yield from checker.template(content, action.goal)
+        case None:
+            yield from checker.text(content)
+
+
+def _action_server(context: Context, checker: FieldChecker, port: Port) -> Iterator[Problem]:
+    if port.accept is not None:
+        yield from checker.condition(port.accept, port.accept_span or port.span)
+    action = context.interface(port)
+    steps = port.feedback.content if port.feedback is not None else None
+    parts = ((steps, "feedback"), (port.result, "result"))
+    for content, part in parts:
+        if content is None:
+            continue
+        if isinstance(action, Action):
+            yield from checker.template(content, getattr(action, part))
+        else:
+            yield from checker.text(content)

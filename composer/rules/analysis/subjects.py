@@ -1,0 +1,199 @@
+"""What diagnostics are about: what follows from another one is left out, repetitions are joined.
+
+A diagnostic names the things that it says are wrong (``subjects``) and the things that it takes for
+right (``relies_on``). If another rule reports one of the latter, the diagnostic may only follow
+from that mistake. A thing has a kind and a name:
+
+- ``node``, ``process``, ``executor``, ``QoS profile``, ``variable``, ``field``, ``package``,
+  ``renamed port``: what does not exist, and what may be meant instead
+- ``port``, ``type``: a port as connections name it ("planner.scan"), and its type, which other
+  ports contradict; ``declared type``: by its place, which the class of the node contradicts
+- ``topic qos``: the QoS of a topic
+- ``name``: that of a topic, service or action, or of the port that has it
+- ``port name``, ``node name``, ``last part``: of ports that may be meant, in any node or namespace
+- ``namespace``, ``same node``, ``behavior``: of a node; ``section``: of a parameter file
+- ``parameter``, ``undeclared parameter``, ``key``, ``folder``: by its own name, wherever it is
+- ``nodes of process``, ``parameter files``: what is in them
+- ``file``, ``line``, ``errors``: all that is reported in a file or on a line, and the errors there
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from composer.base.diagnostics import (
+    Diagnostic,
+    Label,
+    Severity,
+    Subject,
+    errors_subject,
+    line_subject,
+    nearest,
+)
+from composer.interfaces import Interfaces
+from composer.language.expressions import Expression
+from composer.model import Connection, Endpoint, Node, Port, PortKind, System
+from composer.model.names import join
+
+#: Nodes may be in another namespace than was meant, because a key of an include is misspelled.
+NAMESPACES: tuple[Subject, ...] = (("key", "namespace"), ("key", "prefix"))
+#: A process may lack nodes, because it names what is not one.
+NODES_OF_PROCESSES: Subject = ("nodes of processes", "")
+
+_SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER})
+#: The kinds of things of which one mistake has many uses, which are reported together.
+_JOINED = frozenset(
+    {"executor", "field", "node", "package", "process", "QoS profile", "renamed port", "variable"}
+)
+#: Names that are declared elsewhere. If several of one kind are unknown and resemble no other, a
+#: file or a section is probably missing.
+_DECLARED = {
+    "executor": "an executor of this system",
+    "node": "a node of this system",
+    "process": "a process of this system",
+    "QoS profile": "a QoS profile",
+}
+_MANY = 3
+_MAX_UNKNOWN = 20  # further unknown names in the labels of one diagnostic
+_MAX_PLACES = 3  # further uses in the labels of one diagnostic
+_SEVERITIES = tuple(Severity)  # the most severe one first
+
+
+def unknown_subjects(kind: str, name: str, names: Iterable[str]) -> tuple[Subject, ...]:
+    """Return a thing that does not exist, and the one that may be meant."""
+    close = nearest(name, names)
+    return ((kind, name),) if close is None else ((kind, name), (kind, close))
+
+
+def package_subjects(interfaces: Interfaces, package: str) -> tuple[Subject, ...]:
+    """Return the package that an interface or a module is of, if it is not known."""
+    name = re.split(r"[/.]", package)[0]
+    return () if name in interfaces.packages() else (("package", name),)
+
+
+def port_subject(node: Node, port: Port, kind: str = "port") -> Subject:
+    """Return a port, or its ``type`` or ``qos``."""
+    return (kind, f"{node.name}.{port.name}")
+
+
+def type_subject(port: Port) -> Subject:
+    """Return the declared type of a port: several nodes may have it from one place."""
+    return ("declared type", str(port.interface.span))
+
+
+def wiring(node: Node, port: Port) -> tuple[Subject, ...]:
+    """Return what the connections of a port rely on: its names, with the connection and without."""
+    channel = port.kind.channel
+    return (
+        *_names_of_port(node, port),
+        ("port name", f"{channel} {port.name}"),
+        ("node name", f"{channel} {node.name}"),
+        ("namespace", node.name.value),
+        ("last part", port.full_name.rpartition("/")[2]),
+    )
+
+
+def used_parameters(value: object) -> tuple[Subject, ...]:
+    """Return the parameters that an expression uses; none if ``value`` is not one."""
+    paths = value.paths if isinstance(value, Expression) else ()
+    names = (path.parts[1] for path in paths if path.root == "parameters" and len(path.parts) > 1)
+    return tuple(("parameter", str(name)) for name in names)
+
+
+def namespace_subjects(nodes: Iterable[Node]) -> Iterator[Subject]:
+    """Yield what is not known if the namespaces of nodes are wrong.
+
+    Ports of other nodes that only differ in their namespaces may be meant for theirs.
+    """
+    for node in nodes:
+        yield ("namespace", node.name.value)
+        yield ("section", node.ros_name.value)
+        for port in node.ports:
+            yield ("last part", port.full_name.rpartition("/")[2])
+
+
+def connection_subjects(
+    system: System, connection: Connection, *wrong: Endpoint
+) -> tuple[Subject, ...]:
+    """Return the names that are not known if the ends ``wrong`` of a connection are."""
+    found: list[Subject] = [("name", join(system.namespace, connection.name.value))]
+    for end in connection.ends:
+        node, port = system.node(end.node), system.port(end)
+        is_source = end in connection.sources
+        is_right = port is not None and (port.kind in _SOURCES) is is_source
+        if node is not None and port is not None and is_right and end not in wrong:
+            found += _names_of_port(node, port)
+        else:  # another port of that name, or of that node, may be meant
+            found.append(("port name", f"{connection.kind} {end.port}"))
+            found.append(("node name", f"{connection.kind} {end.node}"))
+    return tuple(found)
+
+
+def _names_of_port(node: Node, port: Port) -> Iterator[Subject]:
+    yield ("name", f"{node.name}.{port.name}")
+    yield ("name", port.full_name)
+    yield ("name", join(node.namespace.value, port.ros_name.value))  # without the connection
+
+
+def without_consequences(
+    found: list[Diagnostic], of_project: Iterable[Diagnostic] = ()
+) -> list[Diagnostic]:
+    """Leave out diagnostics that rely on what another rule reports, perhaps of the project."""
+    rules: dict[Subject, set[str]] = {}
+    for item in (*found, *of_project):
+        is_error = item.severity is Severity.ERROR
+        for subject in (*item.subjects, *([errors_subject(item.primary)] if is_error else ())):
+            rules.setdefault(subject, set()).add(item.rule.code)
+    return [
+        item
+        for item in found
+        if not any(rules.get(subject, set()) - {item.rule.code} for subject in _relies_on(item))
+    ]
+
+
+def _relies_on(item: Diagnostic) -> Iterator[Subject]:
+    yield from item.relies_on
+    yield ("file", item.primary.file.path)
+    yield line_subject(item.primary)
+
+
+def joined(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Report what was probably renamed or removed in one place once, with all uses of it.
+
+    The report is the first of the most severe ones, whatever the files are called.
+    """
+    groups: dict[Subject, list[Diagnostic]] = {}
+    for item in found:
+        if item.subjects and item.subjects[0][0] in _JOINED:
+            groups.setdefault(item.subjects[0], []).append(item)
+    kept: dict[int, Diagnostic] = {}
+    for items in groups.values():
+        first, *others = sorted(items, key=lambda item: _SEVERITIES.index(item.severity))
+        labels = (Label(other.primary, "here too") for other in others[:_MAX_PLACES])
+        kept[id(first)] = replace(first, related=(*first.related, *labels)) if others else first
+    repeated = {id(item) for items in groups.values() for item in items} - kept.keys()
+    return _with_one_of_many(
+        [kept.get(id(item), item) for item in found if id(item) not in repeated]
+    )
+
+
+def _with_one_of_many(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Report many unknown names of one kind once, unless they resemble others."""
+    unknown: dict[str, list[Diagnostic]] = {}
+    for item in found:
+        kinds = [kind for kind, _ in item.subjects if kind in _DECLARED]
+        if len(kinds) == 1:
+            unknown.setdefault(kinds[0], []).append(item)
+    left_out: set[int] = set()
+    first: dict[int, Diagnostic] = {}
+    for kind, (item, *others) in unknown.items():
+        if len(others) + 1 >= _MANY:
+            left_out.update(map(id, others))
+            labels = (
+                Label(other.primary, f"'{other.subjects[0][1]}' is not {_DECLARED[kind]} either")
+                for other in others[:_MAX_UNKNOWN]
+            )
+            first[id(item)] = replace(item, related=(*item.related, *labels))
+    return [first.get(id(item), item) for item in found if id(item) not in left_out]

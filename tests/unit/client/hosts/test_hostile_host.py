@@ -1,0 +1,141 @@
+"""A host that sends back what it wants: it is bounded, and shown as a part of one line."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import stat
+import time
+from collections.abc import Callable, Coroutine
+from contextlib import AsyncExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from composer.base.source import Located, SourceFile, Span
+from composer.model import Host
+
+asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
+from composer.client.hosts import connection as host_connection  # noqa: E402
+from composer.client.hosts import sync  # noqa: E402
+from composer.client.hosts.check import HostsDiffer, compare_all, connect_all  # noqa: E402
+from composer.client.hosts.connection import HostError  # noqa: E402
+from composer.client.hosts.inventory import Inventory, Question  # noqa: E402
+
+SPAN = Span(SourceFile("robot.yaml"), 1, 1)
+EVIL = "\x1b[2J\x07evil\u202e\r\n[FATAL] [compose] forged "
+HERE = Inventory("3.11", {"numpy": "2.0"}, {}, {"a.yaml": "00"})
+LONGEST = 700
+
+
+def host(folder: Path, port: int) -> Host:
+    def text(value: object) -> Located[str]:
+        return Located(str(value), SPAN)
+
+    given: dict[str, Any] = {"workspace": text("~/robot"), "port": port, "user": text("robot")}
+    given |= {"identity_file": str(folder / "key"), "known_hosts": str(folder / "known")}
+    return Host(text("jetson"), SPAN, text("127.0.0.1"), **given)
+
+
+async def endless(process: Any) -> None:
+    while True:
+        process.stdout.write("x" * 100_000)
+        await process.stdout.drain()
+
+
+async def forged_reason(process: Any) -> None:
+    process.stderr.write(f"{EVIL}{'y' * 100_000}\n{EVIL}{'y' * 100_000}")
+    process.exit(1)
+
+
+async def forged_answer(process: Any) -> None:
+    packages = {"numpy": f"{EVIL}{'9' * 100_000}"}
+    answer = {"python": EVIL, "packages": packages, "interfaces": {}, "files": {}}
+    process.stdout.write(json.dumps(answer) + "\n")
+    process.exit(0)
+
+
+async def nested_answer(process: Any) -> None:
+    process.stdout.write('{"python": ' + "[" * 500_000 + "\n")
+    process.exit(0)
+
+
+def check(folder: Path, answer: Callable[[Any], Coroutine[Any, Any, None]]) -> list[str]:
+    """Return what comparing a host says whose commands give an answer."""
+    key = asyncssh.generate_private_key("ssh-ed25519")
+    key.write_private_key(folder / "key")
+    (folder / "key").chmod(0o600)
+    key.write_public_key(folder / "authorized")
+
+    async def run() -> None:
+        server = await asyncssh.create_server(
+            asyncssh.SSHServer,
+            "127.0.0.1",
+            0,
+            server_host_keys=[key],
+            authorized_client_keys=str(folder / "authorized"),
+            process_factory=answer,
+        )
+        port = server.sockets[0].getsockname()[1]
+        known = f"[127.0.0.1]:{port} {key.export_public_key().decode()}"
+        (folder / "known").write_text(known)
+        other = host(folder, port)
+        async with server, AsyncExitStack() as stack:
+            connections = await connect_all([other], folder, stack)
+            await compare_all([other], connections, Question(("a.yaml",), ()), HERE)
+
+    with pytest.raises(HostsDiffer) as found:
+        asyncio.run(run())
+    return [text for text, _ in found.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected"),
+    [
+        (endless, "it sends more than 1 MB as an answer"),
+        (forged_reason, "[FATAL] [compose] forged yyy"),
+        (forged_answer, "numpy is \\x1b[2J\\x07evil\\u202e\\r\\n[FATAL]"),
+        (nested_answer, "answers in another way"),
+    ],
+)
+def test_what_a_host_answers(
+    answer: Any, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(host_connection, "MOST_OUTPUT", 1_000_000)
+    problems = check(tmp_path, answer)
+    assert any(expected in text for text in problems), problems
+    for text in problems:
+        assert text.startswith("jetson (robot@127.0.0.1): ")
+        assert text.isprintable()
+        assert len(text) < LONGEST
+
+
+#: In place of rsync: its messages are those of the host.
+RSYNC = """#!/bin/sh
+printf '\\033[2Jevil\\r[FATAL] [compose] forged\\n' >&2
+[ -e "$(dirname "$0")/endless" ] && exec yes >&2
+exit 12
+"""
+
+
+@pytest.mark.parametrize("is_endless", [True, False])
+def test_messages_of_rsync(
+    is_endless: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sync, "MOST_OUTPUT", 1_000_000)
+    program = tmp_path / "rsync"
+    program.write_text(RSYNC)
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    if is_endless:
+        (tmp_path / "endless").touch()
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    options = sync.SyncOptions(tmp_path, excluded=("a",) * 1000)
+    started_s = time.monotonic()
+    with pytest.raises(HostError) as refusal:
+        sync.copy_project(host(tmp_path, 22), "/robot", options)
+    assert time.monotonic() - started_s < 30.0
+    expected = "sends more than 1 MB" if is_endless else "rsync failed: \\x1b[2Jevil"
+    assert expected in str(refusal.value)
+    assert str(refusal.value).isprintable()

@@ -1,0 +1,147 @@
+"""From text to tree: structure, values and places."""
+
+from __future__ import annotations
+
+import pytest
+
+from composer.base.source import SourceFile
+from composer.language.document import parse_bytes, parse_document
+from composer.language.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+
+
+def parsed(text: str) -> Mapping:
+    tree, diagnostics = parse_document(SourceFile("robot.yaml", text))
+    assert [diagnostic.message for diagnostic in diagnostics] == []
+    assert tree is not None
+    return tree
+
+
+def value_at(tree: Tree, *path: str | int) -> Tree:
+    for step in path:
+        if isinstance(step, int):
+            assert isinstance(tree, Sequence)
+            tree = tree.items[step]
+        else:
+            assert isinstance(tree, Mapping)
+            found = tree.get(step)
+            assert found is not None
+            tree = found
+    return tree
+
+
+def covered(tree: Tree) -> str:
+    """Return the text that the span of ``tree`` covers."""
+    span = tree.span
+    return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("a: 1", {"a": 1}),
+        ("a:", {"a": None}),
+        ("---\na: 1\n...\n", {"a": 1}),
+        ("%YAML 1.2\n---\na: 1", {"a": 1}),
+        ("a: {b: [1, x, {c: null}]}", {"a": {"b": [1, "x", {"c": None}]}}),
+        ("a:\n  - 1\n  - b: 2\n    c: 3", {"a": [1, {"b": 2, "c": 3}]}),
+        ("a:\n- 1\n-\n", {"a": [1, None]}),
+        ("a: []\nb: {}", {"a": [], "b": {}}),
+        ("a: |\n  one\n  two\n", {"a": "one\ntwo\n"}),
+        ("a: >-\n  one\n  two\n", {"a": "one two"}),
+        ("a: 'it''s'", {"a": "it's"}),
+        ('a: "x\\ty\\u00e9"', {"a": "x\tyé"}),
+        ("a: ${name}", {"a": "${name}"}),
+        ("a: # a comment\n  b: 1 # another", {"a": {"b": 1}}),
+        ('"": x\n"a b": y', {"": "x", "a b": "y"}),
+        ("a: &rate 10\nb: *rate\nc: [*rate]", {"a": 10, "b": 10, "c": [10]}),
+        ("a: &m {x: [1]}\nb: *m", {"a": {"x": [1]}, "b": {"x": [1]}}),
+        ("a: &x 1\nb: &x 2\nc: *x", {"a": 1, "b": 2, "c": 2}),
+    ],
+)
+def test_values(text: str, value: Plain) -> None:
+    assert plain(parsed(text)) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "place", "quoted"),
+    [
+        ("a: 1", ("a",), "robot.yaml:1:4", "1"),
+        ("a:\n  - 10\n  - {b: xyz}", ("a", 1, "b"), "robot.yaml:3:9", "xyz"),
+        ("a: 'x y'   # z", ("a",), "robot.yaml:1:4", "'x y'"),
+        ('a: "x\\ty"', ("a",), "robot.yaml:1:4", '"x\\ty"'),
+        ("a: x y  ", ("a",), "robot.yaml:1:4", "x y"),
+        ("日本: 値段", ("日本",), "robot.yaml:1:5", "値段"),
+        ("e\u0301: x", ("e\u0301",), "robot.yaml:1:5", "x"),
+        ("a:\tx", ("a",), "robot.yaml:1:4", "x"),
+        ("😀: {b: 😀}", ("😀", "b"), "robot.yaml:1:8", "😀"),
+        ("x: 1\r\na: y\r\n", ("a",), "robot.yaml:2:4", "y"),
+        ("x: 1\ra: y", ("a",), "robot.yaml:2:4", "y"),
+        # Of several lines the first counts.
+        ("a: one\n  two", ("a",), "robot.yaml:1:4", "one"),
+        ('a: "one\n  two"', ("a",), "robot.yaml:1:4", '"one'),
+        ("a: |  \n  one\n", ("a",), "robot.yaml:1:4", "|"),
+        # Maps and lists: the bracket or, in block style, the first item.
+        ("a: {b: 1}", ("a",), "robot.yaml:1:4", "{"),
+        ("a: [1]", ("a",), "robot.yaml:1:4", "["),
+        ("a:\n  bcd: 1\n\n\nx: 1", ("a",), "robot.yaml:2:3", "bcd"),
+        ("a:\n  - xyz\n\n\nx: 1", ("a",), "robot.yaml:2:5", "xyz"),
+    ],
+)
+def test_places(text: str, path: tuple[str | int, ...], place: str, quoted: str) -> None:
+    found = value_at(parsed(text), *path)
+    assert str(found.span) == place
+    assert covered(found) == quoted
+
+
+def test_place_of_nothing_is_behind_the_colon() -> None:
+    assert str(value_at(parsed("a:\nb: 1"), "a").span) == "robot.yaml:1:3"
+
+
+def test_place_of_key() -> None:
+    tree = parsed("nodes:\n  'my node': {x: 1}")
+    nodes = tree.get("nodes")
+    assert isinstance(nodes, Mapping)
+    key = nodes.entries[0].key
+    assert (str(key.span), key.span.length, covered(key)) == ("robot.yaml:2:3", 9, "'my node'")
+
+
+@pytest.mark.parametrize(
+    ("text", "verbatim", "offset"),
+    [
+        ("a: x y z", True, 0),
+        ("a: 'x y z'", True, 1),
+        ('a: "x y z"', True, 1),
+        ("a: 'x y ''z'", False, 1),
+        ('a: "x y \\u007a"', False, 1),
+        ("a: x\n  y z", False, 0),
+        ("a: |\n  x y z", False, 0),
+    ],
+)
+def test_verbatim(text: str, verbatim: bool, offset: int) -> None:
+    scalar = value_at(parsed(text), "a")
+    assert isinstance(scalar, Scalar)
+    assert (scalar.verbatim, scalar.content_offset) == (verbatim, offset)
+
+
+@pytest.mark.parametrize("text", ["a: x {b}", "a: 'x {b}'", 'a: "x {b}"'])
+def test_part_of_a_verbatim_scalar(text: str) -> None:
+    scalar = value_at(parsed(text), "a")
+    assert isinstance(scalar, Scalar)
+    assert covered(Scalar("", scalar.part(2, 3))) == "{b}"
+
+
+def test_alias_has_the_place_of_what_it_repeats() -> None:
+    tree = parsed("a: &x [1]\nb: *x")
+    assert value_at(tree, "b") is value_at(tree, "a")
+
+
+def test_byte_order_mark_is_dropped() -> None:
+    tree, source, diagnostics = parse_bytes("\ufeffa: 1".encode(), "robot.yaml")
+    assert (diagnostics, source.text) == ([], "a: 1")
+    assert tree is not None
+    assert tree.entries[0].key.span.column == 1
+
+
+def test_source_keeps_the_text() -> None:
+    _, source, _ = parse_bytes(b"a: 1\nb: [", "robot.yaml")
+    assert source.lines == ("a: 1", "b: [")

@@ -1,0 +1,286 @@
+"""Load-time variables: what is put in, where it then stands, and what is wrong."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from composer.base.diagnostics import Diagnostic
+from composer.base.source import SourceFile
+from composer.language.document import parse_document
+from composer.language.document.limits import MAX_DEPTH
+from composer.language.expand import expand, missing_variables
+from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
+
+SECONDS_ALLOWED = 15.0
+
+
+def tree_of(text: str, name: str = "f") -> Mapping:
+    tree, diagnostics = parse_document(SourceFile(name, text))
+    assert diagnostics == []
+    assert tree is not None
+    return tree
+
+
+def arguments(text: str) -> dict[str, Entry]:
+    return {entry.name: entry for entry in tree_of(text, "system")}
+
+
+def expanded(text: str, given: str = "{}") -> tuple[Mapping, list[Diagnostic]]:
+    return expand(tree_of(text), arguments(given))
+
+
+def system(variables: str, value: str) -> str:
+    return f"system: s\nvariables: {variables}\nx: {value}"
+
+
+def at_x(tree: Mapping) -> Tree:
+    found = tree.get("x")
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("variables", "value", "result"),
+    [
+        # alone: the value, whatever it is
+        ("{a: 1}", "${a}", 1),
+        ("{a: 1.5}", "'${a}'", 1.5),
+        ("{a: null}", "${a}", None),
+        ("{a: [1, {b: 2}]}", "['${a}', 3]", [[1, {"b": 2}], 3]),
+        ("{a: {b: 1}}", "{c: '${a}'}", {"c": {"b": 1}}),
+        # inside a text: its text
+        ("{a: 1, b: x}", "p/${a}/${b}", "p/1/x"),
+        ("{a: 1.50, b: true, c: null}", "${a} ${b} ${c}", "1.5 true null"),
+        ("{a: x}", "${a}${a}", "xx"),
+        ("{a: x}", "${a} ", "x"),  # a blank at the end is none of YAML's
+        ("{a: x}", "' ${a}'", " x"),
+        # not variables
+        ("{a: x}", "$${a}", "${a}"),
+        ("{a: x}", "$${a} ${a}", "${a} x"),
+        ("{a: x}", "$a {a} $ {a} ${a}", "$a {a} $ {a} x"),
+        ("{a: '$${b}'}", "${a}", "${b}"),
+        ("{a: '{message.data}'}", "'{count} ${a}'", "{count} {message.data}"),
+        # of each other, in any order
+        ("{a: '${b}', b: '${c}', c: 1}", "${a}", 1),
+        ("{a: '${b}-${c}', b: x, c: '${b}'}", "${a}", "x-x"),
+        ("{a: ['${b}', '${b}'], b: {c: 1}}", "${a}", [{"c": 1}, {"c": 1}]),
+        # names that are keys, too
+        ("{a: b}", "{'${a}_x': '${a}', '$${a}': 1}", {"b_x": "b", "${a}": 1}),
+    ],
+)
+def test_value(variables: str, value: str, result: Plain) -> None:
+    tree, diagnostics = expanded(system(variables, value))
+    assert [item.message for item in diagnostics if item.rule.name != "unused-declaration"] == []
+    assert repr(plain(at_x(tree))) == repr(result)
+
+
+TYPE = "node: t\nvariables: {a: {description: d}, b: {default: '${c}'}, c: {default: 1}}\nx: "
+
+
+@pytest.mark.parametrize(
+    ("value", "given", "result"),
+    [
+        ("'${a} ${b} ${c}'", "{}", "${a} 1 1"),
+        ("${a}", "{}", "${a}"),
+        ("'${a} ${b} ${c}'", "{a: x}", "x 1 1"),
+        ("'${a} ${b} ${c}'", "{a: x, c: 2}", "x 2 2"),
+        ("'${a} ${b} ${c}'", "{b: 3}", "${a} 3 1"),
+        ("['${a}', '${b}', '${c}']", "{a: {y: 1}}", [{"y": 1}, 1, 1]),
+        ("['${a}', '${b}', '${c}']", "{a: '$${a}', b: '${x}'}", ["$${a}", "${x}", 1]),
+        ("['${a}', '${b}', '${c}']", "{a: null}", [None, 1, 1]),
+    ],
+)
+def test_node_type(value: str, given: str, result: Plain) -> None:
+    tree, diagnostics = expanded(TYPE + value, given)
+    assert [item.message for item in diagnostics if item.rule.name != "unused-declaration"] == []
+    assert plain(at_x(tree)) == result
+
+
+def test_missing_variables() -> None:
+    tree = tree_of(TYPE + "1")
+    assert missing_variables(tree, {}) == ("a",)
+    assert missing_variables(tree, arguments("{a: 1}")) == ()
+    assert missing_variables(tree, arguments("{b: 1}")) == ("a",)
+
+
+def test_misspelt_argument_is_not_missing_too() -> None:
+    tree = tree_of("node: t\nvariables: {message_type: {}}\nx: ${message_type}")
+    assert missing_variables(tree, arguments("{mesage_type: x}")) == ()
+
+
+def test_value_keeps_the_place_where_it_was_written() -> None:
+    tree, _ = expanded("node: t\nvariables: {a: {}}\nx: ${a}", "{a: [1, two]}")
+    value = at_x(tree)
+    assert isinstance(value, Sequence)
+    second = value.items[1]
+    assert isinstance(second, Scalar)
+    assert (str(second.span), str(second.part(1, 2))) == ("system:1:9", "system:1:10")
+
+
+def test_text_keeps_its_own_place() -> None:
+    tree, _ = expanded("node: t\nvariables: {a: {}}\nx: 'to ${a}'", "{a: longer}")
+    value = at_x(tree)
+    assert isinstance(value, Scalar)
+    assert (str(value.span), value.verbatim) == ("f:3:4", False)
+    assert value.part(3, 5) == value.span
+
+
+def test_what_has_no_variables_stays_the_very_same() -> None:
+    source = tree_of("system: s\nx: {y: [1, {z: text}]}")
+    tree, diagnostics = expand(source, {})
+    assert diagnostics == []
+    assert at_x(tree) is at_x(source)
+
+
+@pytest.mark.parametrize(
+    ("text", "rule", "place", "message", "hint"),
+    [
+        (
+            system("{rate: 1}", "['${rate}', 'at ${rat}']"),
+            "unknown-variable", "f:3:20", "there is no variable 'rat'", "did you mean 'rate'?",
+        ),
+        (
+            "system: s\nx: ${a}",
+            "unknown-variable", "f:2:4", "there is no variable 'a'", "declare it",
+        ),
+        (
+            system("{a: 1}", "['${a}', '${}']"),
+            "malformed-variable", "f:3:14", "'${}' is not a variable: expected '${name}'", "'$${'",
+        ),
+        (
+            system("{a: 1}", "['${a}', '${a + 1}']"),
+            "malformed-variable", "f:3:14", "'${a + 1}' is not a variable", "expression",
+        ),
+        (
+            system("{a: 1}", "['${a}', '${a']"),
+            "malformed-variable", "f:3:14", "'${a' is not a variable", "",
+        ),
+        (
+            system("{a: {b: 1}}", "at ${a}"),
+            "malformed-variable", "f:3:7", "'${a}' is a map", "",
+        ),
+        (
+            system("{a: [1]}", "at ${a}"),
+            "malformed-variable", "f:3:7", "'${a}' is a list", "",
+        ),
+        (
+            system("{a: '${a}'}", "1"),
+            "cycle", "f:2:13", "variable 'a' is defined by itself", "",
+        ),
+        (
+            system("{a: 'x${b}', b: ['${c}'], c: '${a}', d: '${a}'}", "${d}"),
+            "cycle", "f:2:13", "variable 'a' is defined by itself: a -> b -> c -> a", "",
+        ),
+        (
+            system("{a: 1, b: 2}", "${b}"),
+            "unused-declaration", "f:2:13", "variable 'a' is never used", "'${a}'",
+        ),
+    ],
+)  # fmt: skip
+def test_diagnostic(text: str, rule: str, place: str, message: str, hint: str) -> None:
+    _, (diagnostic,) = expanded(text)
+    assert (diagnostic.rule.name, str(diagnostic.primary)) == (rule, place)
+    assert diagnostic.message.startswith(message)
+    assert hint in (diagnostic.hint or "")
+
+
+def test_unknown_argument() -> None:
+    _, diagnostics = expanded("node: relay\nvariables: {type: {}}\nx: ${type}", "{tipe: 1}")
+    assert [(str(item.primary), item.message, item.hint) for item in diagnostics] == [
+        ("system:1:2", "'relay' has no variable 'tipe'", "did you mean 'type'?")
+    ]
+
+
+def test_misspelt_variable_is_not_unused_too() -> None:
+    _, diagnostics = expanded(system("{rate: 1}", "${rat}"))
+    assert [item.rule.name for item in diagnostics] == ["unknown-variable"]
+
+
+def test_two_cycles_are_two_diagnostics() -> None:
+    _, diagnostics = expanded(system("{a: '${b}', b: '${a}', c: '${d}', d: '${c}'}", "1"))
+    assert [item.message.rpartition(": ")[2] for item in diagnostics] == [
+        "a -> b -> a",
+        "c -> d -> c",
+    ]
+
+
+@pytest.mark.parametrize("section", ["5", "[a]", "null"])
+def test_a_section_of_another_shape_has_no_diagnostics_here(section: str) -> None:
+    tree, diagnostics = expanded(system(section, "${a}"), "{b: 1}")
+    assert diagnostics == []
+    assert plain(at_x(tree)) == "${a}"
+
+
+@pytest.mark.parametrize("entry", ["5", "[a]", "null", "{}"])
+def test_variable_of_another_shape_has_no_value(entry: str) -> None:
+    tree, diagnostics = expanded(f"node: t\nvariables: {{a: {entry}}}\nx: ${{a}}")
+    assert diagnostics == []
+    assert plain(at_x(tree)) == "${a}"
+
+
+def doubling(value: str, last: str) -> str:
+    """Return a system whose variables each hold the next one twice, 60 times over."""
+    lines = [f"  v{number}: {value.replace('NEXT', f'v{number + 1}')}" for number in range(60)]
+    return "\n".join(["system: s", "variables:", *lines, f"  v60: {last}", "x: ${v0}"])
+
+
+@pytest.mark.parametrize(
+    ("text", "rule", "place"),
+    [
+        (doubling("'${NEXT}${NEXT}'", "laugh"), "too-large", "f:"),
+        (doubling("['${NEXT}', '${NEXT}']", "laugh"), "too-large", "f:"),
+        (doubling("{a: '${NEXT}'}", "1"), "too-large", "f:"),
+        (
+            system("{a: [1, 2, 3, 4, 5, 6, 7, 8]}", "[" + "'${a}', " * 30_000 + "]"),
+            "too-large", "f:3:",
+        ),
+    ],
+    ids=["texts", "lists", "levels", "uses"],
+)  # fmt: skip
+def test_growth_is_bounded(text: str, rule: str, place: str) -> None:
+    tree = tree_of(text)
+    started = time.process_time()
+    result, diagnostics = expand(tree, {})
+    assert time.process_time() - started < SECONDS_ALLOWED
+    assert [item.rule.name for item in diagnostics] == [rule]
+    assert str(diagnostics[0].primary).startswith(place)
+    assert result is tree
+
+
+@pytest.mark.parametrize(("around", "fits"), [(MAX_DEPTH - 11, True), (MAX_DEPTH - 10, False)])
+def test_depth(around: int, fits: bool) -> None:
+    value = "[" * 10 + "]" * 10
+    uses = "[" * around + "'${a}'" + "]" * around  # within the map that the file is
+    _, diagnostics = expanded(system(f"{{a: {value}}}", uses))
+    assert [item.rule.name for item in diagnostics] == ([] if fits else ["too-large"])
+
+
+MANY = 20_000
+
+
+@pytest.mark.slow  # 20 000 variables
+@pytest.mark.parametrize(
+    "text",
+    [
+        "system: s\nvariables:\n"
+        + "".join(f"  v{number}: '${{v{number + 1}}}'\n" for number in range(MANY))
+        + f"  v{MANY}: 1\nx: ${{v0}}",
+        "system: s\nvariables:\n"
+        + "".join(f"  v{number}: '${{v{(number + 1) % MANY}}}'\n" for number in range(MANY)),
+        "system: s\nvariables:\n"
+        + "".join(f"  variable_{number}: 1\n" for number in range(MANY))
+        + "x:\n"
+        + "".join(f"  - ${{variabel_{number}}}\n" for number in range(MANY)),
+        "system: s\nx: '" + "${" * 400_000 + "'",
+        "system: s\nx: '" + "$${" * 300_000 + "'",
+    ],
+    ids=["a long chain", "a long circle", "many unknown", "many beginnings", "many escapes"],
+)
+def test_linear(text: str) -> None:
+    tree = tree_of(text)
+    started = time.process_time()
+    _, diagnostics = expand(tree, {})
+    assert time.process_time() - started < SECONDS_ALLOWED
+    assert all(len(item.message) < 200 and len(item.related) < 10 for item in diagnostics)

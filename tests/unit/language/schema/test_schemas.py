@@ -1,0 +1,170 @@
+"""The schemas themselves: valid, complete for editors, and the ones the shipped files keep to."""
+
+from __future__ import annotations
+
+import json
+import runpy
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft7Validator
+
+from composer.base.resources import nodes_folder, schemas_folder, systems_folder
+from composer.base.source import SourceFile
+from composer.language.document import parse_document, read_document
+from composer.language.schema import SCHEMAS, check_schema, kind_of, schema
+from composer.language.schema.explanations import KEYWORDS
+from composer.language.tree import plain
+from tests.unit.support.growth import assert_linear
+
+SHIPPED = sorted([*systems_folder().glob("*.yaml"), *nodes_folder().glob("*.yaml")])
+ANNOTATIONS = {"$schema", "title", "description", "default", "examples", "definitions"}
+APPLICATORS = {"properties", "items", "allOf", "if", "then", "else", "$ref"}
+
+
+def parts_of(part: Any) -> Iterator[dict[str, Any]]:
+    """Yield every schema within a schema."""
+    if not isinstance(part, dict):
+        return
+    yield part
+    for name in ("items", "if", "then", "else", "additionalProperties", "not"):
+        yield from parts_of(part.get(name))
+    for name in ("allOf", "anyOf", "oneOf"):
+        for item in part.get(name, ()):
+            yield from parts_of(item)
+    for name in ("properties", "definitions"):
+        for item in part.get(name, {}).values():
+            yield from parts_of(item)
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_is_a_schema(name: str) -> None:
+    Draft7Validator.check_schema(schema(name))
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_is_made_from_its_parts(name: str) -> None:
+    build = runpy.run_path(str(schemas_folder() / "build.py"))
+    made = build["build"](name)
+    assert build["path"](name).read_text() == made, "run 'python schemas/build.py'"
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_keyword_has_its_words(name: str) -> None:
+    used = {keyword for part in parts_of(schema(name)) for keyword in part}
+    assert used - ANNOTATIONS - APPLICATORS <= KEYWORDS
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_key_is_described(name: str) -> None:
+    whole = schema(name)
+    definitions = whole["definitions"]
+
+    def described(part: dict[str, Any]) -> bool:
+        reference = part.get("$ref", "").removeprefix("#/definitions/")
+        return "description" in part or (reference != "" and described(definitions[reference]))
+
+    bare = [
+        f"{part.get('title')}: {key}"
+        for part in parts_of(whole)
+        for key, value in part.get("properties", {}).items()
+        if not described(value)
+    ]
+    assert bare == []
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_map_of_keys_is_closed(name: str) -> None:
+    open_maps = [
+        part.get("title")
+        for part in parts_of(schema(name))
+        if "properties" in part and part.get("additionalProperties") is not False
+    ]
+    assert open_maps == []
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_examples_and_defaults_are_valid(name: str) -> None:
+    whole = schema(name)
+    for part in parts_of(whole):
+        values = [*part.get("examples", ()), *([part["default"]] if "default" in part else [])]
+        validator = Draft7Validator({**part, "definitions": whole["definitions"]})
+        for value in values:
+            assert list(validator.iter_errors(value)) == [], part
+
+
+def test_unknown_schema() -> None:
+    with pytest.raises(KeyError):
+        schema("../../etc/passwd")
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
+def test_shipped_file(path: Path) -> None:
+    tree, _, diagnostics = read_document(path)
+    assert tree is not None
+    kind = kind_of(tree)
+    assert kind is not None
+    assert [item.message for item in (*diagnostics, *check_schema(tree, kind))] == []
+    # An editor has plain JSON Schema, without the composer's stricter idea of an integer.
+    assert Draft7Validator(schema(kind)).is_valid(plain(tree))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
+def test_an_editor_finds_the_schema_of_a_shipped_file(path: Path) -> None:
+    first = path.read_text(encoding="utf-8").splitlines()[0]
+    mark, _, reference = first.partition("=")
+    assert mark == "# yaml-language-server: $schema"
+    tree, _, _ = read_document(path)
+    assert tree is not None
+    found = json.loads((path.parent / reference).read_text(encoding="utf-8"))
+    assert found == schema(str(kind_of(tree)))
+
+
+def large_system(nodes: int) -> str:
+    lines = ["system: large", "nodes:"]
+    for number in range(nodes):
+        lines += [
+            f"  node_{number}:",
+            "    type: relay",
+            "    variables: {message_type: std_msgs/msg/String}",
+            "    parameters: {rate_hz: 10.0}",
+        ]
+    lines.append("connections:")
+    for number in range(3 * nodes):
+        ends = f"from: node_{number % nodes}.output, to: node_{(number + 1) % nodes}.input"
+        lines.append(f"  - {{topic: /t{number}, {ends}}}")
+    return "\n".join(lines)
+
+
+def check_of(sizes: tuple[int, int], *mistakes: tuple[str, str]) -> Callable[[int], bool]:
+    """Return a function that checks the system of a size; it returns whether that is valid."""
+    trees = {}
+    for nodes in sizes:
+        text = large_system(nodes)
+        for right, wrong in mistakes:
+            text = text.replace(right, wrong)
+        trees[nodes], diagnostics = parse_document(SourceFile("f", text))
+        assert diagnostics == []
+
+    def check(nodes: int) -> bool:
+        tree = trees[nodes]
+        assert tree is not None
+        return not check_schema(tree, "system")
+
+    return check
+
+
+@pytest.mark.slow  # 2000 nodes
+def test_a_large_system_costs_no_more_than_in_proportion() -> None:
+    check = check_of((250, 2000))
+    assert check(250)
+    assert_linear(check, 250, 2000)
+
+
+@pytest.mark.slow  # 800 nodes with mistakes
+def test_mistakes_everywhere_cost_no_more_than_in_proportion() -> None:
+    check = check_of((100, 800), ("type:", "typ:"), ("topic", "topc"))
+    assert not check(100)
+    assert_linear(check, 100, 800)

@@ -1,0 +1,383 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.base.source import Located, SourceFile
+from composer.language.document import parse_document
+from composer.model import Dependency, Event, ExecutorKind, PortKind, PrimaryState
+from composer.model.resolve import resolve
+from composer.project import Project
+from composer.project.node_types import NodeTypes
+from tests.unit.support.resolving import quoted, resolve_text, system_of
+
+CAMERA = """\
+node: camera
+description: Takes pictures.
+behavior: camera:Camera
+variables: {message_type: {default: std_msgs/msg/String}}
+parameters:
+  rate_hz: {type: double, default: 10.0}
+publishers:
+  image: {type: "${message_type}", qos: sensor_data}
+timers:
+  shoot: {period_ms: 100, log: click}
+state: {count_of_pictures: 0}
+on_activate: {log: ready}
+"""
+
+
+@pytest.fixture
+def nodes(tmp_path: Path) -> Path:
+    (tmp_path / "camera.yaml").write_text(CAMERA)
+    return tmp_path
+
+
+def test_a_system_says_what_is_in_it() -> None:
+    system = system_of("""\
+        system: robot
+        description: Two nodes.
+        executors:
+          control: {kind: single_threaded}
+          perception: {kind: multi_threaded, threads: 4}
+          rest: {cpus: [1, 3], priority: 50}
+        lifecycle: {autostart: inactive}
+        nodes:
+          talker: {executor: control, description: Talks.}
+          listener:
+        """)
+    assert system.name.value == "robot"
+    assert quoted(system.span) == "robot"
+    assert system.description == "Two nodes."
+    assert [(item.name.value, item.kind, item.threads) for item in system.executors] == [
+        ("control", ExecutorKind.SINGLE_THREADED, 2),
+        ("perception", ExecutorKind.MULTI_THREADED, 4),
+        ("rest", ExecutorKind.EVENTS, 2),
+    ]
+    assert [(item.cpus, item.priority) for item in system.executors] == [
+        ((), None),
+        ((), None),
+        ((1, 3), 50),
+    ]
+    assert system.autostart is PrimaryState.INACTIVE
+    talker, listener = system.nodes
+    assert (talker.name.value, talker.description, str(talker.executor)) == (
+        "talker",
+        "Talks.",
+        "control",
+    )
+    assert quoted(talker.span) == "talker"
+    assert listener.executor is None
+    assert system.node("listener") is listener
+    assert system.node("missing") is None
+
+
+def test_namespaces_are_below_the_systems_unless_absolute() -> None:
+    system = system_of("""\
+        system: robot
+        namespace: robot1
+        nodes:
+          plain: {}
+          deep: {namespace: arm/left}
+          away: {namespace: /world}
+        """)
+    assert [node.full_name for node in system.nodes] == [
+        "/robot1/plain",
+        "/robot1/arm/left/deep",
+        "/world/away",
+    ]
+    assert quoted(system.nodes[1].namespace.span) == "arm/left"
+
+
+def test_the_command_lines_namespace_takes_the_place_of_the_systems() -> None:
+    text = """\
+        system: robot
+        namespace: robot1
+        nodes: {talker: {}, away: {namespace: /world}}
+        """
+    system = system_of(text, namespace="robot2")
+    assert [node.full_name for node in system.nodes] == ["/robot2/talker", "/world/away"]
+    span = system.nodes[0].namespace.span
+    assert (span.file.path, quoted(span)) == ("--namespace", "robot2")
+
+
+def test_dependencies_are_a_list_or_a_map() -> None:
+    system = system_of("""\
+        system: robot
+        nodes:
+          a: {lifecycle: {depends_on: [b, missing]}}
+          b: {lifecycle: {depends_on: {c: inactive, d: active}, autostart: unconfigured}}
+        """)
+    a, b = system.nodes
+    assert [item.node.value for item in a.depends_on] == ["b", "missing"]
+    assert {item.state for item in a.depends_on} == {PrimaryState.ACTIVE}
+    span = a.span
+    assert b.depends_on == (
+        Dependency(Located("c", span), PrimaryState.INACTIVE),
+        Dependency(Located("d", span), PrimaryState.ACTIVE),
+    )
+    assert quoted(a.depends_on[0].node.span) == "b"
+    assert b.autostart is not None
+    assert b.autostart.value is PrimaryState.UNCONFIGURED
+
+
+def test_a_type_gives_a_node_what_it_is_made_of(nodes: Path) -> None:
+    system = system_of(
+        """\
+        system: robot
+        nodes:
+          front: {type: camera, namespace: perception}
+        """,
+        nodes,
+    )
+    (front,) = system.nodes
+    assert (str(front.type_name), front.type_found, front.complete) == ("camera", True, True)
+    assert front.description == "Takes pictures."
+    assert front.behavior is not None
+    assert (front.behavior.module, front.behavior.class_name) == ("camera", "Camera")
+    assert front.behavior.folder == nodes
+    image = front.port("image")
+    assert image is not None
+    assert (image.kind, image.full_name) == (PortKind.PUBLISHER, "/perception/image")
+    assert image.span.file.path.endswith("camera.yaml")
+    assert [timer.name.value for timer in front.timers] == ["shoot"]
+    assert [(name.value, value) for name, value in front.state] == [("count_of_pictures", 0)]
+    assert [event for event, _ in front.reactions] == [Event.ACTIVATE]
+
+
+def test_variables_make_types_different(nodes: Path) -> None:
+    system = system_of(
+        """\
+        system: robot
+        nodes:
+          front: {type: camera}
+          back: {type: camera, variables: {message_type: sensor_msgs/msg/Image}}
+        """,
+        nodes,
+    )
+    types = [str(node.ports[0].interface) for node in system.nodes]
+    assert types == ["std_msgs/msg/String", "sensor_msgs/msg/Image"]
+
+
+def test_an_instance_refines_what_its_type_has(nodes: Path) -> None:
+    system = system_of(
+        """\
+        system: robot
+        nodes:
+          front:
+            type: camera
+            publishers: {image: {qos: state, required: false}}
+            timers: {shoot: {rate_hz: 5}}
+            state: {count_of_pictures: 7}
+            on_activate: {log: steady}
+        """,
+        nodes,
+    )
+    (front,) = system.nodes
+    image = front.ports[0]
+    assert (str(image.interface), image.qos.profile.depth) == ("std_msgs/msg/String", 1)
+    assert not image.required
+    assert image.span.file.path == "robot.yaml"
+    period = front.timers[0].period
+    assert (period.value, period.unit) == (5, "rate_hz")
+    assert front.timers[0].reaction is not None
+    assert [value for _, value in front.state] == [7]
+    assert dict(front.reactions)[Event.ACTIVATE].span.file.path == "robot.yaml"
+
+
+def test_what_the_type_lacks_is_unknown(nodes: Path) -> None:
+    system = system_of(
+        """\
+        system: robot
+        nodes:
+          front:
+            type: camera
+            parameters: {rate: 3}
+            publishers: {picture: {qos: state}}
+            subscriptions: {image: {qos: state}}
+            timers: {shot: {rate_hz: 5}}
+        """,
+        nodes,
+    )
+    assert [(item.section, item.name.value, item.known) for item in system.nodes[0].unknown] == [
+        ("publishers", "picture", ("image",)),
+        ("subscriptions", "image", ()),
+        ("timers", "shot", ("shoot",)),
+        ("parameters", "rate", ("rate_hz",)),
+    ]
+    assert quoted(system.nodes[0].unknown[0].name.span) == "picture"
+
+
+def test_of_an_unknown_type_nothing_is_known() -> None:
+    system = system_of("""\
+        system: robot
+        nodes:
+          front: {type: camra, parameters: {rate: 3}, publishers: {image: {qos: state}}}
+        """)
+    (front,) = system.nodes
+    assert (str(front.type_name), front.type_found, front.complete) == ("camra", False, False)
+    assert (front.ports, front.parameters, front.unknown) == ((), (), ())
+
+
+def test_a_type_file_with_errors_reports_them_once_and_is_incomplete(nodes: Path) -> None:
+    (nodes / "broken.yaml").write_text("node: broken\nservices: [\n")
+    (nodes / "system.yaml").write_text("system: robot\n")
+    system, diagnostics = resolve_text(
+        """\
+        system: robot
+        nodes:
+          one: {type: broken}
+          two: {type: broken}
+          three: {type: system}
+        """,
+        nodes,
+    )
+    assert [(node.type_found, node.complete) for node in system.nodes] == [(True, False)] * 3
+    paths = [Path(diagnostic.primary.file.path).name for diagnostic in diagnostics]
+    assert paths == ["broken.yaml", "system.yaml"]
+    assert diagnostics[1].rule.name == "wrong-kind-of-file"
+    assert "is a system, not a node type" in diagnostics[1].message
+
+
+def test_an_error_in_an_expression_of_a_type_is_reported_once(nodes: Path) -> None:
+    (nodes / "broken.yaml").write_text(
+        "node: broken\nvariables: {text: {default: a}}\ndescription: ${text}\n"
+        "timers: {tick: {period_ms: 5, when: 1 +}}\n"
+        "publishers: {out: {type: std_msgs/msg/String}}\n"
+    )
+    _, diagnostics = resolve_text(
+        """\
+        system: robot
+        nodes:
+          one: {type: broken}
+          two: {type: broken, variables: {text: b}}
+          three: {type: broken, publishers: {out: {qos: state}}}
+        """,
+        nodes,
+    )
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-expression"]
+
+
+def test_a_node_type_alone_is_a_system_of_one(nodes: Path) -> None:
+    system = system_of(CAMERA, nodes)
+    assert system.node_type
+    assert system.name.value == "camera"
+    (camera,) = system.nodes
+    assert camera.full_name == "/camera"
+    assert camera.type_name is None
+    assert camera.ports[0].interface.value == "std_msgs/msg/String"
+
+
+def test_a_variable_without_value_makes_nothing_wrong() -> None:
+    system = system_of("""\
+        node: relay
+        variables: {kind: {}, condition: {}, rate: {}}
+        subscriptions:
+          input:
+            type: ${kind}
+            topic: /${kind}/in
+            qos: ${kind}
+            when: "${condition} > {"
+            log: "${kind} {"
+        timers: {tick: {rate_hz: "${rate}"}}
+        """)
+    (relay,) = system.nodes
+    assert relay.ports[0].full_name == "/${kind}/in"
+    assert system.qos_references == ()
+    assert len(relay.timers) == 1
+
+
+def test_a_file_of_neither_kind_has_a_diagnostic(tmp_path: Path) -> None:
+    source = SourceFile("compose.yaml", "nodes: {}\n")
+    tree, _ = parse_document(source)
+    assert tree is not None
+    system, (diagnostic,) = resolve(tree, source, NodeTypes.of(Project.at(tmp_path)))
+    assert system is None
+    assert diagnostic.message == "'compose.yaml' is neither a system nor a node type"
+    assert quoted(diagnostic.primary) == "nodes"
+
+
+def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
+    (tmp_path / "relay.yaml").write_text(
+        "node: relay\nvariables: {kind: {}}\nsubscriptions: {in: {type: '${kind}'}}\n"
+    )
+    system, diagnostics = resolve_text(
+        """\
+        system: robot
+        nodes:
+          good: {type: relay, variables: {kind: x/msg/X}}
+          bad: {type: relay}
+          worse: {type: relay}
+        """,
+        tmp_path,
+    )
+    assert [(diagnostic.rule.name, diagnostic.primary.line) for diagnostic in diagnostics] == [
+        ("missing-variable", 4),
+        ("missing-variable", 5),
+    ]
+    assert diagnostics[0].message == "node type 'relay' needs a value for its variable 'kind'"
+    assert quoted(diagnostics[0].primary) == "relay"
+    assert quoted(diagnostics[0].related[0].span) == "kind"
+    assert [node.ports[0].interface.value for node in system.nodes] == [
+        "x/msg/X",
+        "${kind}",
+        "${kind}",
+    ]
+
+
+def test_a_mistake_in_an_argument_is_reported_at_every_argument(tmp_path: Path) -> None:
+    (tmp_path / "filter.yaml").write_text(
+        "node: filter\nvariables: {condition: {}, count: {default: 1}}\n"
+        "subscriptions: {in: {type: x/msg/X, when: '${condition}', required: '${count}'}}\n"
+    )
+    _, diagnostics = resolve_text(
+        """\
+        system: robot
+        nodes:
+          one: {type: filter, variables: {condition: 1 +, count: true}}
+          two: {type: filter, variables: {condition: 1 +, count: true}}
+          three: {type: filter, variables: {condition: count > 1, count: [1]}}
+          four: {type: filter, variables: {condition: count > 1, count: [1]}}
+        """,
+        tmp_path,
+    )
+    assert [diagnostic.primary.line for diagnostic in diagnostics] == [3, 4, 5, 6]
+    assert {diagnostic.primary.file.path for diagnostic in diagnostics} == {"robot.yaml"}
+
+
+def test_a_node_may_have_another_name_in_ros(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        "/front/camera: {ros__parameters: {rate_hz: 5.0}}\n"
+        "/front_camera: {ros__parameters: {rate_hz: 1.0}}\n"
+    )
+    system, diagnostics = resolve_text(
+        """\
+        system: robot
+        parameter_files: [robot.yaml]
+        nodes:
+          front_camera:
+            name: camera
+            namespace: front
+            parameters: {rate_hz: {type: double, default: 2.0}}
+            publishers:
+              image: {type: sensor_msgs/msg/Image, topic: ~/image}
+              info: {type: sensor_msgs/msg/CameraInfo}
+          viewer:
+            lifecycle: {depends_on: [front_camera]}
+            subscriptions: {image: {type: sensor_msgs/msg/Image}}
+        connections:
+          - {topic: /image, from: front_camera.image, to: viewer.image}
+          - {topic: /info, from: front_camera.info}
+        """,
+        tmp_path,
+    )
+    assert diagnostics == []
+    camera, _ = system.nodes
+    assert camera.name.value == "front_camera"
+    assert camera.full_name == "/front/camera"
+    assert camera.ros_name.span.line == 5
+    assert [port.full_name for port in camera.ports] == ["/image", "/info"]
+    assert camera.initial_parameters == {"rate_hz": 5.0}
+    (unmatched,) = system.unmatched_parameters
+    assert unmatched.section.value == "/front_camera"

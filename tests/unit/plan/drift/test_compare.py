@@ -1,0 +1,271 @@
+"""The differences between a declared system and an observed graph, without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from composer.model import PortKind, PrimaryState
+from composer.model.qos import Durability, QosProfile, Reliability
+from composer.plan.drift import Drift, DriftKind, ObservedEndpoint, ObservedNode, Snapshot, compare
+from tests.unit.support.resolving import system_of
+
+SYSTEM = system_of("""
+    system: shop
+    nodes:
+      clerk:
+        namespace: front
+        parameters: {speed: 1.5, on: true, tags: [a, b]}
+        publishers: {bill: {type: std_msgs/msg/String, topic: /bill, qos: state}}
+        services: {ask: {type: std_srvs/srv/Trigger, respond: {success: true}}}
+      guard:
+        lifecycle: {autostart: inactive}
+        subscriptions: {bill: {type: std_msgs/msg/String, topic: /bill, qos: command}}
+      sleeper:
+        lifecycle: {autostart: unconfigured}
+        publishers: {dream: {type: std_msgs/msg/String}}
+""")
+STRING = "std_msgs/msg/String"
+STATE = QosProfile(durability=Durability.TRANSIENT_LOCAL)
+BILL = ObservedEndpoint(PortKind.PUBLISHER, "/bill", STRING, STATE)
+ASK = ObservedEndpoint(PortKind.SERVICE, "/front/ask", "std_srvs/srv/Trigger")
+CLERK = ObservedNode(
+    "/front/clerk", (BILL, ASK), "active", {"speed": 1.5, "on": True, "tags": ["a", "b"]}
+)
+GUARD = ObservedNode(
+    "/guard", (ObservedEndpoint(PortKind.SUBSCRIPTION, "/bill", STRING, QosProfile()),), "inactive"
+)
+SLEEPER = ObservedNode("/sleeper", (), "unconfigured")
+ALL = (CLERK, GUARD, SLEEPER)
+
+
+def differences(*nodes: ObservedNode, **options: object) -> list[str]:
+    return [drift.message for drift in found(*nodes, **options)]
+
+
+def found(*nodes: ObservedNode, **options: object) -> tuple[Drift, ...]:
+    return compare(SYSTEM, Snapshot(nodes), **options)  # type: ignore[arg-type]
+
+
+def test_a_system_as_declared_has_no_drift() -> None:
+    assert differences(*ALL) == []
+
+
+def test_a_missing_node_is_reported_with_the_most_similar_one() -> None:
+    clark = replace(CLERK, full_name="/front/clark")
+    missing, extra = found(clark, GUARD, SLEEPER)
+    assert missing.message == "/front/clerk: the node does not exist"
+    assert missing.hint == "'/front/clark' exists: did you mean that?"
+    assert missing.span is not None
+    assert extra.message == "/front/clark: the node exists, but is not declared"
+
+
+def test_a_node_in_another_namespace_is_similar() -> None:
+    (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
+    assert "'/clerk' exists" in missing.hint
+
+
+def test_two_nodes_with_one_name_are_reported() -> None:
+    assert differences(replace(CLERK, count=2), GUARD, SLEEPER) == [
+        "/front/clerk: 2 nodes have this name"
+    ]
+
+
+def test_undeclared_nodes_are_extra_unless_ignored_hidden_or_the_manager() -> None:
+    manager = ObservedNode(
+        "/shop/manager",
+        (ObservedEndpoint(PortKind.SERVICE, "/shop/manager/is_active", "std_srvs/srv/Trigger"),),
+    )
+    assert differences(*ALL, manager, ObservedNode("/_ros2cli_7")) == []
+    assert differences(*ALL, ObservedNode("/other/manager")) == [
+        "/other/manager: the node exists, but is not declared"
+    ]
+    assert differences(*ALL, ObservedNode("/rviz2"), ignored=["/rviz*"]) == []
+
+
+@pytest.mark.parametrize("name", ["/stranger", "/_ros2cli_7"])
+def test_another_type_on_a_declared_topic_is_reported_for_any_node(name: str) -> None:
+    stranger = ObservedNode(
+        name, (ObservedEndpoint(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8"),)
+    )
+    assert (
+        f"{name}: type of its publisher /bill is std_msgs/msg/Int8, declared {STRING}"
+    ) in differences(*ALL, stranger, ignored=["/stranger"])
+
+
+def test_a_missing_endpoint_is_reported_with_the_most_similar_one() -> None:
+    bills = replace(BILL, name="/bills")
+    missing, extra = found(replace(CLERK, endpoints=(bills, ASK)), GUARD, SLEEPER)
+    assert missing.kind is DriftKind.MISSING_ENDPOINT
+    assert missing.message == "/front/clerk: publisher /bill is missing"
+    assert missing.hint == "it has '/bills': did you mean that?"
+    assert extra.message == "/front/clerk: publisher /bills exists, but is not declared"
+
+
+def test_a_cleaned_up_node_is_reported_with_its_state_and_missing_endpoints() -> None:
+    gone = found(replace(CLERK, endpoints=(), state="unconfigured"), GUARD, SLEEPER)
+    assert [drift.message for drift in gone] == [
+        "/front/clerk: lifecycle state is unconfigured, declared active",
+        "/front/clerk: publisher /bill is missing",
+        "/front/clerk: service /front/ask is missing",
+    ]
+    assert gone[1].hint == "the node is unconfigured: it has no ports"
+
+
+def test_an_unconfigured_node_needs_no_endpoints() -> None:
+    assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
+        "/sleeper: lifecycle state is inactive, declared unconfigured",
+        "/sleeper: publisher /dream is missing",
+    ]
+
+
+def test_the_autostart_state_can_be_overridden() -> None:
+    inactive = replace(CLERK, state="inactive")
+    assert differences(inactive, GUARD, SLEEPER, autostart=PrimaryState.INACTIVE) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (
+            lambda end: replace(end, type="std_msgs/msg/Int8"),
+            f"type of publisher /bill is std_msgs/msg/Int8, declared {STRING}",
+        ),
+        (
+            lambda end: replace(end, qos=replace(STATE, reliability=Reliability.BEST_EFFORT)),
+            "reliability of publisher /bill is best_effort, declared reliable",
+        ),
+        (
+            lambda end: replace(end, qos=replace(STATE, durability=Durability.VOLATILE)),
+            "durability of publisher /bill is volatile, declared transient_local",
+        ),
+        (
+            lambda end: replace(end, qos=replace(STATE, deadline_ms=20.0)),
+            "deadline_ms of publisher /bill is 20, declared no limit",
+        ),
+    ],
+)
+def test_types_and_offered_qos(
+    change: Callable[[ObservedEndpoint], ObservedEndpoint], expected: str
+) -> None:
+    clerk = replace(CLERK, endpoints=(change(BILL), ASK))
+    assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {expected}"]
+
+
+def test_depth_and_history_are_not_compared_because_discovery_omits_them() -> None:
+    deep = replace(BILL, qos=replace(STATE, depth=77))
+    assert differences(replace(CLERK, endpoints=(deep, ASK)), GUARD, SLEEPER) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"speed": 2.5}, ["parameter speed is 2.5, declared 1.5"]),
+        ({"on": 1}, ["parameter on is 1, declared true"]),
+        ({"tags": ["a"]}, ["parameter tags is ['a'], declared ['a', 'b']"]),
+        ({"use_sim_time": True}, []),
+    ],
+)
+def test_parameter_values(values: dict[str, object], expected: list[str]) -> None:
+    assert CLERK.parameters is not None
+    clerk = replace(CLERK, parameters={**CLERK.parameters, **values})
+    assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {text}" for text in expected]
+
+
+def test_a_missing_parameter() -> None:
+    clerk = replace(CLERK, parameters={"on": True, "tags": ["a", "b"]})
+    assert differences(clerk, GUARD, SLEEPER) == ["/front/clerk: parameter speed is missing"]
+
+
+def test_a_node_that_does_not_respond_is_reported() -> None:
+    silent = replace(CLERK, state=None, parameters=None)
+    assert differences(silent, GUARD, SLEEPER) == [
+        "/front/clerk: no response to the request for its lifecycle state",
+        "/front/clerk: no response to the request for its parameters",
+    ]
+
+
+def test_a_node_without_a_lifecycle_differs() -> None:
+    assert differences(replace(CLERK, state=""), GUARD, SLEEPER) == [
+        "/front/clerk: lifecycle state is none: it is not a lifecycle node, declared active"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "type_name"),
+    [
+        (PortKind.PUBLISHER, "/rosout", "rcl_interfaces/msg/Log"),
+        (PortKind.PUBLISHER, "/a/transition_event", "lifecycle_msgs/msg/TransitionEvent"),
+        (PortKind.SERVICE, "/a/get_parameters", "rcl_interfaces/srv/GetParameters"),
+        (PortKind.CLIENT, "/a/change_state", "lifecycle_msgs/srv/ChangeState"),
+    ],
+)
+def test_endpoints_for_tools_are_recognized(kind: PortKind, name: str, type_name: str) -> None:
+    assert ObservedEndpoint(kind, name, type_name).is_for_tools
+    assert not ObservedEndpoint(kind, name, "example_interfaces/msg/Other").is_for_tools
+    assert not ObservedEndpoint(kind, f"{name}_more", type_name).is_for_tools
+
+
+def test_ports_of_other_programs_are_compared_only_if_some_are_declared() -> None:
+    driver = ObservedNode("/driver", (BILL,))
+    text = "system: shop\nnodes: {driver: {executable: {command: [driver]}PORTS}}\n"
+    without = system_of(text.replace("PORTS", ""))
+    assert compare(without, Snapshot((driver,))) == ()
+    ports = ", services: {ask: {type: std_srvs/srv/Trigger}}"
+    with_ports = system_of(text.replace("PORTS", ports))
+    assert [drift.kind for drift in compare(with_ports, Snapshot((driver,)))] == [
+        DriftKind.MISSING_ENDPOINT,
+        DriftKind.EXTRA_ENDPOINT,
+    ]
+
+
+def test_transforms_are_published_by_their_node_and_received_by_the_manager() -> None:
+    system = system_of("""
+        system: frames
+        nodes:
+          mounts:
+            transforms:
+              static: {laser: {parent: base_link, translation_m: {x: 1}}}
+              lookup: [laser]
+          viewer:
+            external: true
+            publishers: {bill: {type: std_msgs/msg/String, topic: /bill, qos: state}}
+            transforms: {lookup: [laser]}
+    """)
+    message, latched = "tf2_msgs/msg/TFMessage", QosProfile(durability=Durability.TRANSIENT_LOCAL)
+    static = ObservedEndpoint(PortKind.PUBLISHER, "/tf_static", message, latched)
+    listens = ObservedEndpoint(PortKind.SUBSCRIPTION, "/tf_static", message, latched)
+    viewer = ObservedNode("/viewer", (BILL, listens), "")
+    mounts = ObservedNode("/mounts", (static,), "active")
+    missing = compare(system, Snapshot((mounts, viewer)))
+    assert [item.subject for item in missing if "/tf" in item.subject] == ["subscription /tf"]
+    missing = compare(system, Snapshot((replace(mounts, endpoints=()), viewer)))
+    subjects = [item.subject for item in missing if item.node == "/mounts"]
+    assert subjects == ["publisher /tf_static"]
+
+
+def test_nodes_in_a_program_are_known() -> None:
+    system = system_of("""
+        system: robot
+        nodes:
+          base: {executable: {command: [base], nodes: [base, drive/wheels]}}
+    """)
+    base, wheels = (ObservedNode(name) for name in ("/base", "/drive/wheels"))
+    assert compare(system, Snapshot((base, wheels))) == ()
+    (missing,) = compare(system, Snapshot((base,)))
+    assert missing.message == "/drive/wheels: the node does not exist"
+
+
+def test_a_parameter_that_is_only_passed_on_may_be_missing() -> None:
+    system = system_of("""
+        system: robot
+        nodes:
+          arm: {executable: {command: [arm]}}
+    """)
+    passed_on = SYSTEM.nodes[0].parameters[:1]
+    system = replace(system, nodes=(replace(system.nodes[0], undeclared_parameters=passed_on),))
+    assert compare(system, Snapshot((ObservedNode("/arm"),))) == ()
+    (wrong,) = compare(system, Snapshot((ObservedNode("/arm", parameters={"speed": 2.0}),)))
+    assert wrong.message == "/arm: parameter speed is 2.0, declared 1.5"
