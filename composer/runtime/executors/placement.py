@@ -22,7 +22,8 @@ _SWITCH_INTERVAL_S = 0.001
 def switch_threads_sooner() -> None:
     """Let a thread wait less for the interpreter while another one computes.
 
-    See docs/decisions/0069-turns-of-threads.md. A shorter interval that is set already is kept.
+    A shorter interval that is set already is kept.
+    See docs/decisions/0009-event-driven-executor.md.
     """
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
 

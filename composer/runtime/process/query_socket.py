@@ -4,7 +4,7 @@ A command that joins the ROS graph itself imports rclpy and waits for discovery,
 second. The manager of a running system discovered the graph long ago, and knows the states and
 parameters of its nodes. It listens on a Unix socket next to the instance lock. A command sends the
 name of a query and an argument as one line of JSON, and receives the answer as one JSON document,
-with null if the manager is not certain. See docs/decisions/0042-query-socket.md.
+with null if the manager is not certain. See docs/decisions/0015-query-socket.md.
 """
 
 from __future__ import annotations
