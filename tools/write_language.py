@@ -47,6 +47,8 @@ _WORDS = {
     "boolean": "boolean",
     "null": "null",
 }
+#: A cell of a table has the first sentence, and further ones up to this number of words.
+_WORDS_IN_CELL = 18
 _SUBSTITUTION = r"\$\{"
 _EXPRESSION = r"\{"
 
@@ -170,6 +172,7 @@ class Schema:
 
 def page() -> str:
     """Return the page."""
+    details = Details()
     parts = [INTRODUCTION.read_text(encoding="utf-8").replace("FUNCTIONS", _functions())]
     known: set[str] = set()
     for name in SCHEMAS:
@@ -179,18 +182,67 @@ def page() -> str:
         for section in document.sections.values():
             if section.heading not in known:
                 known.add(section.heading)
-                parts.append(_rendered(section, document))
+                parts.append(_rendered(section, document, details))
     return "\n".join(parts)
 
 
-def _rendered(section: Section, document: Schema) -> str:
+@dataclass(slots=True)
+class Details:
+    """What the cells of the tables leave out: below the first table that has the key."""
+
+    headings: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def lines(self, heading: str, texts: dict[str, str]) -> Iterator[str]:
+        """Yield a list of the texts by key, and where the ones are that an earlier section has."""
+        elsewhere: dict[str, list[str]] = {}
+        for key, text in texts.items():
+            first = self.headings.setdefault((key, text), heading)
+            if first == heading:
+                yield from _detail(key, text)
+            else:
+                elsewhere.setdefault(first, []).append(f"`{key}`")
+        for first, keys in elsewhere.items():
+            yield f"- {', '.join(keys)}: see {_link(first)}"
+
+
+def _detail(key: str, text: str) -> Iterator[str]:
+    """Yield the lines of a list item; the values of an enumeration are items of their own."""
+    choices = re.search(r"(?:^|(?<=\s))\w+: [^;.]*(?:; \w+: [^;.]*)+\.", text)
+    if choices is None:
+        yield f"- `{key}`: {text}"
+        return
+    before, after = text[: choices.start()].strip(), text[choices.end() :].strip()
+    yield f"- `{key}`: {' '.join(part for part in (before, after) if part)}".rstrip(": ")
+    for choice in choices[0].removesuffix(".").split("; "):
+        value, _, meaning = choice.partition(": ")
+        yield f"    - `{value}`: {meaning}"
+
+
+def _cell_and_details(text: str) -> tuple[str, str]:
+    """Return the sentences of a description that a cell has, and the others."""
+    first, *others = re.split(r"(?<=\.)\s+(?=[A-Z`a-z])", text)
+    while (
+        others and len(f"{first} {others[0]}".split()) <= _WORDS_IN_CELL and ": " not in others[0]
+    ):
+        first = f"{first} {others.pop(0)}"
+    return first, " ".join(others)
+
+
+def _rendered(section: Section, document: Schema, details: Details) -> str:
     level = "##" if section.heading in _FILES.values() else "###"
     lines = [f"{level} {section.heading}", ""]
     if "description" in section.part:
         lines += [section.part["description"], ""]
     lines += ["| Key | Description | Value | Example |", "|---|---|---|---|"]
+    texts = {}
     for key, part in section.part["properties"].items():
-        lines.append(_row(key, part, section, document))
+        described = document.described(part)
+        cell, text = _cell_and_details(described.get("description", "").strip())
+        lines.append(_row(key, part, cell, section, document))
+        if text:
+            texts[key] = text
+    if texts:
+        lines += ["", *details.lines(section.heading, texts)]
     alternatives = [choice["required"] for choice in section.part.get("anyOf", ())]
     if alternatives:
         names = " and ".join(f"`{name}`" for choice in alternatives for name in choice)
@@ -198,9 +250,8 @@ def _rendered(section: Section, document: Schema) -> str:
     return "\n".join([*lines, ""])
 
 
-def _row(key: str, part: Part, section: Section, document: Schema) -> str:
+def _row(key: str, part: Part, what: str, section: Section, document: Schema) -> str:
     described = document.described(part)
-    what = described.get("description", "").strip()
     if key in section.required:
         what = f"**Required.** {what}"
     elif key in section.declared:
