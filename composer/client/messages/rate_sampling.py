@@ -13,10 +13,10 @@ from typing import Any, Self
 
 from rclpy.subscription import Subscription
 
-from composer.client.messages.rates import TopicRate
 from composer.client.messages.topics import measuring_qos
 from composer.client.messages.values import InvalidValueError, class_of
 from composer.client.session import Session
+from composer.runtime.metrics.message_rate import MessageRate
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 _DEPTH = 1000
@@ -29,13 +29,13 @@ class RateMeter:
     def __init__(self, session: Session, topics: Mapping[str, tuple[str, ...]]) -> None:
         self._graph = session.graph
         self._node = session.node
-        self._rates: dict[str, TopicRate] = {}
+        self._rates: dict[str, MessageRate] = {}
         self._subscriptions: dict[str, Subscription] = {}
         for topic, types in topics.items():
             subscription = self._subscribe(topic, types)
             if subscription is not None:
                 self._subscriptions[topic] = subscription
-                self._rates[topic] = TopicRate()
+                self._rates[topic] = MessageRate()
 
     def __enter__(self) -> Self:
         return self

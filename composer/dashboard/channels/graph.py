@@ -11,6 +11,7 @@ from composer.dashboard.feeds import Feed
 from composer.dashboard.observing.report_pairs import ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
+from composer.runtime.metrics.message_rate import CountedRate
 
 if TYPE_CHECKING:
     from composer.client.systems.system_reports import NodeReport
@@ -139,6 +140,7 @@ class LiveFeed(Feed):
         self._ros: RosGraphSide
         self._pairs = ReportPairs(lambda report: report.at_s)
         self._measured: set[str] = set()
+        self._rates: dict[str, CountedRate] = {}  # by the keys of edges
         #: What the topics to measure depend on, and these topics with their endpoints.
         self._known: object = None
         self._wanted: dict[str, list[ObservedEndpoint]] = {}
@@ -176,9 +178,26 @@ class LiveFeed(Feed):
         for pair in self._pairs.update(reports).values():
             known = {} if pair.before is None else {node.node: node for node in pair.before.nodes}
             for node in pair.now.nodes:
-                edges |= _edges(node, known.get(node.node), pair.passed_s)
+                edges |= self._edges(node, known.get(node.node), pair.now.at_s)
+        self._rates = {key: rate for key, rate in self._rates.items() if key in edges}
         topics = self._measure(reported)
         yield Update(to_json({"nodes": nodes, "edges": edges, "topics": topics}))
+
+    def _edges(self, node: NodeReport, before: NodeReport | None, now_s: float) -> dict[str, Any]:
+        """Return the rates of the topics of a node by the keys of their edges."""
+        found: dict[str, Any] = {}
+        for kind, counts in (("publisher", node.sent), ("subscription", node.received)):
+            for topic, count in counts.items():
+                key = f"{kind}:{node.node}.{topic}"
+                rate = self._rates.setdefault(key, CountedRate())
+                rate.read(count, now_s)
+                edge: dict[str, Any] = {"rate_hz": rate.current_hz(now_s)}
+                if kind == "subscription":
+                    total = node.dropped.get(topic, 0)
+                    known = total if before is None else before.dropped.get(topic, 0)
+                    edge |= {"dropped": max(0, total - known), "dropped_total": total}
+                found[key] = edge
+        return found
 
     def _measure(self, reported: set[str]) -> dict[str, Any]:
         """Measure the topics that no system reports; return their rates."""
@@ -236,23 +255,3 @@ def _state(node: NodeReport) -> dict[str, Any]:
         "pid": node.pid,
         "host": node.host,
     }
-
-
-def _edges(node: NodeReport, before: NodeReport | None, passed_s: float) -> dict[str, Any]:
-    """Return the rates of the topics of a node by the keys of their edges."""
-    found: dict[str, Any] = {}
-    for kind, now, earlier in (
-        ("publisher", node.sent, {} if before is None else before.sent),
-        ("subscription", node.received, {} if before is None else before.received),
-    ):
-        for topic, count in now.items():
-            rate_hz = None
-            if passed_s > 0.0 and before is not None:
-                rate_hz = max(0, count - earlier.get(topic, 0)) / passed_s
-            edge: dict[str, Any] = {"rate_hz": rate_hz}
-            if kind == "subscription":
-                total = node.dropped.get(topic, 0)
-                known = total if before is None else before.dropped.get(topic, 0)
-                edge |= {"dropped": max(0, total - known), "dropped_total": total}
-            found[f"{kind}:{node.node}.{topic}"] = edge
-    return found

@@ -13,10 +13,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
-from composer.client.messages.rates import TopicRate
 from composer.dashboard.observing.large_messages import LARGE_BYTES, LARGE_TYPES, large_profile
 from composer.model import PortKind
 from composer.model.qos import Durability, QosProfile, Reliability
+from composer.runtime.metrics.message_rate import MessageRate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from composer.plan.drift import ObservedEndpoint
 
 _DEPTH = 100
-#: A rate is that of the messages of the last seconds.
-_WINDOW_S = 3.0
-#: A topic is silent after this many times the length of the window.
-_SILENT_PERIODS = 3
 _MAX_TAKEN = 200
 
 
@@ -57,7 +53,7 @@ class _Meter:
     messages: int = 0
     lost: int = 0
     last_number: int = 0
-    rate: TopicRate = field(default_factory=TopicRate)
+    rate: MessageRate = field(default_factory=MessageRate)
 
 
 class TopicMeters:
@@ -152,12 +148,9 @@ def _take(meter: _Meter) -> None:
 
 def _figures(meter: _Meter, now_s: float) -> TopicFigures:
     rate = meter.rate
-    rate.forget_before(now_s - _WINDOW_S)
-    mean_bytes = rate.mean_bytes
+    rate_hz, mean_bytes = rate.current_hz(now_s), rate.mean_bytes
     if mean_bytes is None:
         return TopicFigures(None, None, None, None, 0, 0)
-    is_silent = now_s - rate.last_s > max(_WINDOW_S, _SILENT_PERIODS * rate.span_s)
-    rate_hz = 0.0 if is_silent else rate.hertz
     return TopicFigures(
         rate_hz=rate_hz,
         bytes_per_s=None if rate_hz is None else rate_hz * mean_bytes,

@@ -15,6 +15,7 @@ from collections.abc import Callable, Coroutine
 from math import inf
 from time import monotonic
 from typing import Any, Final, TypeVar
+from weakref import ref
 
 from composer.base.source import Located
 from composer.runtime.callbacks.context import NodeContext
@@ -60,10 +61,11 @@ class CallbackTimer:
     """Times the calls of one callback and checks its budget.
 
     ``to_skip`` is the number of the next calls that need not be timed. The caller decrements it for
-    each call that it does not time.
+    each call that it does not time. ``last_s`` is when the last timed call began.
     """
 
     __slots__ = (
+        "__weakref__",
         "_adapted_s",
         "_batch",
         "_budget",
@@ -72,6 +74,7 @@ class CallbackTimer:
         "_skip",
         "_statistics",
         "_times",
+        "last_s",
         "to_skip",
     )
 
@@ -82,7 +85,9 @@ class CallbackTimer:
         budget_ms: Located[float] | None,
     ) -> None:
         self._statistics = statistics
+        statistics.timer = ref(self)
         self._mutations = context.mutations
+        self.last_s = 0.0
         self._budget_s = inf if budget_ms is None else budget_ms.value / 1e3
         self._budget = CallbackBudget(context.log, statistics, self._budget_s)
         self._times = statistics.times
@@ -104,6 +109,7 @@ class CallbackTimer:
         Returns ``continuation``, the rest of an ``async`` call, timed.
         """
         duration_s = monotonic() - began_s
+        self.last_s = began_s
         if continuation is not None:
             self._time_every(1)
             return self._timed_steps(continuation, duration_s)
@@ -227,5 +233,6 @@ class Callback(CallbackTimer):
         if rest is not None or duration_s > self._budget_s or len(batch) >= _LAST:
             return self.finish(began_s, rest)
         batch.append(duration_s)  # as in finish, without a call
+        self.last_s = began_s
         self.to_skip = self._skip
         return None

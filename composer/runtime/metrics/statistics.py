@@ -6,7 +6,7 @@ import math
 import threading
 from bisect import bisect, bisect_left
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import field
 from itertools import accumulate, pairwise
 from typing import Protocol
@@ -146,10 +146,17 @@ _MIDDLES_S = (
 )
 
 
+class HasLastCall(Protocol):
+    """Keeps the time of its last call."""
+
+    last_s: float
+
+
 @dataclass(slots=True)
 class CallbackStatistics:
     """The counters of the callbacks of one port or timer.
 
+    ``timer`` refers to what times them while the port exists, with the time of the last call.
     ``kind`` is ``timer`` or the value of a :class:`composer.model.PortKind`. ``lateness`` is for
     timers: the time from when a call is due to its start. ``overruns`` counts calls that took
     longer than their ``budget_ms``. ``dropped`` counts messages that a full queue dropped, or calls
@@ -162,6 +169,13 @@ class CallbackStatistics:
     lateness: Histogram = field(default_factory=Histogram)
     overruns: int = 0
     dropped: int = 0
+    timer: Callable[[], HasLastCall | None] = lambda: None
+
+    @property
+    def last_s(self) -> float:
+        """When the last timed call began, in seconds of ``monotonic()``; 0 if it is not known."""
+        timer = self.timer()
+        return 0.0 if timer is None else timer.last_s
 
     def __str__(self) -> str:
         return f"{self.kind} '{self.name}'"
@@ -270,6 +284,19 @@ class Statistics:
             for callback in tuple(self.callbacks.values())
             if callback.dropped and callback.name in self.subscriptions
         }
+
+    @property
+    def last_sent_s(self) -> float:
+        """When the last callback began: what it published was published then."""
+        return max((item.last_s for item in tuple(self.callbacks.values())), default=0.0)
+
+    @property
+    def last_received_s(self) -> float:
+        """When the last callback of a subscription began."""
+        received = [
+            item for item in tuple(self.callbacks.values()) if item.name in self.subscriptions
+        ]
+        return max((item.last_s for item in received), default=0.0)
 
     @property
     def busy_s(self) -> float:

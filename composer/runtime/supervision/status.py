@@ -8,12 +8,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import STARTING, Condition, optional_nodes, parse_goals, start_goals
+from composer.runtime.metrics.message_rate import CountedRate
 from composer.runtime.metrics.statistics import Statistics
 
 _MAX_LISTED = 5
@@ -35,8 +36,9 @@ class NodeStatus:
     ``pid`` is the id of the operating system's process, empty while none runs or it is not known,
     and ``host`` its computer, empty for that of the process that reports.
 
-    Rates are in hertz over the last second, and so is ``busy``, the share of a thread that its
-    callbacks took; they are None if they are not known, as of an executable. ``slowest`` is the
+    Rates are in hertz from burst to burst of the last seconds; ``busy`` is the share of a thread
+    that its callbacks took in the last second. They are None if they are not known, as of an
+    executable. ``slowest`` is the
     callback with the longest call so far, and its time. ``calls`` and ``skipped`` are as in a
     ``NodeSummary``.
     ``overruns`` counts calls over their ``budget_ms``, ``queue_drops`` messages and calls that full
@@ -150,24 +152,30 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(names[:_MAX_LISTED])}{more}"
 
 
-class _Counters(NamedTuple):
-    """Counters of a node at a time of ``time.monotonic()``."""
+class _NodeRates:
+    """The rates of a node in this process, from counters that are read every second."""
 
-    at_s: float
-    sent: int
-    received: int
-    busy_s: float
+    def __init__(self) -> None:
+        self._sent, self._received = CountedRate(), CountedRate()
+        self._at_s = self._busy_s = 0.0
+        self.current: dict[str, float | None] = {}
 
-    def rates(self, before: _Counters | None) -> dict[str, float]:
-        """Return the rates of a node since ``before``, none if there are none yet."""
-        if before is None or self.at_s <= before.at_s:
-            return {}
-        passed_s = self.at_s - before.at_s
-        # The counters of ports start from zero when a node is configured again.
-        return {
-            "sent_hz": max(0, self.sent - before.sent) / passed_s,
-            "received_hz": max(0, self.received - before.received) / passed_s,
-            "busy": max(0.0, self.busy_s - before.busy_s) / passed_s,
+    def read(self, counters: Statistics) -> None:
+        """Read the counters."""
+        before_s, self._at_s = self._at_s, time.monotonic()
+        before_busy_s, self._busy_s = self._busy_s, counters.busy_s
+
+        def time_of(last_s: float) -> float:
+            """Return when the last message was counted: the time of a callback since then."""
+            return last_s if last_s > before_s else self._at_s
+
+        self._sent.read(counters.sent, time_of(counters.last_sent_s))
+        self._received.read(counters.received, time_of(counters.last_received_s))
+        passed_s = self._at_s - before_s
+        self.current = {
+            "sent_hz": self._sent.current_hz(self._at_s),
+            "received_hz": self._received.current_hz(self._at_s),
+            "busy": max(0.0, self._busy_s - before_busy_s) / passed_s if before_s else None,
         }
 
 
@@ -178,12 +186,10 @@ class Status:
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
         self._statistics: Mapping[str, Statistics] = {}
-        self._counters: dict[str, _Counters] = {}
         self._reported: Mapping[str, Mapping[str, Any]] = {}
-        self._counters_before: dict[str, _Counters] = {}
         now_s = time.time()
         models = {node.name.value: node for node in system.nodes}
-        self._in_process = {name for name, node in models.items() if node.in_process}
+        self._rates = {name: _NodeRates() for name, node in models.items() if node.in_process}
         self._topics = {
             name: {port.name.value: port.full_name for port in node.ports}
             for name, node in models.items()
@@ -294,19 +300,16 @@ class Status:
         statistics: Mapping[str, Statistics],
         reported: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> None:
-        """Read the counters of the nodes; rates are those between the last two calls.
+        """Read the counters of the nodes for their rates.
 
         ``reported`` is what is known of nodes outside the process, by fields of ``NodeStatus``.
         """
-        now_s = time.monotonic()
         with self._lock:
             self._statistics = statistics
             self._reported = reported or {}
-            self._counters_before = self._counters
-            self._counters = {
-                name: _Counters(now_s, counters.sent, counters.received, counters.busy_s)
-                for name, counters in statistics.items()
-            }
+            for name, rates in self._rates.items():
+                if name in statistics:
+                    rates.read(statistics[name])
 
     def _with_counters(self, name: str, node: NodeStatus) -> NodeStatus:
         counters = self._statistics.get(name)
@@ -316,9 +319,7 @@ class Status:
         return replace(node, **reported) if reported else node
 
     def _counted(self, name: str, node: NodeStatus, counters: Statistics) -> NodeStatus:
-        rates: Mapping[str, float] = {}
-        if name in self._in_process:
-            rates = self._counters[name].rates(self._counters_before.get(name))
+        rates = self._rates[name].current if name in self._rates else {}
         return replace(
             node,
             **rates,  # type: ignore[arg-type]  # of fields that are floats

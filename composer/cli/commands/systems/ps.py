@@ -52,7 +52,7 @@ def ps(
     """List running systems and their nodes.
 
     For each node, the list has the state and its duration, the number of restarts and errors, the
-    message rates over the last second (- if they are not known), and the last error. Nodes of other
+    message rates of the last seconds (- if they are not known), and the last error. Nodes of other
     processes of a system are listed there, with the process. Lifecycle nodes that do not belong to
     a system are listed with their states. If a system is of another version of ros2-composer, only
     the states of its nodes are listed. With --json, the output includes callback timings, which

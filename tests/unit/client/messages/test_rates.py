@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.client.messages.rates import BandwidthWindow, DelayWindow, RateWindow, TopicRate
+from composer.client.messages.rates import BandwidthWindow, DelayWindow, RateWindow
 
 
 def test_rate_statistics() -> None:
@@ -90,36 +90,3 @@ def test_delay_statistics() -> None:
     assert (found.shortest_s, found.longest_s, found.window) == (0.1, 0.3, 2)
     assert found.average_s == pytest.approx(0.2)
     assert found.deviation_s == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize(
-    ("times_s", "expected_hz"),
-    [
-        ([], None),
-        ([5.0], None),
-        ([5.0, 5.0004], None),  # a burst, without the next one
-        ([5.0, 5.0004, 6.0], 2.0),
-        ([5.0, 5.0004, 6.0, 6.0004], 2.0),
-        ([5.0, 5.0004, 10.0, 10.0004, 15.0], 0.4),
-        ([5.0, 6.0, 7.0, 8.0], 1.0),
-        ([5.0 + number / 100 for number in range(300)], 100.0),
-        ([5.0 + number / 12 for number in range(36)], 12.0),
-        ([5.0, 5.5, 5.2], 2.0),  # two publishers with different clocks
-    ],
-)
-def test_a_rate_counts_from_burst_to_burst(times_s: list[float], expected_hz: float | None) -> None:
-    rate = TopicRate()
-    for at_s in times_s:
-        rate.add(at_s, 10)
-        rate.forget_before(at_s - 3.0)
-    assert rate.hertz == (None if expected_hz is None else pytest.approx(expected_hz, rel=0.02))
-    assert rate.mean_bytes == (10.0 if times_s else None)
-
-
-def test_a_rate_includes_missed_messages() -> None:
-    rate = TopicRate()
-    for second in range(4):  # of 1000 messages each second, the first one is late, and 99 are read
-        for number in range(99):
-            missed = 901 if number == 0 and second > 0 else 0
-            rate.add(second + number / 1000, missed=missed)
-    assert rate.hertz == pytest.approx(1000.0)
