@@ -23,7 +23,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.hosts.connection import SILENCE_S, HostError, connect, failure_of, shown
 from composer.client.hosts.remote_command import NO_PYTHON, NO_SETUP, NO_WORKSPACE, python_command
 from composer.model import Host, LogLevel, Process
-from composer.runtime.children.output import OutputLines, parse_line
+from composer.model.names import PROGRAM_LOGGER
+from composer.runtime.children.output import OutputLines, attribute_line, process_loggers
 
 _BEAT_S = 2.0
 _RETRY_S = 1.0
@@ -40,16 +41,15 @@ _USAGE, _CONFIG = 2, 78
 _FINAL = (_USAGE, _CONFIG, NO_WORKSPACE, NO_SETUP, NO_PYTHON)
 _GUARD = "composer.client.hosts.guard"
 _SESSIONS = "a host needs one for each process: increase MaxSessions in its sshd_config"
-#: What the process that coordinates reports as well.
-_COMPOSE = "compose"
 
 
 @dataclass(frozen=True, slots=True)
 class RemoteProcess:
-    """A process of the system and its host."""
+    """A process of the system, its host, and the full names of its nodes."""
 
     process: Process
     host: Host
+    nodes: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -109,9 +109,9 @@ class Deployment:
         finally:
             self._is_ending.set()
             self._is_down.set()
-            all_ended = asyncio.gather(*serving, return_exceptions=True)
-            await self._until_urgent(all_ended, _ENDS_WITHIN_S)
-            all_ended.cancel()
+            await self._until_urgent(asyncio.create_task(asyncio.wait(serving)), _ENDS_WITHIN_S)
+            for task in serving:
+                task.cancel()
             results = await asyncio.gather(*serving, return_exceptions=True)
         if self._problem is not None:
             raise self._problem
@@ -232,13 +232,15 @@ class Deployment:
         Raises HostError, asyncssh.Error.
         """
         tail: list[str] = []
+        loggers = process_loggers(item.process.name.value, item.nodes)
 
         def show(text: str) -> None:
             tail[:] = [*tail[-9:], text]
-            level, logger, message = parse_line(text, is_error=False)
-            if logger != _COMPOSE or level is not LogLevel.INFO:
+            level, logger, message = attribute_line(text, loggers, is_error=False)
+            # The process that coordinates reports what the others say about states as well.
+            if logger != PROGRAM_LOGGER or level is not LogLevel.INFO:
                 self._options.write(f"{item.label} | {text}")
-                self._options.log(item, level, logger or item.process.name.value, message)
+                self._options.log(item, level, logger, message)
 
         run = ("-m", "composer", "run", self._options.system, *self._options.start)
         words = (*run, "--process", item.process.name.value)

@@ -11,7 +11,7 @@ from composer.client.hosts.connection import HostError
 from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess
 from composer.client.hosts.inventory import Question, take_inventory
 from composer.client.hosts.sync import SyncOptions, copy_project, prepare_workspace
-from composer.model import Host, System
+from composer.model import Host, Process, System
 from composer.runtime.process.addresses import is_this_computer
 from composer.runtime.process.signals import STOP_SIGNALS
 
@@ -20,10 +20,19 @@ def remote_processes(system: System) -> tuple[RemoteProcess, ...]:
     """Return the processes of a system that belong to other computers."""
     hosts = {host.name.value: host for host in system.hosts}
     return tuple(
-        RemoteProcess(process, hosts[process.host.value])
+        RemoteProcess(process, hosts[process.host.value], _nodes(system, process))
         for process in system.processes
         if process.host is not None
         and not is_this_computer(hosts[process.host.value].address.value)
+    )
+
+
+def _nodes(system: System, process: Process) -> tuple[str, ...]:
+    """Return the full names of the nodes of a process."""
+    return tuple(
+        node.full_name
+        for node in system.nodes
+        if node.process is not None and node.process.value == process.name.value
     )
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from composer.model import LogLevel
+from composer.model.names import PROGRAM_LOGGER
 
 _LONGEST_LINE = 2000  # bytes
 _CUT = b" ..."
@@ -73,16 +74,12 @@ class OutputLines:
         self._on_line(_COLORS.sub(b"", line).decode(errors="backslashreplace").rstrip("\r"))
 
 
-def parse_line(text: str, *, is_error: bool) -> tuple[LogLevel, str | None, str]:
-    """Return the level, the logger and the message of a line.
+def process_loggers(process: str, nodes: Iterable[str]) -> tuple[str, ...]:
+    """Return the names that a process of a system may log with: its own, and those of its nodes.
 
-    A line that no ROS logger has written has the level of its stream, and no logger.
+    ``nodes`` are full names.
     """
-    found = _ROS_LINE.fullmatch(text)
-    if found is None:
-        return LogLevel.WARN if is_error else LogLevel.INFO, None, text
-    severity, logger, message = found.groups()
-    return LogLevel(severity.lower()), logger, message
+    return process, PROGRAM_LOGGER, *(name.strip("/").replace("/", ".") for name in nodes)
 
 
 def attribute_line(
@@ -90,13 +87,15 @@ def attribute_line(
 ) -> tuple[LogLevel, str, str]:
     """Return the level, the logger and the message of a line of a process.
 
-    ``loggers`` are the names that the process may log with, and the parents of others; the first
-    one is for lines without a logger. A program can print the name of any logger, so a line with
+    ``loggers`` are the names that the process may log with, and the parents of others. A line
+    that no ROS logger has written has the first one, and the level of its stream. A program can print the name of any logger, so a line with
     another name has the first logger, and shows that name in its message.
     """
-    level, logger, message = parse_line(text, is_error=is_error)
-    if logger is None:
-        return level, loggers[0], message
+    match = _ROS_LINE.fullmatch(text)
+    if match is None:
+        return LogLevel.WARN if is_error else LogLevel.INFO, loggers[0], text
+    severity, logger, message = match.groups()
+    level = LogLevel(severity.lower())
     if logger in loggers or logger.startswith(tuple(f"{name}." for name in loggers)):
         return level, logger, message
     return level, loggers[0], f"[{logger}] {message}"

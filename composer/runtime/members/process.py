@@ -26,7 +26,7 @@ from rcl_interfaces.msg import SetParametersResult
 from composer.model import LogLevel, Process
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import Child, StartFailed
-from composer.runtime.children.output import attribute_line
+from composer.runtime.children.output import attribute_line, process_loggers
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
@@ -411,7 +411,6 @@ class MemberProcess:
         self._context.write_log(LogLevel.WARN, PROGRAM_LOGGER, f"{self} {text}")
 
     def _log(self, text: str, is_error: bool) -> None:
-        nodes = (name.strip("/").replace("/", ".") for name in self._members)
-        loggers = (self._process.name.value, PROGRAM_LOGGER, *nodes)
+        loggers = process_loggers(self._process.name.value, self._members)
         level, logger, message = attribute_line(text, loggers, is_error=is_error)
         self._context.write_log(level, logger, printable(message))

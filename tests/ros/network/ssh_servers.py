@@ -42,13 +42,13 @@ class SshKeys:
         with self.known_hosts.open("a", encoding="utf-8") as file:
             file.writelines(lines)
 
-    def serve(self, computer: Computer) -> None:
-        """Start the server of a computer; it ends with that."""
+    def serve(self, computer: Computer, settings: str = "") -> None:
+        """Start the server of a computer, with more lines of sshd_config; it ends with that."""
         login = self.folder.joinpath("login_key.pub").read_text(encoding="utf-8")
         self.folder.joinpath("authorized_keys").write_text(login, encoding="utf-8")
         environment = " ".join(f"{k}={v}" for k, v in computer.private_environment().items())
         config = self.folder / f"sshd_{computer.name}"
-        text = _CONFIG.format(folder=self.folder, environment=environment)
+        text = _CONFIG.format(folder=self.folder, environment=environment) + settings
         config.write_text(text, encoding="utf-8")
         server = computer.start(_SSHD, "-D", "-e", "-f", str(config), stderr=subprocess.PIPE)
         assert server.stderr is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,16 +11,23 @@ from pathlib import Path
 import pytest
 
 from tests.ros.network.namespaces import PERFECT, Computer, Quality, network
-from tests.ros.network.split_system import WORKSPACE, SplitSystem, wait_until
+from tests.ros.network.split_system import PATIENCE_S, WORKSPACE, SplitSystem, wait_until
 from tests.ros.network.ssh_servers import SshKeys
 from tests.ros.support.commands import code_of_end
 
 pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 
+#: Without the second signal, it waits 20 s for hosts that do not answer.
+AT_ONCE_S = 8.0
+
 
 @contextmanager
 def split(
-    folder: Path, *others: str, quality: Quality = PERFECT, trusted: bool = True
+    folder: Path,
+    *others: str,
+    quality: Quality = PERFECT,
+    trusted: bool = True,
+    settings: str = "",
 ) -> Iterator[tuple[SplitSystem, SshKeys]]:
     """Make computers, with ssh servers on all but the first one, and a project on that."""
     with network(["base", *others], quality) as computers:
@@ -27,7 +35,7 @@ def split(
         keys_folder.mkdir()
         keys = SshKeys(keys_folder)
         for computer in computers[1:]:
-            keys.serve(computer)
+            keys.serve(computer, settings)
         if trusted:
             keys.trust(*computers[1:])
         system = SplitSystem(folder / "project", computers, keys)
@@ -96,6 +104,49 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
             assert all(" ".join(options) in words for words in commands)
             up.kill()
             wait_until(lambda: not system.all_processes(), "processes are left")
+
+
+HOSTILE = r"""#!/bin/sh
+printf '\033[2J\007evil\r\n[FATAL] [compose] forged\n' | tee /dev/stderr
+[ -e "$(dirname "$0")/endless" ] && exec yes
+exit 1
+"""
+MOST_CHARACTERS = 5000
+
+
+@pytest.mark.timeout(120)
+def test_a_host_whose_every_command_is_hostile(tmp_path: Path) -> None:
+    program = tmp_path / "hostile"
+    program.write_text(HOSTILE)
+    program.chmod(0o755)
+    settings = f"ForceCommand {program}\nBanner {program}\n"
+    with split(tmp_path, "robot", trusted=False, settings=settings) as (system, keys):
+        keys.trust(*system.others)
+        for is_endless in (False, True):
+            if is_endless:
+                program.with_name("endless").touch()
+            for command in (("up", "--hosts"), ("doctor", "--hosts"), ("sync",)):
+                done = system.compose(command[0], str(system.path), *command[1:])
+                output = done.stdout + done.stderr
+                assert done.returncode == 1, output
+                assert output.replace("\n", "").isprintable(), output
+                assert not any(line.startswith("[FATAL]") for line in output.splitlines()), output
+                assert "robot (root@10.77.0.2): " in output or command[0] == "doctor"
+                assert len(output) < MOST_CHARACTERS
+
+
+@pytest.mark.timeout(120)
+def test_the_second_signal_ends_all_at_once(tmp_path: Path) -> None:
+    with split(tmp_path, "robot") as (system, _), system.up() as up:
+        up.wait_for("3 of 3 nodes active")
+        system.others[0].cut()  # its processes cannot be ended
+        up.signal(signal.SIGINT)
+        up.wait_for("ran for ")  # and now it waits for the other computer
+        sent_s = time.monotonic()
+        up.signal(signal.SIGINT)
+        up.process.wait(PATIENCE_S)
+        assert time.monotonic() - sent_s < AT_ONCE_S
+        assert "Traceback" not in up.output
 
 
 @pytest.mark.soak

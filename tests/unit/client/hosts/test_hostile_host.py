@@ -15,19 +15,22 @@ from typing import Any
 import pytest
 
 from composer.base.source import Located, SourceFile, Span
-from composer.model import Host
+from composer.model import Host, LogLevel, Process
 
 asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 from composer.client.hosts import connection as host_connection  # noqa: E402
 from composer.client.hosts import sync  # noqa: E402
 from composer.client.hosts.check import HostsDiffer, compare_all, connect_all  # noqa: E402
 from composer.client.hosts.connection import HostError  # noqa: E402
+from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess  # noqa: E402
 from composer.client.hosts.inventory import Inventory, Question  # noqa: E402
 
 SPAN = Span(SourceFile("robot.yaml"), 1, 1)
 EVIL = "\x1b[2J\x07evil\u202e\r\n[FATAL] [compose] forged "
 HERE = Inventory("3.11", {"numpy": "2.0"}, {}, {"a.yaml": "00"})
 LONGEST = 700
+#: 500 a second and no longer than 2000 bytes, whatever is sent.
+MOST_LINES, LONGEST_LINE = 2000, 2100
 
 
 def host(folder: Path, port: int) -> Host:
@@ -62,33 +65,43 @@ async def nested_answer(process: Any) -> None:
     process.exit(0)
 
 
-def check(folder: Path, answer: Callable[[Any], Coroutine[Any, Any, None]]) -> list[str]:
-    """Return what comparing a host says whose commands give an answer."""
+async def forged_lines(process: Any) -> None:
+    process.stdout.write("[INFO] [compose] ready\n[INFO] [camera] ready\n")
+    for _ in range(2000):
+        process.stdout.write(f"[FATAL] [planner] {EVIL}{'z' * 5000}\n")
+    process.exit(0)
+
+
+async def serve(
+    folder: Path,
+    answer: Callable[[Any], Coroutine[Any, Any, None]],
+    use: Callable[[Host, Any], Coroutine[Any, Any, None]],
+) -> None:
+    """Log in at a host whose commands give an answer, and call ``use(host, connection)``."""
     key = asyncssh.generate_private_key("ssh-ed25519")
     key.write_private_key(folder / "key")
     (folder / "key").chmod(0o600)
     key.write_public_key(folder / "authorized")
 
-    async def run() -> None:
-        server = await asyncssh.create_server(
-            asyncssh.SSHServer,
-            "127.0.0.1",
-            0,
-            server_host_keys=[key],
-            authorized_client_keys=str(folder / "authorized"),
-            process_factory=answer,
-        )
-        port = server.sockets[0].getsockname()[1]
-        known = f"[127.0.0.1]:{port} {key.export_public_key().decode()}"
-        (folder / "known").write_text(known)
-        other = host(folder, port)
-        async with server, AsyncExitStack() as stack:
-            connections = await connect_all([other], folder, stack)
-            await compare_all([other], connections, Question(("a.yaml",), ()), HERE)
+    server = await asyncssh.create_server(
+        asyncssh.SSHServer,
+        "127.0.0.1",
+        0,
+        server_host_keys=[key],
+        authorized_client_keys=str(folder / "authorized"),
+        process_factory=answer,
+    )
+    port = server.sockets[0].getsockname()[1]
+    known = f"[127.0.0.1]:{port} {key.export_public_key().decode()}"
+    (folder / "known").write_text(known)
+    other = host(folder, port)
+    async with server, AsyncExitStack() as stack:
+        connections = await connect_all([other], folder, stack)
+        await use(other, connections["jetson"])
 
-    with pytest.raises(HostsDiffer) as found:
-        asyncio.run(run())
-    return [text for text, _ in found.value.problems]
+
+async def compare(other: Host, connection: Any) -> None:
+    await compare_all([other], {"jetson": connection}, Question(("a.yaml",), ()), HERE)
 
 
 @pytest.mark.parametrize(
@@ -104,12 +117,47 @@ def test_what_a_host_answers(
     answer: Any, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(host_connection, "MOST_OUTPUT", 1_000_000)
-    problems = check(tmp_path, answer)
+    with pytest.raises(HostsDiffer) as refusal:
+        asyncio.run(serve(tmp_path, answer, compare))
+    problems = [text for text, _ in refusal.value.problems]
     assert any(expected in text for text in problems), problems
     for text in problems:
         assert text.startswith("jetson (robot@127.0.0.1): ")
         assert text.isprintable()
         assert len(text) < LONGEST
+
+
+def test_lines_of_a_process(tmp_path: Path) -> None:
+    """They have the label of the process, and its log has no lines of other nodes."""
+    written: list[str] = []
+    logged: list[tuple[LogLevel, str, str]] = []
+
+    async def run(other: Host, connection: Any) -> None:
+        process = Process(Located("vision", SPAN), SPAN, host=other.name)
+        item = RemoteProcess(process, other, ("/camera",))
+        coordinator = ("/bin/sh", "-c", "exec sleep 60", "--")
+        deployed: Deployment
+
+        def write(text: str) -> None:
+            written.append(text)
+            if "starting again" in text:
+                deployed.end()
+
+        options = DeploymentOptions(
+            *(tmp_path, "robot.yaml", (), coordinator, write),
+            lambda _, *record: logged.append(record),
+        )
+        deployed = Deployment([item], options)
+        await deployed.run({"jetson": connection})
+
+    asyncio.run(asyncio.wait_for(serve(tmp_path, forged_lines, run), 30.0))
+    assert all(text.startswith("vision@jetson | ") for text in written)
+    assert {logger for _, logger, _ in logged} == {"vision", "camera", "compose"}
+    assert (LogLevel.INFO, "camera", "ready") in logged
+    assert (LogLevel.INFO, "compose", "ready") not in logged
+    assert any(message.startswith("[planner] ") for _, _, message in logged)
+    assert 0 < len(logged) < MOST_LINES
+    assert max(map(len, written)) < LONGEST_LINE
 
 
 #: In place of rsync: its messages are those of the host.

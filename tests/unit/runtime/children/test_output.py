@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.model import LogLevel
-from composer.runtime.children.output import OutputLines, attribute_line, parse_line
+from composer.runtime.children.output import OutputLines, attribute_line
 
 
 def lines_of(*chunks: bytes, now_s: float = 0.0) -> list[str]:
@@ -54,29 +54,21 @@ def test_any_output_becomes_short_lines(chunks: list[bytes]) -> None:
 @pytest.mark.parametrize(
     ("text", "is_error", "expected"),
     [
-        ("plain", False, (LogLevel.INFO, None, "plain")),
-        ("plain", True, (LogLevel.WARN, None, "plain")),
-        ("[ERROR] [robot.arm] it hurts", True, (LogLevel.ERROR, "robot.arm", "it hurts")),
+        ("plain", False, (LogLevel.INFO, "arm", "plain")),
+        ("plain", True, (LogLevel.WARN, "arm", "plain")),
+        ("[NOTE] [arm] ready", False, (LogLevel.INFO, "arm", "[NOTE] [arm] ready")),
         ("[INFO] [arm]: ready", True, (LogLevel.INFO, "arm", "ready")),
-        ("[NOTE] [arm] ready", False, (LogLevel.INFO, None, "[NOTE] [arm] ready")),
+        ("[ERROR] [arm.driver] it hurts", True, (LogLevel.ERROR, "arm.driver", "it hurts")),
+        ("[ERROR] [hand] it hurts", False, (LogLevel.ERROR, "hand", "it hurts")),
+        ("[ERROR] [arms] it hurts", False, (LogLevel.ERROR, "arm", "[arms] it hurts")),
+        (
+            "[1.5] [FATAL] [compose]: /x failed",
+            True,
+            (LogLevel.FATAL, "arm", "[compose] /x failed"),
+        ),
     ],
 )
-def test_lines_of_ros_loggers(
-    text: str, is_error: bool, expected: tuple[LogLevel, str | None, str]
+def test_a_program_has_its_own_loggers_only(
+    text: str, is_error: bool, expected: tuple[LogLevel, str, str]
 ) -> None:
-    assert parse_line(text, is_error=is_error) == expected
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("plain", (LogLevel.INFO, "arm", "plain")),
-        ("[ERROR] [arm] it hurts", (LogLevel.ERROR, "arm", "it hurts")),
-        ("[ERROR] [arm.driver] it hurts", (LogLevel.ERROR, "arm.driver", "it hurts")),
-        ("[ERROR] [hand] it hurts", (LogLevel.ERROR, "hand", "it hurts")),
-        ("[ERROR] [arms] it hurts", (LogLevel.ERROR, "arm", "[arms] it hurts")),
-        ("[1.5] [FATAL] [compose]: /x failed", (LogLevel.FATAL, "arm", "[compose] /x failed")),
-    ],
-)
-def test_a_program_has_its_own_loggers_only(text: str, expected: tuple[LogLevel, str, str]) -> None:
-    assert attribute_line(text, ("arm", "hand"), is_error=False) == expected
+    assert attribute_line(text, ("arm", "hand"), is_error=is_error) == expected

@@ -1,0 +1,118 @@
+"""The first signal ends a command in order, the second one at once, whatever it waits for."""
+
+from __future__ import annotations
+
+import array
+import fcntl
+import os
+import signal
+import subprocess
+import termios
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.ros.dashboard.test_foxglove_limits import raw
+from tests.ros.support.commands import COMPOSE, hand_written
+from tests.ros.support.dashboard import Address
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem
+
+#: On a busy machine; the limits in order are 5 s and more.
+AT_ONCE_S = 4.0
+#: Signals that follow more closely are those of a terminal and of a tool that forwards them.
+PAUSE_S = 0.2
+PIPE_BYTES = 4096
+TIMERS = ", ".join(f"tick_{number}: {{period_ms: 50, log: tick}}" for number in range(30))
+TALKATIVE = f"system: robot\nnodes: {{talker: {{timers: {{{TIMERS}}}}}}}\n"
+STUBBORN = """
+system: robot
+nodes: {stubborn: {behavior: "stubborn:Stubborn", lifecycle: {timeout_ms: 60000}}}
+"""
+BEHAVIOR = """
+import time
+from composer.behavior import Behavior
+
+class Stubborn(Behavior):
+    def on_deactivate(self):
+        self.log.info("deactivating")
+        time.sleep(60.0)
+"""
+
+
+@pytest.fixture
+def talkative(tmp_path: Path) -> Iterator[None]:
+    path = tmp_path / "robot.yaml"
+    path.write_text(TALKATIVE, encoding="utf-8")
+    with RunningSystem(str(path)) as system:
+        system.wait_for("1 of 1 nodes active")
+        yield
+
+
+def started(*words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*COMPOSE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def wait_until_full(process: subprocess.Popen[str]) -> None:
+    """Wait until the output of a command fills its pipe."""
+    assert process.stdout is not None
+    descriptor = process.stdout.fileno()
+    size, waiting = fcntl.fcntl(descriptor, fcntl.F_SETPIPE_SZ, PIPE_BYTES), array.array("i", [0])
+    end_s = time.monotonic() + PATIENCE_S
+    while waiting[0] < size // 2:
+        fcntl.ioctl(descriptor, termios.FIONREAD, waiting)
+        assert process.poll() is None
+        assert time.monotonic() < end_s
+        time.sleep(0.05)  # poll: nothing announces it
+
+
+def end(process: subprocess.Popen[str]) -> str:
+    """Send two signals; check that the process ends at once, and return its errors."""
+    process.send_signal(signal.SIGINT)
+    time.sleep(PAUSE_S)
+    process.send_signal(signal.SIGINT)
+    sent_s = time.monotonic()
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert time.monotonic() - sent_s < AT_ONCE_S
+    assert "Traceback" not in errors
+    return errors
+
+
+@pytest.mark.usefixtures("talkative")
+@pytest.mark.parametrize("words", [("top", "--json"), ("logs", "-f")])
+def test_a_command_whose_output_nobody_reads(words: tuple[str, ...]) -> None:
+    with started(*words) as process:
+        wait_until_full(process)
+        end(process)
+
+
+def test_a_dashboard_with_a_client_that_does_not_read() -> None:
+    with hand_written("hand_written_camera.py"), started("dashboard", "--port", "0") as process:
+        assert process.stdout is not None
+        address = Address(process.stdout.readline())
+        with raw(address, max_queue=1, close_timeout=0) as client:
+            client.subscribe("/camera")
+            client.wait(lambda: client.frames)
+            end(process)
+
+
+def test_a_run_with_a_dashboard(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(STUBBORN, encoding="utf-8")
+    path.with_name("stubborn.py").write_text(BEHAVIOR, encoding="utf-8")
+    with RunningSystem(str(path), "--dashboard", "--grace", "30", program=COMPOSE) as system:
+        system.wait_for("1 of 1 nodes active")
+        system.wait_for("dashboard: http")
+        children = Path(f"/proc/{system.process.pid}/task/{system.process.pid}/children")
+        (dashboard,) = map(int, children.read_text(encoding="ascii").split())
+        system.process.send_signal(signal.SIGINT)
+        system.wait_for("deactivating")
+        time.sleep(PAUSE_S)
+        _, took_s = system.stop()
+        assert took_s < AT_ONCE_S
+        assert "Traceback" not in system.output
+        with pytest.raises(ProcessLookupError):
+            os.kill(dashboard, 0)
