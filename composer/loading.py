@@ -31,8 +31,8 @@ from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
 from composer.language.document import parse_bytes, read_document
 from composer.language.document.limits import MAX_BYTES, MAX_ENTRIES
-from composer.language.document.rules import TOO_LARGE
 from composer.language.expand import expand
+from composer.language.rules import TOO_LARGE
 from composer.language.schema import check_schema, kind_of, kinds
 from composer.language.schema.kinds import check_kind
 from composer.language.tree import Mapping
@@ -41,10 +41,10 @@ from composer.model import System
 from composer.model.assembly import NodeTypeFile, assemble, inherit
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
-from composer.model.resolve.parameter_files.reader import PARAMETER_SUBSTITUTION
+from composer.model.resolve.parameter_files import PARAMETER_SUBSTITUTION
 from composer.project import SETTINGS_FILE, Project
 from composer.project.node_types import NodeTypes, interface_folders
-from composer.project.rule_selection import apply_rule_settings, check_rule_settings
+from composer.project.settings import apply_rule_settings, check_rule_settings
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.analysis.subjects import joined, without_consequences
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored

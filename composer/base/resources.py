@@ -1,4 +1,6 @@
-"""Folders of data files: JSON Schemas, node types, systems, interfaces, pages of rules.
+"""Folders of data files, and the prefixes in which ROS packages are installed.
+
+Data files are JSON Schemas, node types, systems, interfaces and pages of rules.
 
 A wheel has them in ``composer/share/`` (see pyproject.toml). In a checkout or an editable install,
 they are next to the package.
@@ -6,6 +8,9 @@ they are next to the package.
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -18,31 +23,33 @@ def data_folder() -> Path:
     return share if share.is_dir() else _PACKAGE.parent
 
 
-def _folder(name: str) -> Path:
-    return data_folder() / name
-
-
 def schemas_folder() -> Path:
     """Return the folder of the JSON Schemas."""
-    return _folder("schemas")
+    return data_folder() / "schemas"
 
 
 def nodes_folder() -> Path:
     """Return the folder of the node types that come with the composer."""
-    return _folder("nodes")
+    return data_folder() / "nodes"
 
 
 def systems_folder() -> Path:
     """Return the folder of the example systems."""
-    return _folder("systems")
+    return data_folder() / "systems"
 
 
 def interfaces_folder() -> Path:
     """Return the source of the ament package composer_interfaces (.srv and .action files)."""
-    return _folder("interfaces")
+    return data_folder() / "interfaces"
 
 
 def rules_folder() -> Path:
     """Return the folder of the pages about rules, ``docs/rules`` in a checkout."""
-    in_wheel = _folder("rules")
-    return in_wheel if in_wheel.is_dir() else _folder("docs/rules")
+    in_wheel = data_folder() / "rules"
+    return in_wheel if in_wheel.is_dir() else data_folder() / "docs/rules"
+
+
+def ament_prefixes(environment: Mapping[str, str] = os.environ) -> list[Path]:
+    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then that of this Python."""
+    listed = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return [Path(prefix) for prefix in dict.fromkeys((*filter(None, listed), sys.prefix))]

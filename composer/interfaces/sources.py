@@ -7,9 +7,7 @@ checked before they become part of a path.
 from __future__ import annotations
 
 import json
-import os
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +15,7 @@ from typing import Protocol
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.regular_files import NotRegularError, read_regular
+from composer.base.resources import ament_prefixes
 from composer.interfaces.parser import split_name
 
 FOLDERS = ("msg", "srv", "action")
@@ -139,9 +138,7 @@ class Bundle:
 
 def installed_prefixes() -> tuple[Prefix, ...]:
     """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then that of this Python."""
-    listed = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-    roots = dict.fromkeys((*(entry for entry in listed if entry), sys.prefix))
-    return tuple(Prefix(Path(root)) for root in roots)
+    return tuple(map(Prefix, ament_prefixes()))
 
 
 def find_packages(folders: Iterable[Path]) -> Packages:

@@ -10,7 +10,7 @@ from composer.base.source import SourceFile
 from composer.language.document import parse_document
 from composer.language.tree import Plain, plain
 from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
-from composer.model.resolve.parameter_files.sections import is_pattern
+from composer.model.resolve.parameter_sections import is_pattern
 
 _EVERY_NODE = "/**"
 

@@ -4,7 +4,7 @@ The model does not check anything. A reference to a missing entity stays as writ
 report it.
 """
 
-from composer.model.channels import Channel, PortOfNode, channels
+from composer.model.dependencies import Channel, PortOfNode, channels
 from composer.model.discovery import Discovery, DiscoveryKind
 from composer.model.hosts import Host
 from composer.model.implementation import (

@@ -5,9 +5,15 @@ activated after the nodes they depend on, and taken down in reverse order; indep
 move at the same time. :mod:`composer.model.dependencies` defines the dependencies.
 """
 
-from composer.plan.bringup import bring_up, start_causes, start_goals, tear_down
-from composer.plan.decision import Decision, decide
-from composer.plan.desired_state import Condition, DesiredState, Fault, FaultKind, Restart
+from composer.plan.desired_state import (
+    Condition,
+    Decision,
+    DesiredState,
+    Fault,
+    FaultKind,
+    Restart,
+    decide,
+)
 from composer.plan.reconciliation import (
     STARTING,
     blocked_nodes,
@@ -19,8 +25,17 @@ from composer.plan.reconciliation import (
     reconcile,
 )
 from composer.plan.steps import Plan, Step, TransitionName
-from composer.plan.system_goals import STOPPED, SystemGoals, parse_goals, system_goals
-from composer.plan.transitions import plan_transitions
+from composer.plan.transitions import (
+    STOPPED,
+    SystemGoals,
+    bring_up,
+    parse_goals,
+    plan_transitions,
+    start_causes,
+    start_goals,
+    system_goals,
+    tear_down,
+)
 
 __all__ = [
     "STARTING",

@@ -14,6 +14,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.base.resources import ament_prefixes
+
 if TYPE_CHECKING:
     from importlib.metadata import Distribution
 
@@ -23,7 +25,7 @@ _RUN = "import sys; from {module} import {function} as main; sys.exit(main())"
 
 def has_ros_packages(environment: Mapping[str, str]) -> bool:
     """Return whether any ROS package is installed. Without ROS, a missing one says nothing."""
-    return any((prefix / _INDEX).is_dir() for prefix in _prefixes(environment))
+    return any((prefix / _INDEX).is_dir() for prefix in ament_prefixes(environment))
 
 
 def has_package(package: str, environment: Mapping[str, str]) -> bool:
@@ -84,14 +86,9 @@ def _libraries(package: str, environment: Mapping[str, str]) -> Iterator[Path]:
     """Yield the folders of a ROS package's executables, which may not exist."""
     if not package or "/" in package:
         return
-    for prefix in _prefixes(environment):
+    for prefix in ament_prefixes(environment):
         if (prefix / _INDEX / package).is_file():
             yield prefix / "lib" / package
-
-
-def _prefixes(environment: Mapping[str, str]) -> list[Path]:
-    listed = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-    return [Path(prefix) for prefix in dict.fromkeys((*filter(None, listed), sys.prefix))]
 
 
 def _distribution(package: str) -> Distribution | None:

@@ -13,7 +13,7 @@ from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.regular_files import open_regular
 from composer.base.source import SourceFile, Span
-from composer.language.document.rules import UNREADABLE_FILE
+from composer.language.rules import UNREADABLE_FILE
 from composer.project import SETTINGS_FILE, Project
 
 _SUFFIXES = frozenset({".yaml", ".yml"})

@@ -1,14 +1,82 @@
-"""The node types and interface packages that a file may refer to by name."""
+"""The node types and interface packages that a file may refer to by name.
+
+Also those of projects that are installed as ROS packages. Such a package registers in the ament
+index under the resource type ``ros2_composer``. Its node types and systems are in
+``share/<package>/nodes`` and ``share/<package>/systems``. The packages of earlier prefixes of
+AMENT_PREFIX_PATH come first, as in overlays of workspaces.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping as Map
+from contextlib import suppress
+from dataclasses import field
 from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.resources import interfaces_folder, nodes_folder
+from composer.base.ownership import TrustedUsers
+from composer.base.resources import ament_prefixes, interfaces_folder, nodes_folder
+from composer.base.source import Span
 from composer.project import Project
-from composer.project.installed_projects import installed_projects
+
+#: The resource type in the ament index.
+RESOURCE_TYPE = "ros2_composer"
+_INDEX = Path("share", "ament_index", "resource_index", RESOURCE_TYPE)
+_SUFFIX = ".yaml"
+
+
+@dataclass(frozen=True, slots=True)
+class InstalledProject:
+    """A package with node types and systems. ``folder`` is its share folder."""
+
+    package: str
+    folder: Path
+
+    @property
+    def node_folder(self) -> Path:
+        """The folder of its node types, which need not exist."""
+        return self.folder / "nodes"
+
+    def systems(self) -> dict[str, Path]:
+        """Return its system files by name.
+
+        ``colcon build --symlink-install`` makes links: these are the files that they lead to.
+        """
+        files = sorted((self.folder / "systems").glob(f"*{_SUFFIX}"))
+        return {file.stem: file.resolve() for file in files}
+
+
+def installed_projects() -> tuple[InstalledProject, ...]:
+    """Return the installed projects, each package once, without those of other users."""
+    trusted = TrustedUsers.own()
+    found: dict[str, InstalledProject] = {}
+    for prefix in ament_prefixes():
+        for package in _registered(prefix):
+            folder = prefix / "share" / package
+            if package not in found and trusted.other_owner(folder) is None:
+                found[package] = InstalledProject(package, folder)
+    return tuple(found.values())
+
+
+def installed_systems() -> dict[str, Path]:
+    """Return the systems of installed projects, by name and by ``package/name``.
+
+    Of systems with the same name, the first one is used.
+    """
+    found: dict[str, Path] = {}
+    for project in installed_projects():
+        for name, path in project.systems().items():
+            found.setdefault(name, path)
+            found[f"{project.package}/{name}"] = path
+    return found
+
+
+def _registered(prefix: Path) -> list[str]:
+    with suppress(OSError):
+        return sorted(path.name for path in (prefix / _INDEX).iterdir() if path.is_file())
+    return []
+
 
 SUFFIX = ".yaml"
 
@@ -83,3 +151,29 @@ def replaced_built_in_type(path: Path) -> Path | None:
 def interface_folders(project: Project) -> tuple[Path, ...]:
     """Return the folders of interface packages: the project's, then the composer's own."""
     return tuple(dict.fromkeys((*project.interface_folders, interfaces_folder().resolve())))
+
+
+@dataclass(frozen=True, slots=True)
+class SourceFolders:
+    """The folders of a system's files by name, and the node types that the files may use.
+
+    ``home`` and ``node_types`` belong to the file of the system.
+    """
+
+    home: Path
+    folders: Map[str, Path]
+    node_types: NodeTypes
+    _node_types_of: dict[Path, NodeTypes] = field(default_factory=dict, repr=False, compare=False)
+
+    def folder(self, span: Span) -> Path:
+        """Return the folder of the file of ``span``."""
+        return self.folders.get(span.file.path, self.home)
+
+    def node_types_for(self, span: Span) -> NodeTypes:
+        """Return the node types that the file of ``span`` may use."""
+        folder = self.folder(span)
+        if folder == self.home:
+            return self.node_types
+        if folder not in self._node_types_of:
+            self._node_types_of[folder] = NodeTypes.of(Project.at(folder))
+        return self._node_types_of[folder]

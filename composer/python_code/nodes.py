@@ -12,9 +12,9 @@ from composer import behavior
 from composer.base.diagnostics import Diagnostic, Label, Rule
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
+from composer.language.tree_values import is_opaque
 from composer.model import HostedClass, Node, Parameter, Port, PortKind, System
-from composer.model.resolve.declarations.parameters import rclpy_type
-from composer.model.resolve.tree_values import is_opaque
+from composer.model.resolve.parameters import rclpy_type
 from composer.python_code.lookup import BehaviorSource, find_behavior
 from composer.python_code.scopes import Scope
 from composer.python_code.syntax import Method, scopes_in

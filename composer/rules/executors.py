@@ -18,7 +18,7 @@ from composer.base.diagnostics import (
 )
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
-from composer.language.expand.rules import UNUSED_DECLARATION
+from composer.language.rules import UNUSED_DECLARATION
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.earlier_errors import earlier_errors

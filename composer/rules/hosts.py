@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from composer.base.diagnostics import Diagnostic, error, suggestion
 from composer.base.source import Located
-from composer.language.expand.rules import UNUSED_DECLARATION
+from composer.language.rules import UNUSED_DECLARATION
 from composer.model import Host
 from composer.model.hosts import (
     address_problem,

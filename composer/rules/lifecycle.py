@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
 from composer.base.source import Located
-from composer.language.expand.rules import CYCLE
+from composer.language.rules import CYCLE
 from composer.model import Dependency, Node, PortKind, PortOfNode, PrimaryState, System
 from composer.model.dependencies import dependency_cycles
 from composer.rules.analysis.context import Context, is_unresolved

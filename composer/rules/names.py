@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, error, info, warning
 from composer.base.source import Located, Span
-from composer.language.expand.rules import DUPLICATE_NAME
+from composer.language.rules import DUPLICATE_NAME
 from composer.model import Connection, Node, Port, System
 from composer.model.names import (
     is_hidden,

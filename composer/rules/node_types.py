@@ -7,9 +7,9 @@ from pathlib import Path, PurePath
 
 from composer.base.diagnostics import Diagnostic, error, suggestion, warning
 from composer.base.source import Located, shown_path
-from composer.language.expand.rules import UNUSED_DECLARATION
+from composer.language.rules import UNUSED_DECLARATION
+from composer.language.tree_values import is_opaque
 from composer.model import System
-from composer.model.resolve.tree_values import is_opaque
 from composer.project import SETTINGS_FILE, Project
 from composer.project.node_types import replaced_built_in_type
 from composer.rules.analysis.context import Context, is_unresolved, location

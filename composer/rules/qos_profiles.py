@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, info, suggestion
 from composer.base.source import Located
-from composer.language.expand.rules import CYCLE, UNUSED_DECLARATION
+from composer.language.rules import CYCLE, UNUSED_DECLARATION
 from composer.model import ChannelKind, NamedQos
 from composer.model.qos import PRESETS
 from composer.rules.analysis.context import Context, is_unresolved

@@ -23,8 +23,7 @@ from composer.interfaces.sources import Bundle, Definition
 from composer.language.document import parse_bytes
 from composer.loading import load_bytes
 from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
-from composer.project.rule_selection import check_rule_settings
-from composer.project.settings import SettingsSource, read_settings
+from composer.project.settings import SettingsSource, check_rule_settings, read_settings
 from tests.properties.mutation import mutated, spliced
 from tests.properties.validating import (
     INTERFACES,

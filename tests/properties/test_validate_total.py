@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 
 from composer.language.document.writer import write_document
-from composer.language.expand.rules import UNUSED_DECLARATION
+from composer.language.rules import UNUSED_DECLARATION
 from composer.loading import collect_diagnostics, load
 from composer.model.assembly.canonical import canonical
 from tests.examples import examples

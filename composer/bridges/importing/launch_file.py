@@ -10,7 +10,7 @@ from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSys
 from composer.language.tree import Plain
 from composer.model import LogLevel
 from composer.model.names import join_node_name, parameter_name_problem
-from composer.model.resolve.declarations.parameters import rclpy_type
+from composer.model.resolve.parameters import rclpy_type
 
 _PORTS = (
     "A launch file does not show topics, services and actions, so the nodes have no ports.",

@@ -10,7 +10,7 @@ from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
 from composer.model.names import parameter_name_problem, split_node_name, topic_name_problem
 from composer.model.qos import PRESETS, QosProfile
-from composer.model.resolve.declarations.parameters import rclpy_type
+from composer.model.resolve.parameters import rclpy_type
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
 
 _IS_ACTIVE = "/manager/is_active"

@@ -16,7 +16,7 @@ from composer.bridges.importing.branches import ALWAYS, Condition, conditions_of
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort
 from composer.language.tree import Plain
 from composer.model import BehaviorReference, PortKind
-from composer.model.resolve.declarations.parameters import rclpy_type
+from composer.model.resolve.parameters import rclpy_type
 from composer.project import Project
 from composer.python_code.lookup import BehaviorSource, find_behavior
 from composer.python_code.modules import nearby_modules

@@ -11,7 +11,7 @@ from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSys
 from composer.bridges.importing.writing import write_system
 from composer.language.document import parse_bytes
 from composer.language.document.limits import MAX_ENTRIES
-from composer.language.document.rules import TOO_LARGE
+from composer.language.rules import TOO_LARGE
 from composer.language.tree import Plain
 
 #: The part of a file that is left out at once, if it is too large.

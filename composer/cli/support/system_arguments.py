@@ -24,7 +24,7 @@ _SUFFIXES = ("", ".yaml", ".yml")
 
 def complete_system(incomplete: str) -> list[str]:
     """Complete the names of the project's systems and of example systems, and paths."""
-    from composer.project.installed_projects import installed_systems
+    from composer.project.node_types import installed_systems
 
     known = sorted({*project_systems(), *installed_systems(), *example_systems()})
     names = [name for name in known if name.startswith(incomplete)]
@@ -67,7 +67,7 @@ def system_file(text: str) -> Path:
     Systems of the project come before those of installed packages, and these before example
     systems. Raises UsageError.
     """
-    from composer.project.installed_projects import installed_systems
+    from composer.project.node_types import installed_systems
 
     if not text:
         raise UsageError("the name of the system is empty")

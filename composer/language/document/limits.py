@@ -1,10 +1,16 @@
-"""Limits for the size of files.
+"""Limits for the size of files, and for the number of errors that are reported of one.
 
 They allow any file written by hand and generated systems of 5 000 nodes. Checking a file takes at
 most about two seconds for each megabyte, whatever it contains, and 200 MB.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Self
+
+from composer.base.diagnostics import Diagnostic, Severity
+from composer.language.rules import TOO_LARGE
 
 #: Bytes in a file; checked before it is read.
 MAX_BYTES = 2_000_000
@@ -42,3 +48,36 @@ MAX_NUMBER_LENGTH = 100
 #: The range of ROS integers: int64 and uint64.
 MIN_INTEGER = -(2**63)
 MAX_INTEGER = 2**64 - 1
+
+
+class TooManyErrors(Exception):
+    """A stage has found more than MAX_ERRORS errors: the ``first`` ones, and what says so."""
+
+    def __init__(self, first: list[Diagnostic], diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+        self.diagnostics = [*first, diagnostic]
+
+
+class LimitedDiagnostics(list[Diagnostic]):
+    """The diagnostics of one stage. Raises TooManyErrors where there are too many errors.
+
+    An error costs more time than a valid value, as the nearest names are searched for.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._errors = 0
+
+    def append(self, item: Diagnostic) -> None:
+        """Add a diagnostic. Raises TooManyErrors."""
+        self._errors += item.severity is Severity.ERROR
+        if self._errors > MAX_ERRORS:
+            message = f"there are more than {MAX_ERRORS:,} errors; the rest is not checked"
+            raise TooManyErrors([*self], Diagnostic(TOO_LARGE, message, item.primary))
+        super().append(item)
+
+    def __iadd__(self, items: Iterable[Diagnostic]) -> Self:  # type: ignore[misc,override]
+        for item in items:
+            self.append(item)
+        return self

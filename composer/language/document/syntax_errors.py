@@ -13,8 +13,8 @@ import yaml
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
-from composer.language.document.events import Mark, span_at
-from composer.language.document.rules import YAML_SYNTAX
+from composer.language.document.builder import Mark, span_at
+from composer.language.rules import YAML_SYNTAX
 
 _QUOTE_TEXT = "put the whole text in quotes"
 _KEY_AND_VALUE_BEFORE = re.compile(r"\s*(?:- +)*[^\s#][^#]*?:\s+\S")

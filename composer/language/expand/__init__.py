@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Map
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, shown
-from composer.language.document.error_limit import TooManyErrors
-from composer.language.expand import rules
+from composer.language import rules
+from composer.language.document.limits import TooManyErrors
 from composer.language.expand.copies import COPYING
 from composer.language.expand.scope import Scope, dependency_order, measure, read_scope
 from composer.language.expand.substitution import Substitution, TooLarge, references

@@ -15,8 +15,8 @@ from itertools import product
 from math import prod
 
 from composer.base.diagnostics import Diagnostic, Label, shown
+from composer.language import rules
 from composer.language.document.limits import MAX_COPIES
-from composer.language.expand import rules
 from composer.language.expand.scope import Declared
 from composer.language.expand.substitution import Substitution, has_reference, references
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree

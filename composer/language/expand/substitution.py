@@ -8,11 +8,16 @@ from dataclasses import field
 
 from composer.base.diagnostics import Diagnostic, Label, Rule, shown
 from composer.base.fast_dataclass import dataclass
-from composer.language.document.error_limit import LimitedDiagnostics
-from composer.language.document.limits import MAX_BYTES, MAX_COPIES, MAX_DEPTH, MAX_VALUES
-from composer.language.document.rules import DUPLICATE_KEY, TOO_LARGE
-from composer.language.expand import rules
+from composer.language import rules
+from composer.language.document.limits import (
+    MAX_BYTES,
+    MAX_COPIES,
+    MAX_DEPTH,
+    MAX_VALUES,
+    LimitedDiagnostics,
+)
 from composer.language.expand.scope import Scope, Sized
+from composer.language.rules import DUPLICATE_KEY, TOO_LARGE
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
 
 _MARK = "${"

@@ -11,10 +11,15 @@ those look at the type of a value before they touch it and bound every number.
 """
 
 from composer.language.expressions.builder import compile_expression, path_of
-from composer.language.expressions.expression import Expression, FieldPath
+from composer.language.expressions.expression import (
+    EvaluationError,
+    Expression,
+    ExpressionError,
+    FieldPath,
+    map_key,
+)
 from composer.language.expressions.operations import CONSTANTS, FUNCTIONS
 from composer.language.expressions.syntax import MAXIMUM_LENGTH, MAXIMUM_NODES
-from composer.language.expressions.values import EvaluationError, ExpressionError, map_key
 
 __all__ = [
     "CONSTANTS",

@@ -9,7 +9,14 @@ from functools import lru_cache, partial
 from typing import Any, TypeVar
 
 from composer.base.diagnostics import suggestion
-from composer.language.expressions.expression import Expression, FieldPath, Function
+from composer.language.expressions.expression import (
+    Expression,
+    ExpressionError,
+    FieldPath,
+    Function,
+    read_fields,
+    read_path,
+)
 from composer.language.expressions.operations import (
     ARITHMETIC,
     CONSTANTS,
@@ -19,7 +26,6 @@ from composer.language.expressions.operations import (
     is_in,
 )
 from composer.language.expressions.syntax import extent, parse
-from composer.language.expressions.values import ExpressionError, read_fields, read_path
 
 _MAXIMUM_INDEX = 2**31 - 1
 _NOT_IN_LANGUAGE = "this is not part of the expression language"

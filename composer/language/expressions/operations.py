@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.language.expressions.values import Kind, Refusal, describe, kind_of, plain
+from composer.language.expressions.expression import Kind, Refusal, describe, kind_of, plain
 
 #: The range of integers: int64 and uint64.
 MAXIMUM_INTEGER = 2**64 - 1

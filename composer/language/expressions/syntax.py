@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 
 from composer.base.fast_dataclass import dataclass
-from composer.language.expressions.values import ExpressionError
+from composer.language.expressions.expression import ExpressionError
 
 #: Limits the recursion depth of Python's parser.
 MAXIMUM_TOKENS = 256

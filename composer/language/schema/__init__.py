@@ -12,7 +12,6 @@ from typing import Any
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.resources import schemas_folder
-from composer.language.schema import rules  # noqa: F401 - registers the rules
 from composer.language.schema.fast_check import Check, compile_check
 from composer.language.tree import Mapping, plain
 

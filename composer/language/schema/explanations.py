@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 from composer.base.diagnostics import Diagnostic, Label, nearest, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.language.document.error_limit import LimitedDiagnostics, TooManyErrors
-from composer.language.document.limits import MAX_ERRORS
-from composer.language.schema import rules
-from composer.language.schema.common_mistakes import advice, intended_key, value_advice
-from composer.language.schema.expectations import expected, type_hint
+from composer.language import rules
+from composer.language.document.limits import MAX_ERRORS, LimitedDiagnostics, TooManyErrors
+from composer.language.schema.hints import advice, expected, intended_key, type_hint, value_advice
 from composer.language.schema.locations import TreeIndex, TreeValue
 from composer.language.tree import Entry, describe
 

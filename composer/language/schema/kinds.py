@@ -6,8 +6,9 @@ from functools import cache
 
 from composer.base.diagnostics import Diagnostic, error, nearest, shown
 from composer.base.source import SourceFile
-from composer.language.schema import kind_of, rules, schema
-from composer.language.schema.common_mistakes import intended_key
+from composer.language import rules
+from composer.language.schema import kind_of, schema
+from composer.language.schema.hints import intended_key
 from composer.language.tree import Entry, Mapping, Scalar
 
 SYSTEM = "system"

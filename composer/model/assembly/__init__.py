@@ -12,8 +12,7 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
-from composer.language.document.rules import TOO_LARGE
-from composer.language.expand.rules import CYCLE, DUPLICATE_NAME
+from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
 from composer.language.tree import Mapping
 from composer.model.assembly.include_entries import IncludeReader
 from composer.model.assembly.includes import IncludeResolver, system_file

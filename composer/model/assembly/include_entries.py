@@ -12,7 +12,7 @@ from composer.base.diagnostics import Diagnostic, nearest, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
 from composer.language.document import read_document
-from composer.language.document.rules import TOO_LARGE, UNREADABLE_FILE
+from composer.language.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.language.schema.kinds import SYSTEM, check_kind
 from composer.language.tree import Entry, Mapping, Scalar, Tree
 from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits

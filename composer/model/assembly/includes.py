@@ -10,8 +10,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand import expand
-from composer.language.expand.rules import CYCLE
 from composer.language.expand.scope import measure
+from composer.language.rules import CYCLE
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import SYSTEM, with_intended_sections
 from composer.language.tree import Entry, Mapping, Sequence, Tree

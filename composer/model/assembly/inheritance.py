@@ -11,8 +11,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile
 from composer.language.document import read_document
 from composer.language.document.limits import MAX_INCLUDE_DEPTH
-from composer.language.expand.rules import CYCLE
 from composer.language.expand.scope import measure
+from composer.language.rules import CYCLE
 from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
 from composer.language.tree import Mapping, Scalar
 from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, LimitExceeded

@@ -11,7 +11,7 @@ from composer.language.document.limits import (
     MAX_INCLUDES,
     MAX_MATCHES,
 )
-from composer.language.document.rules import TOO_LARGE
+from composer.language.rules import TOO_LARGE
 
 INVALID_INCLUDE = error("RC290", "invalid-include")
 UNKNOWN_OVERRIDE = error("RC293", "unknown-override")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
-from composer.language.expand.rules import DUPLICATE_NAME
+from composer.language.rules import DUPLICATE_NAME
 from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
 from composer.model.assembly.limits import INVALID_INCLUDE, UNKNOWN_OVERRIDE
 

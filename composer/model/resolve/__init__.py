@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from composer.base.diagnostics import Diagnostic, in_order
 from composer.base.source import SourceFile
-from composer.language.document.error_limit import TooManyErrors
+from composer.language.document.limits import TooManyErrors
 from composer.language.schema import kind_of, kinds
 from composer.language.schema.kinds import check_kind
 from composer.language.tree import Mapping
@@ -24,9 +24,8 @@ from composer.model.resolve.overrides import (
     Overrides,
     read_overrides,
 )
-from composer.model.resolve.source_folders import SourceFolders
 from composer.model.resolve.system import resolve_node_type, resolve_system
-from composer.project.node_types import NodeTypes
+from composer.project.node_types import NodeTypes, SourceFolders
 
 __all__ = ["NO_OVERRIDES", "OverrideOptions", "Overrides", "read_overrides", "resolve"]
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language.tree import Entry, Mapping, Sequence, Tree
+from composer.language.tree_values import choice, entries, is_opaque, key, number, text, texts
 from composer.model import (
     Chain,
     ChannelKind,
@@ -21,7 +22,6 @@ from composer.model import (
 )
 from composer.model.names import join
 from composer.model.resolve.qos import QosTable, implicit_qos
-from composer.model.resolve.tree_values import choice, entries, is_opaque, key, number, text, texts
 
 T = TypeVar("T")
 

@@ -7,9 +7,7 @@ from collections.abc import Mapping as Map
 
 from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Sequence, Tree
-from composer.model import Host, Process
-from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
-from composer.model.resolve.tree_values import (
+from composer.language.tree_values import (
     choice,
     entries,
     environment,
@@ -20,6 +18,8 @@ from composer.model.resolve.tree_values import (
     text,
     texts,
 )
+from composer.model import Host, Process
+from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
 
 
 def read_processes(tree: Tree | None) -> tuple[Process, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.language.tree import Entry, Mapping, Scalar, Tree
+from composer.language.tree_values import entries, integer, is_opaque, key, number, text
 from composer.model import ChannelKind, NamedQos, Qos, QosReference
 from composer.model.qos import (
     PRESETS,
@@ -19,7 +20,6 @@ from composer.model.qos import (
     QosProfile,
     Reliability,
 )
-from composer.model.resolve.tree_values import entries, integer, is_opaque, key, number, text
 
 
 @dataclass(slots=True)

@@ -6,8 +6,18 @@ from functools import cache, partial
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
-from composer.language.document.error_limit import LimitedDiagnostics
+from composer.language.document.limits import LimitedDiagnostics
 from composer.language.tree import Entry, Mapping, Scalar, Sequence
+from composer.language.tree_values import (
+    choice,
+    entries,
+    flag,
+    integer,
+    is_opaque,
+    key,
+    plain_text,
+    text_or_opaque,
+)
 from composer.model import (
     DEFAULT_SUPERVISION,
     USE_SIM_TIME,
@@ -21,46 +31,37 @@ from composer.model import (
 )
 from composer.model.names import join
 from composer.model.resolve.connections import read_chains, read_connections
-from composer.model.resolve.declarations.declaration import declare
-from composer.model.resolve.declarations.parameters import (
-    unknown_parameters,
-    with_use_sim_time,
-    with_values,
-)
+from composer.model.resolve.declaration import declare
 from composer.model.resolve.deployment import (
     processes_of_nodes,
     read_discovery,
     read_hosts,
     read_processes,
 )
-from composer.model.resolve.nodes.node import (
+from composer.model.resolve.node import (
     SystemContext,
     place_ports,
     place_transforms,
     resolve_node,
     state,
 )
-from composer.model.resolve.nodes.node_parameters import sections_of, without_sections_of_others
-from composer.model.resolve.nodes.node_settings import (
+from composer.model.resolve.node_settings import (
     NodeNames,
     read_introspection,
     read_supervision,
 )
-from composer.model.resolve.nodes.node_type_loader import NodeTypeLoader
+from composer.model.resolve.node_types import NodeTypeLoader
 from composer.model.resolve.overrides import Overrides
 from composer.model.resolve.parameter_files import read_parameter_files
-from composer.model.resolve.qos import qos_table
-from composer.model.resolve.source_folders import SourceFolders
-from composer.model.resolve.tree_values import (
-    choice,
-    entries,
-    flag,
-    integer,
-    is_opaque,
-    key,
-    plain_text,
-    text_or_opaque,
+from composer.model.resolve.parameters import (
+    sections_of,
+    unknown_parameters,
+    with_use_sim_time,
+    with_values,
+    without_sections_of_others,
 )
+from composer.model.resolve.qos import qos_table
+from composer.project.node_types import SourceFolders
 
 ROOT = "/"
 DEFAULT_THREADS = 2

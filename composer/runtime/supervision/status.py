@@ -87,7 +87,7 @@ class SystemStatus:
     """A system, its process, and its nodes in the order of the bring-up.
 
     ``is_child`` is whether the coordinating process of the system has started this one. ``goals``
-    are those of the whole system: see :mod:`composer.plan.system_goals`.
+    are those of the whole system: see :mod:`composer.plan.transitions`.
     """
 
     system: str

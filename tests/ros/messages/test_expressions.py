@@ -13,7 +13,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import ByteMultiArray
 
 from composer.language.expressions import EvaluationError, compile_expression
-from composer.language.expressions.values import message_fields
+from composer.language.expressions.expression import message_fields
 
 
 def odometry() -> Odometry:

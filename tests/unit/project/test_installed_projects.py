@@ -9,8 +9,7 @@ import pytest
 
 from composer.loading import load
 from composer.project import Project
-from composer.project.installed_projects import installed_projects, installed_systems
-from composer.project.node_types import NodeTypes
+from composer.project.node_types import NodeTypes, installed_projects, installed_systems
 from tests.cli.compose import compose
 
 

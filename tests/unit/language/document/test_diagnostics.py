@@ -20,7 +20,7 @@ if yaml.__with_libyaml__:
 @pytest.fixture(params=PARSERS, ids=lambda parser: parser.__name__)
 def parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of the parsers that PyYAML may have in turn."""
-    events = importlib.import_module("composer.language.document.events")
+    events = importlib.import_module("composer.language.document.builder")
     monkeypatch.setattr(events, "_LOADER", request.param)
 
 

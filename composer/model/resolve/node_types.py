@@ -20,11 +20,11 @@ from composer.language.expand import expand, missing_variables
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import NODE, check_kind
 from composer.language.tree import Entry, Mapping, Plain, Tree, plain
+from composer.language.tree_values import entries
 from composer.model.assembly import Inherited, NodeTypeFile, inherit
-from composer.model.resolve.declarations.declaration import Declaration, declare
+from composer.model.resolve.declaration import Declaration, declare
 from composer.model.resolve.qos import QosTable
-from composer.model.resolve.source_folders import SourceFolders
-from composer.model.resolve.tree_values import entries
+from composer.project.node_types import SourceFolders
 
 RULE = error("RC287", "missing-variable")
 

@@ -7,14 +7,7 @@ from collections.abc import Iterator
 
 from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Sequence, Tree
-from composer.model import (
-    DynamicTransform,
-    StaticTransform,
-    Transforms,
-    transform_ports,
-)
-from composer.model.geometry import IDENTITY, Quaternion, Transform, Vector, quaternion_of_angles
-from composer.model.resolve.tree_values import (
+from composer.language.tree_values import (
     entries,
     flag,
     key,
@@ -23,6 +16,13 @@ from composer.model.resolve.tree_values import (
     text_or_opaque,
     texts,
 )
+from composer.model import (
+    DynamicTransform,
+    StaticTransform,
+    Transforms,
+    transform_ports,
+)
+from composer.model.geometry import IDENTITY, Quaternion, Transform, Vector, quaternion_of_angles
 
 _ANGLES = ("roll", "pitch", "yaw")
 _ROTATIONS = ("rotation_rad", "rotation_deg", "quaternion")

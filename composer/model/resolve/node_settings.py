@@ -7,9 +7,7 @@ from dataclasses import fields
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Tree
-from composer.model import Executable, Introspection, OnFailure, RestartBudget, Supervision, Watch
-from composer.model.names import join
-from composer.model.resolve.tree_values import (
+from composer.language.tree_values import (
     choice,
     entries,
     flag,
@@ -19,6 +17,8 @@ from composer.model.resolve.tree_values import (
     number,
     text_or_opaque,
 )
+from composer.model import Executable, Introspection, OnFailure, RestartBudget, Supervision, Watch
+from composer.model.names import join
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,16 @@ from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.tree_values import (
+    choice,
+    entries,
+    flag,
+    is_opaque,
+    key,
+    plain_text,
+    text,
+    text_or_opaque,
+)
 from composer.model import (
     DRIVEN_BY_MANAGER,
     USE_SIM_TIME,
@@ -27,39 +37,30 @@ from composer.model import (
 )
 from composer.model.names import expand_name, remapped_name
 from composer.model.resolve.connections import PortConnection, PortConnections, connection_of
-from composer.model.resolve.declarations.declaration import (
+from composer.model.resolve.declaration import (
     Declaration,
+    Implementation,
     declare,
+    read_external,
     refined,
     refines,
     unknown_keys,
 )
-from composer.model.resolve.declarations.implementation import Implementation, read_external
-from composer.model.resolve.nodes.node_parameters import (
-    GivenValues,
-    node_parameters,
-)
-from composer.model.resolve.nodes.node_settings import (
+from composer.model.resolve.node_settings import (
     NodeNames,
     node_names,
     read_introspection,
     read_supervision,
 )
-from composer.model.resolve.nodes.node_type_loader import NodeTypeLoader
+from composer.model.resolve.node_types import NodeTypeLoader
 from composer.model.resolve.overrides import Overrides
 from composer.model.resolve.parameter_files import ParameterFiles
-from composer.model.resolve.qos import QosTable
-from composer.model.resolve.source_folders import SourceFolders
-from composer.model.resolve.tree_values import (
-    choice,
-    entries,
-    flag,
-    is_opaque,
-    key,
-    plain_text,
-    text,
-    text_or_opaque,
+from composer.model.resolve.parameters import (
+    GivenValues,
+    node_parameters,
 )
+from composer.model.resolve.qos import QosTable
+from composer.project.node_types import SourceFolders
 
 
 @dataclass(frozen=True, slots=True)

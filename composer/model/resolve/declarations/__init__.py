@@ -1,1 +1,0 @@
-"""What a node or a node type declares: its ports, parameters, reactions, transforms and code."""
