@@ -88,8 +88,9 @@ def attribute_line(
     """Return the level, the logger and the message of a line of a process.
 
     ``loggers`` are the names that the process may log with, and the parents of others. A line
-    that no ROS logger has written has the first one, and the level of its stream. A program can print the name of any logger, so a line with
-    another name has the first logger, and shows that name in its message.
+    that no ROS logger has written has the first one, and the level of its stream. A program can
+    print the name of any logger, so a line with another name has the first logger, and shows that
+    name in its message.
     """
     match = _ROS_LINE.fullmatch(text)
     if match is None:
