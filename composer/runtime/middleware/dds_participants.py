@@ -93,6 +93,22 @@ def ended_participants(known: Set[bytes], domain_id: int) -> frozenset[bytes]:
     return frozenset(ended) if is_certain else frozenset()
 
 
+def is_in_group(prefix: bytes, leader: int) -> bool:
+    """Return whether a participant is in a process of the group that ``leader`` leads."""
+    return _process(prefix) in {
+        pid & _LOWER_HALF
+        for pid in (int(path.name) for path in Path("/proc").glob("[0-9]*"))
+        if _group(pid) == leader
+    }
+
+
+def _group(pid: int) -> int | None:
+    try:
+        return os.getpgid(pid)
+    except ProcessLookupError:
+        return None
+
+
 def _process(prefix: bytes) -> int | None:
     """Return the lower half of the id of the process of a participant, None if unknown."""
     is_known = prefix.startswith(_FAST_DDS)

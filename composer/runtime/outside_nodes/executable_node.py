@@ -28,6 +28,7 @@ from composer.runtime.outside_nodes.outside_node import (
     OutsideContext,
     OutsideNode,
     TransitionRefused,
+    elsewhere_text,
     missing_text,
 )
 from composer.runtime.outside_nodes.presence import NodePresence
@@ -102,10 +103,16 @@ class ExecutableNode(OutsideNode):
         ready = partial(self._is_ready, child)
         if not await self._until_ready(ready, end_s) or child.ended.done():
             missing = self._presence.missing(self._earlier)
-            reason = _ended(child) or f"{missing_text(missing)} after {_seconds(self._executable)}"
+            reason = _ended(child) or self._not_ready(child, missing_text(missing))
             await self._end_process()
             raise TransitionRefused(reason, INACTIVE)
         self._check_names_later(child)
+
+    def _not_ready(self, child: Child, missing: str) -> str:
+        """Return why its process is not ready in time, with the nodes that it has instead."""
+        names = set() if child.pid is None else self._presence.names_in(child.pid)
+        limit = f"after {_seconds(self._executable)}"
+        return f"{missing} {limit}{elsewhere_text(self.model, names)}"
 
     async def _finish_task(self, child: Child, end_s: float) -> None:
         if not await self._until_ready(child.ended.done, end_s):
@@ -148,8 +155,7 @@ class ExecutableNode(OutsideNode):
         if await self._until_ready(has_services, end_s) and not child.ended.done():
             self._check_names_later(child)
             return
-        problem = f"no service {service} after {_seconds(self._executable)}"
-        reason = _ended(child) or problem
+        reason = _ended(child) or self._not_ready(child, f"no service {service}")
         await self._end_process()
         raise TransitionRefused(reason, UNCONFIGURED)
 

@@ -12,6 +12,7 @@ from composer.runtime.outside_nodes.outside_node import (
     OutsideContext,
     OutsideNode,
     TransitionRefused,
+    elsewhere_text,
     missing_text,
 )
 from composer.runtime.outside_nodes.presence import NodePresence
@@ -119,7 +120,9 @@ class ExternalNode(OutsideNode):
     def _refuse_absent(self, missing: str, state: str) -> None:
         limit = f"after {self._external.ready_timeout_s:g} s"
         self._is_lost = True
-        raise TransitionRefused(f"{missing} {limit}; start it, or see 'ros2 node list'", state)
+        elsewhere = elsewhere_text(self.model, self._presence.names_elsewhere())
+        advice = elsewhere or "; start it, or see 'ros2 node list'"
+        raise TransitionRefused(f"{missing} {limit}{advice}", state)
 
     def _close_remote(self) -> None:
         if self._remote is not None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from time import monotonic
 from typing import Any
 
@@ -15,6 +15,7 @@ from rclpy.node import Node as RosNode
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, Port
+from composer.model.names import split_node_name
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Cancelled, Future
@@ -274,6 +275,19 @@ def missing_text(ports: Iterable[Port]) -> str:
         return "it is not in the ROS graph"
     more = len(names) - _MAX_MISSING
     return f"it has no {', '.join(names[:_MAX_MISSING])}" + (f" and {more} more" * (more > 0))
+
+
+def elsewhere_text(model: Node, names: Set[str]) -> str:
+    """Return which other nodes there are instead of an awaited one, and what to write for them."""
+    if not names or model.full_name in names:
+        return ""
+    shown = sorted(names)[:_MAX_MISSING]
+    if len(names) > 1:
+        return f"; there are {', '.join(shown)} instead: list them under 'nodes' of the executable"
+    namespace, name = split_node_name(shown[0])
+    keys = [f"'name: {name}'"] if name != model.ros_name.value else []
+    keys += [f"'namespace: {namespace}'"] if namespace != model.namespace.value else []
+    return f"; there is {shown[0]} instead: write {' and '.join(keys)}"
 
 
 class _TransitionLock:

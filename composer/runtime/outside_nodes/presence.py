@@ -9,7 +9,8 @@ from rclpy.node import Node as RosNode
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.model import Node, Port, PortKind
-from composer.model.names import split_node_name
+from composer.model.names import join_node_name, split_node_name
+from composer.runtime.middleware.dds_participants import is_in_group
 from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.
@@ -37,11 +38,7 @@ class NodePresence:
 
     def participants(self) -> frozenset[bytes]:
         """Return the prefixes of the participants with this node, as far as they are known."""
-        found = [
-            endpoint
-            for topic in _COMMON_TOPICS
-            for endpoint in self._manager.get_publishers_info_by_topic(topic)
-        ]
+        found = self._common_endpoints()
         for port in self._model.ports:
             found += self._endpoints(port)
         return frozenset(map(participant, self._own(found)))
@@ -59,6 +56,20 @@ class NodePresence:
         counts = Counter(participant(event) for event in events if event.node_name == name)
         return max((counts[item] for item in self.participants() - earlier), default=0)
 
+    def names_in(self, pid: int) -> set[str]:
+        """Return the full names of the nodes in a process and its children."""
+        return {
+            join_node_name(endpoint.node_namespace, endpoint.node_name)
+            for endpoint in self._common_endpoints()
+            if is_in_group(participant(endpoint), pid)
+        }
+
+    def names_elsewhere(self) -> set[str]:
+        """Return the full names of nodes with its name in other namespaces."""
+        nodes = set(RosGraph(self._manager).nodes()) - self._names
+        name = self._model.ros_name.value
+        return {join_node_name(namespace, last) for last, namespace in nodes if last == name}
+
     def missing(self, earlier: frozenset[bytes] = frozenset()) -> tuple[Port, ...]:
         """Return the declared ports that the node does not have yet."""
         return tuple(
@@ -73,6 +84,13 @@ class NodePresence:
         """Return whether the node provides a service, by its full name."""
         servers = self._own(servers_of(self._manager, service))
         return any(participant(endpoint) not in earlier for endpoint in servers)
+
+    def _common_endpoints(self) -> list[TopicEndpointInfo]:
+        return [
+            endpoint
+            for topic in _COMMON_TOPICS
+            for endpoint in self._manager.get_publishers_info_by_topic(topic)
+        ]
 
     def _own(self, endpoints: Iterable[TopicEndpointInfo]) -> Iterator[TopicEndpointInfo]:
         for endpoint in endpoints:

@@ -225,6 +225,12 @@ nodes:
             "publishers: {other: {type: std_msgs/msg/String, external: true}}",
             "activate failed: it has no publisher /other after 1.5 s",
         ),
+        (  # a program that names its node itself, as a launch file would
+            f"{{command: [sh, -c, '{sys.executable} {PROGRAMS / 'driver.py'} --ros-args"
+            " -r __node:=c -r __ns:=/a/b $@; true', sh], ready_timeout_ms: 3000}",
+            "",
+            "graph after 3 s; there is /a/b/c instead: write 'name: c' and 'namespace: /a/b'",
+        ),
         ("{command: [/nowhere/x]}", "", "configure failed: there is no program '/nowhere/x'"),
         (
             f"{{command: {MANAGED}, lifecycle: managed}}",
@@ -376,12 +382,30 @@ def test_the_end_does_not_wait_for_an_absent_node(tmp_path: Path) -> None:
         assert outcome.remarks == ("waiting for /lidar",)
 
 
-def test_an_absent_external_node_fails_a_bring_up_that_is_all_or_nothing(tmp_path: Path) -> None:
+ELSEWHERE = """
+system: robot
+nodes: {lidar: {name: NAME, namespace: elsewhere, external: {ready_timeout_ms: 300}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (
+            EXTERNAL.replace("TIMEOUT", "300"),
+            "no publisher /scan, service /reset after 0.3 s; start",
+        ),
+        (ELSEWHERE, "ROS graph after 0.3 s; there is /NAME instead: write 'namespace: /'"),
+    ],
+)
+def test_an_absent_external_node_fails_a_bring_up_that_is_all_or_nothing(
+    text: str, reason: str, tmp_path: Path, peer: Peer
+) -> None:
+    name = peer.node.get_name()
     options = HostOptions(all_or_nothing=True)
-    with running(EXTERNAL.replace("TIMEOUT", "300"), tmp_path, options=options) as system:
+    with running(text.replace("NAME", name), tmp_path, options=options) as system:
         assert system.end().exit_code == 1
-    reason = str(system.reported(RollingBack)[0])
-    assert "it has no publisher /scan, service /reset after 0.3 s" in reason
+    assert reason.replace("NAME", name) in str(system.reported(RollingBack)[0])
 
 
 def test_a_refused_system_leaves_an_external_node_as_it_is(tmp_path: Path, peer: Peer) -> None:
