@@ -66,9 +66,13 @@ def _open_missing_streams() -> None:
 
 
 def _os_error(error: OSError) -> int:
-    """Report a full disk or a removed working directory; all else is an internal error."""
+    """Report a full disk, a private file or a removed working directory; all else is an internal
+    error.
+    """
     if error.errno in _DISK_FULL:
         text = f"cannot write the output: {error.strerror}"
+    elif isinstance(error, PermissionError) and error.filename is not None:
+        text = escape_line(f"cannot use '{error.filename}': {error.strerror}")
     elif not _has_working_directory():
         text = "the current working directory does not exist anymore"
     else:

@@ -1,0 +1,48 @@
+"""Ctrl-C at any moment of the start of a command: no traceback from our code."""
+
+from __future__ import annotations
+
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import composer
+
+COMMANDS = (("--version",), ("validate", "systems"), ("dashboard", "--port", "0"))
+WITHIN_S = 0.3
+TIMES = 6
+INTERRUPTED = 130
+PACKAGE = Path(composer.__file__).parent
+#: Being imported when the first line of ours runs, a millisecond before Ctrl-C is handled.
+FIRST_FILES = {"__init__.py", "__main__.py", "cli/__init__.py"}
+PATIENCE_S = 30.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
+def test_ctrl_c_in_the_first_moments(words: tuple[str, ...]) -> None:
+    """Before our first line, Python itself prints where it was: see decision 0024."""
+    seed = random.randrange(2**32)
+    chance = random.Random(seed)
+    for _ in range(TIMES):
+        delay_s = chance.uniform(0.0, WITHIN_S)
+        with subprocess.Popen(
+            [sys.executable, "-m", "composer", *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            time.sleep(delay_s)  # the moment is what is tested
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=PATIENCE_S)
+        case = f"{delay_s:.3f} s, seed {seed}: exit code {process.returncode}\n{errors}"
+        files = {Path(name) for name in re.findall(r'File "(/.+?)"', errors)}
+        ours = {file for file in files if file.is_relative_to(PACKAGE)}
+        assert {str(file.relative_to(PACKAGE)) for file in ours} <= FIRST_FILES, case
+        assert process.returncode in (0, 1, INTERRUPTED, -signal.SIGINT), case
