@@ -21,8 +21,12 @@ RUN = "log/compose/robot/2026-03-01-08-30-00-000-1"
 RECORD = Record(1, "info", "arm", "/arm", "moved").to_line()
 FILES = {
     "composer.yaml": "",
-    "systems/robot.yaml": "system: robot\nparameter_files: [../arm.params.yaml]\nnodes: {arm: {type: arm}}\n",
-    "nodes/arm.yaml": "node: arm\nbehavior: arm:Arm\nparameters: {speed: {type: double, default: 1.0}}\n",
+    "systems/robot.yaml": (
+        "system: robot\nparameter_files: [../arm.params.yaml]\nnodes: {arm: {type: arm}}\n"
+    ),
+    "nodes/arm.yaml": (
+        "node: arm\nbehavior: arm:Arm\nparameters: {speed: {type: double, default: 1.0}}\n"
+    ),
     "nodes/arm.py": "class Arm:\n    def on_activate(self): pass\n",
     "arm.params.yaml": "arm: {ros__parameters: {speed: 2.0}}\n",
     f"{RUN}/run.json": '{"system": "/robot", "host": "here", "pid": 1}\n',

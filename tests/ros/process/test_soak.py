@@ -1,0 +1,120 @@
+"""A split system for minutes, with everything around it that goes wrong: nothing grows or hangs."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from tests.ros.dashboard.test_foxglove_limits import raw
+from tests.ros.process.test_restarts import PROGRAMS, SYSTEM, TALKER, children, settled, usage
+from tests.ros.support.commands import compose
+from tests.ros.support.dashboard import Dashboard
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem
+
+#: Restarts of everything, several times as often as the system waits before the next one.
+RESTARTS = "{max_attempts: 100000, window_ms: 3600000, backoff_ms: 20, backoff_max_ms: 200}"
+KILL_PERIOD_S = 3.0
+WARM_UP_KILLS = 10
+#: Of the system, and of the dashboard beside it.
+MEMORY_MB, DASHBOARD_MB = 12.0, 8.0
+SPARE_THREADS = 2
+
+
+@contextmanager
+def lifecycle_client(node: str) -> Iterator[list[int]]:
+    """Move a node up and down with commands, as a user with a script; collect the exit codes."""
+    has_ended, codes = threading.Event(), list[int]()
+
+    def run() -> None:
+        while not has_ended.is_set():
+            for transition in ("deactivate", "activate"):
+                codes.append(compose("lifecycle", "set", node, transition).returncode)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield codes
+    finally:
+        has_ended.set()
+        thread.join()
+
+
+def wait_until_up(system: RunningSystem) -> None:
+    """Wait until every node is active, or was deactivated by a client and is about to return."""
+    end_s = time.monotonic() + PATIENCE_S
+    while compose("ps").stdout.count(" active") < len(("driver", "talker", "other")):
+        assert system.process.poll() is None, "the system has ended"
+        assert time.monotonic() < end_s, compose("ps").stdout
+        time.sleep(0.2)  # poll: each look is a command
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("seconds", [30, 600])
+def test_kills_of_any_process(seconds: int, tmp_path: Path) -> None:
+    seed = random.randrange(2**32)
+    chance = random.Random(seed)
+    text = SYSTEM.replace("PYTHON", sys.executable).replace("PROGRAMS", str(PROGRAMS))
+    text += f"lifecycle: {{on_failure: restart, restart: {RESTARTS}}}\n"
+    (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "talker.py").write_text(TALKER, encoding="utf-8")
+    with RunningSystem(str(tmp_path / "robot.yaml"), "--dashboard") as system:
+        system.wait_for("3 of 3 nodes active")
+        pid = system.process.pid
+        dashboard = Dashboard()
+        own_dashboard = next(child for child in children(pid)[1:] if has_word(child, "dashboard"))
+
+        def kill_one() -> None:
+            """Kill a launcher, an executable or a process of the system."""
+            victims = [child for child in children(pid)[1:] if child != own_dashboard]
+            with suppress(ProcessLookupError):
+                os.kill(chance.choice(victims), signal.SIGKILL)
+            wait_until_up(system)
+
+        with raw(dashboard.address, max_queue=1, close_timeout=0) as stalled:
+            stalled.subscribe("/chatter")
+            with lifecycle_client("talker") as first_codes, lifecycle_client("driver") as codes:
+                for _ in range(WARM_UP_KILLS):
+                    kill_one()
+                first = usage(pid)
+                first_of_dashboard = usage(dashboard.process.pid)
+                end_s = time.monotonic() + seconds
+                while time.monotonic() < end_s:
+                    kill_one()
+                    print(f"{end_s - time.monotonic():.0f} s left", usage(pid))
+                    time.sleep(KILL_PERIOD_S)  # the period of the kills
+            wait_until_up(system)
+            last = settled(lambda: usage(pid), first)
+            of_dashboard = usage(dashboard.process.pid)
+            print(f"seed {seed}", first, last, first_of_dashboard, of_dashboard)
+            assert set(first_codes + codes) <= {0, 1}
+            assert first_codes.count(0) > 0
+            assert codes.count(0) > 0
+            for before, after, memory_mb in (
+                (first, last, MEMORY_MB),
+                (first_of_dashboard, of_dashboard, DASHBOARD_MB),
+            ):
+                assert after.zombies == 0
+                assert (after.processes, after.descriptors) == (
+                    before.processes,
+                    before.descriptors,
+                )
+                assert after.threads <= before.threads + SPARE_THREADS
+                assert after.memory_mb - before.memory_mb < memory_mb
+        dashboard.process.send_signal(signal.SIGINT)
+        assert dashboard.process.wait(timeout=PATIENCE_S) == 0
+        system.stop()
+        assert "Traceback" not in system.output + dashboard.errors()
+
+
+def has_word(pid: int, word: str) -> bool:
+    return word.encode() in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
