@@ -1,10 +1,11 @@
-"""Read typed values from a located tree, skipping values of the wrong type.
+"""Read typed values from a located tree, and change values in it, skipping those of the wrong type.
 
 The schema has already reported those.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from typing import TypeVar
 
@@ -28,6 +29,16 @@ def entries(tree: Tree | None) -> tuple[Entry, ...]:
     return tree.entries if isinstance(tree, Mapping) else ()
 
 
+def mapping(entry: Entry) -> Mapping:
+    """Return the map under a key; an empty one for other values."""
+    return entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+
+
+def items(tree: Tree | None) -> tuple[Tree, ...]:
+    """Return the items of a list; none for other values."""
+    return tree.items if isinstance(tree, Sequence) else ()
+
+
 def text(tree: Tree | None) -> Located[str] | None:
     """Return a text with its location."""
     if isinstance(tree, Scalar) and isinstance(tree.value, str):
@@ -37,8 +48,7 @@ def text(tree: Tree | None) -> Located[str] | None:
 
 def texts(tree: Tree | None) -> tuple[Located[str], ...]:
     """Return a single text, or the texts of a list."""
-    items = tree.items if isinstance(tree, Sequence) else (tree,)
-    found = (text(item) for item in items)
+    found = map(text, tree.items if isinstance(tree, Sequence) else (tree,))
     return tuple(item for item in found if item is not None)
 
 
@@ -100,3 +110,30 @@ def word(tree: Tree) -> str:
 def environment(tree: Tree | None) -> tuple[tuple[Located[str], str], ...]:
     """Return the environment variables of a map."""
     return tuple((key(item), word(item.value)) for item in entries(tree))
+
+
+def changed_at(tree: Mapping, path: tuple[str, ...], change: Callable[[Tree], Tree]) -> Mapping:
+    """Return a map with the values at ``path`` changed; ``*`` stands for any key or item."""
+    changed = _changed_at(tree, path, change)
+    return changed if isinstance(changed, Mapping) else tree
+
+
+def _changed_at(tree: Tree, path: tuple[str, ...], change: Callable[[Tree], Tree]) -> Tree:
+    if not path:
+        return change(tree)
+    step, rest = path[0], path[1:]
+    match tree:
+        case Mapping() if step == "*" or tree.entry(step) is not None:
+            entries = (
+                Entry(entry.key, _changed_at(entry.value, rest, change))
+                if step in ("*", entry.name)
+                else entry
+                for entry in tree
+            )
+            return Mapping(tuple(entries), tree.span)
+        case Sequence() if step == "*":
+            return Sequence(
+                tuple(_changed_at(item, rest, change) for item in tree.items), tree.span
+            )
+        case _:
+            return tree

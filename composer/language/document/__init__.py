@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import codecs
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from functools import lru_cache
 from itertools import islice
@@ -29,8 +29,6 @@ from composer.language.tree import Mapping, Scalar, ScalarValue, Tree, describe
 #: Larger files are systems, which are parsed once anyway.
 _MAX_CACHED_BYTES = 32_768
 _FIRST_KEY_HINT = "begin with 'system: <name>' or 'node: <name>'"
-
-__all__ = ["parse_bytes", "parse_document", "read_document", "read_parameter_document"]
 
 
 def read_document(
@@ -211,7 +209,7 @@ def _read(path: Path) -> bytes | None:
     except FileTooLargeError:
         return None
     except FileNotFoundError:
-        raise _NotRead("there is no such file", _similar_name(path)) from None
+        raise _NotRead("there is no such file", similar_file(path, str(path), "")) from None
     except NotRegularError as error:
         raise _NotRead(error.strerror or str(error)) from None
     except (OSError, ValueError) as error:
@@ -219,17 +217,19 @@ def _read(path: Path) -> bytes | None:
         raise _NotRead(f"this file cannot be read: {reason or error}") from None
 
 
-def _similar_name(path: Path) -> str | None:
-    name = nearest(path.name, _sibling_names(path))
-    if name is None:
+def similar_file(path: Path, name: str, *suffixes: str) -> str | None:
+    """Return a hint with the file next to ``path`` that its ``name`` was probably meant to be."""
+    close = nearest(path.name, [other for other in _names(path.parent) if other.endswith(suffixes)])
+    if close is None:
         return None
     # Do not shorten the path: its end is the part that differs.
-    return f"did you mean '{shown(path.with_name(name), limit=_LONGEST_PATH)}'?"
+    return f"did you mean '{shown(Path(name).with_name(close), limit=_LONGEST_PATH)}'?"
 
 
-def _sibling_names(path: Path) -> Iterator[str]:
+def _names(folder: Path) -> list[str]:
+    """Return the first names in a folder."""
     try:
-        with os.scandir(path.parent) as entries:
-            yield from (entry.name for entry in islice(entries, _ENTRIES_FOR_HINT))
+        with os.scandir(folder) as entries:
+            return [entry.name for entry in islice(entries, _ENTRIES_FOR_HINT)]
     except (OSError, ValueError):
-        return
+        return []

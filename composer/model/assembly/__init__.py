@@ -14,8 +14,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
 from composer.language.tree import Mapping
-from composer.model.assembly.include_entries import IncludeReader
-from composer.model.assembly.includes import IncludeResolver, system_file
+from composer.language.tree_values import entries, is_opaque
+from composer.model.assembly.include_entries import IncludeReader, SystemFile
+from composer.model.assembly.includes import IncludeResolver
 from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit
 from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits, LimitExceeded
 from composer.project import Project
@@ -53,18 +54,13 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
     limits = IncludeLimits()
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
-        merged = resolver.merge(system_file(tree, source, folder), {})
+        merged = resolver.merge(SystemFile(folder / Path(source.path).name, source, tree), {})
     except LimitExceeded as stopped:
         return AssembledSystem(None, [stopped.diagnostic])
     is_partial = (
         resolver.is_partial
         or any(item.rule in _PARTIAL_RULES for item in diagnostics)
-        or _has_unexpanded_names(merged)
+        or any(is_opaque(entry.name) for entry in entries(merged.get("nodes")))
     )
     included = {path: tuple(places.values()) for path, places in resolver.included.items()}
     return AssembledSystem(merged, diagnostics, is_partial, resolver.folders, included)
-
-
-def _has_unexpanded_names(tree: Mapping) -> bool:
-    nodes = tree.get("nodes")
-    return isinstance(nodes, Mapping) and any("${" in entry.name for entry in nodes)

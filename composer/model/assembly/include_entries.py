@@ -5,23 +5,22 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import field
-from itertools import islice
 from pathlib import Path
 
-from composer.base.diagnostics import Diagnostic, nearest, shown
+from composer.base.diagnostics import Diagnostic, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
-from composer.language.document import read_document
+from composer.language.document import read_document, similar_file
 from composer.language.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.language.schema.kinds import SYSTEM, check_kind
-from composer.language.tree import Entry, Mapping, Scalar, Tree
+from composer.language.tree import Entry, Mapping, Tree
+from composer.language.tree_values import is_opaque, text
 from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits
 from composer.model.assembly.namespacing import Placement
 from composer.model.names import namespace_problem
 from composer.project import OUTSIDE_HINT, Project
 
 _PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_NAMES_FOR_HINT = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +46,8 @@ class SystemFile:
 def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     """Return an entry, without the parts that have the wrong type; None without a file."""
     entry = tree if isinstance(tree, Mapping) else None
-    file = _text(entry.get("file") if entry is not None else tree)
-    if file is None or _is_opaque(file.value):
+    file = text(entry.get("file") if entry is not None else tree)
+    if file is None or is_opaque(file.value):
         return None
     if entry is None:
         return Include(file, Placement(), {}, None, file.span)
@@ -56,7 +55,7 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     before = len(diagnostics)
     namespace = _namespace(entry, diagnostics)
     # the value of a loop may be in both; it is reported once
-    written, prefix = _text(entry.get("namespace")), _text(entry.get("prefix"))
+    written, prefix = text(entry.get("namespace")), text(entry.get("prefix"))
     is_same = written is not None and prefix is not None and written.value in prefix.value
     found = [] if is_same and len(diagnostics) > before else diagnostics
     return Include(
@@ -100,7 +99,9 @@ class IncludeReader:
             elif not self.project.holds(target):
                 self._refuse(name, "is outside the project", OUTSIDE_HINT)
             elif not target.exists():
-                self._refuse(name, "does not exist", _similar(name.value, folder))
+                self._refuse(
+                    name, "does not exist", similar_file(target, name.value, ".yaml", ".yml")
+                )
             else:
                 return target.resolve()
         except (OSError, RuntimeError, ValueError):
@@ -109,7 +110,7 @@ class IncludeReader:
 
     def _read(self, path: Path, name: Located[str], shown_path: str) -> SystemFile | None:
         tree, source, found = read_document(path, shown_path)
-        self.limits.read(len(source.text), name.span)
+        self.limits.count("characters", len(source.text), name.span)
         for diagnostic in found:
             if not source.text and diagnostic.rule in (UNREADABLE_FILE, TOO_LARGE):
                 self._refuse(name, f"cannot be included: {diagnostic.message}", diagnostic.hint)
@@ -129,8 +130,8 @@ class IncludeReader:
 
 
 def _prefix(entry: Mapping, diagnostics: list[Diagnostic]) -> str:
-    prefix = _text(entry.get("prefix"))
-    if prefix is None or not prefix.value or _is_opaque(prefix.value):
+    prefix = text(entry.get("prefix"))
+    if prefix is None or not prefix.value or is_opaque(prefix.value):
         return ""
     if _PREFIX.fullmatch(prefix.value):
         return prefix.value
@@ -141,8 +142,8 @@ def _prefix(entry: Mapping, diagnostics: list[Diagnostic]) -> str:
 
 
 def _namespace(entry: Mapping, diagnostics: list[Diagnostic]) -> Located[str] | None:
-    namespace = _text(entry.get("namespace"))
-    if namespace is None or _is_opaque(namespace.value):
+    namespace = text(entry.get("namespace"))
+    if namespace is None or is_opaque(namespace.value):
         return namespace  # names with an unknown variable are not checked
     absolute = namespace.value if namespace.value.startswith("/") else f"/{namespace.value}"
     problem = namespace_problem(absolute)
@@ -151,25 +152,3 @@ def _namespace(entry: Mapping, diagnostics: list[Diagnostic]) -> Located[str] | 
     message = f"namespace '{shown(namespace.value)}' {problem}"
     diagnostics.append(Diagnostic(INVALID_INCLUDE, message, namespace.span))
     return None
-
-
-def _similar(name: str, folder: Path) -> str | None:
-    """Return a hint with a file of a similar name."""
-    path = Path(name)
-    try:
-        with os.scandir(folder / path.parent) as entries:
-            names = [entry.name for entry in islice(entries, _NAMES_FOR_HINT)]
-    except OSError:
-        return None
-    close = nearest(path.name, [other for other in names if other.endswith((".yaml", ".yml"))])
-    return f"did you mean '{shown(path.with_name(close))}'?" if close is not None else None
-
-
-def _text(tree: Tree | None) -> Located[str] | None:
-    if isinstance(tree, Scalar) and isinstance(tree.value, str):
-        return Located(tree.value, tree.span)
-    return None
-
-
-def _is_opaque(text: str) -> bool:
-    return "${" in text

@@ -7,19 +7,20 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import SourceFile, Span
+from composer.base.source import Span
 from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand import expand
 from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import SYSTEM, with_intended_sections
-from composer.language.tree import Entry, Mapping, Sequence, Tree
+from composer.language.tree import Entry, Mapping, Tree
+from composer.language.tree_values import items
 from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
 from composer.model.assembly.limits import IncludeLimits, LimitExceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
 from composer.model.assembly.namespacing import add_namespace
-from composer.model.assembly.wildcards import Wildcards
+from composer.model.assembly.references import expand_wildcards
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,17 +57,13 @@ class IncludeResolver:
         self.diagnostics += misspelled
         expanded, found = expand(tree, arguments)
         if self._stack:
-            self.limits.add(measure(expanded).values, self._stack[-1].span)
+            self.limits.count("values", measure(expanded).values, self._stack[-1].span)
         found += check_schema(expanded, SYSTEM)
         self.diagnostics += found
         includes = expanded.get(INCLUDE)
         if any(_is_in_section(item.primary, INCLUDE, expanded) for item in found):
             self.is_partial = True
-        parts = [
-            part
-            for item in (includes.items if isinstance(includes, Sequence) else ())
-            if (part := self._part(item, file)) is not None
-        ]
+        parts = [part for item in items(includes) if (part := self._part(item, file)) is not None]
         conflicts: list[Diagnostic] = []
         joined = join_parts(expanded, parts, conflicts)
         # The copies of an include with an error may have the same names because of it, and an
@@ -74,14 +71,14 @@ class IncludeResolver:
         if not self.is_partial:
             wrong = {_line(item) for item in self.diagnostics}
             self.diagnostics += (item for item in conflicts if not _lines(item) & wrong)
-        return self._expand_wildcards(joined)
+        return expand_wildcards(joined, self.limits)
 
     def _part(self, item: Tree, includer: SystemFile) -> Part | None:
         include = read_include(item, self.diagnostics)
         if include is None:
             self.is_partial = True
             return None
-        self.limits.include(include.file.span)
+        self.limits.count("includes", 1, include.file.span)
         file = self.reader.read(include.file, includer.path.parent, includer.source)
         if file is None:
             self.is_partial = True
@@ -104,7 +101,8 @@ class IncludeResolver:
             diagnostics: list[Diagnostic] = [] if self.is_partial else self.diagnostics
             tree = apply_overrides(tree, include.overrides, file.source, diagnostics)
             diagnostics += check_schema(tree, SYSTEM)
-        merged = add_namespace(tree, include.placement, self._folder(), file.path.parent)
+        includer = self._stack[-1].file.path.parent
+        merged = add_namespace(tree, include.placement, includer, file.path.parent)
         return Part(merged, include.naming)
 
     def _is_cycle(self, file: SystemFile) -> bool:
@@ -118,48 +116,19 @@ class IncludeResolver:
         self.diagnostics.append(_cycle(self._stack[numbers[0] :]))
         return True
 
-    def _folder(self) -> Path:
-        return self._stack[-1].file.path.parent
-
-    def _expand_wildcards(self, tree: Mapping) -> Mapping:
-        """Return the system with node names in place of patterns."""
-        nodes = tree.get("nodes")
-        names = tuple(entry.name for entry in nodes) if isinstance(nodes, Mapping) else ()
-        wildcards = Wildcards(names, self.limits)
-        changes = {
-            "nodes": wildcards.in_nodes,
-            "processes": wildcards.in_processes,
-            "connections": wildcards.in_connections,
-        }
-        return Mapping(
-            tuple(
-                Entry(entry.key, changes[entry.name](entry.value))
-                if entry.name in changes
-                else entry
-                for entry in tree
-            ),
-            tree.span,
-        )
-
 
 def _cycle(frames: list[_Frame]) -> Diagnostic:
     """Report a cycle, starting at its first file by name: one diagnostic for all entry points."""
     paths = [frame.file.source.path for frame in frames]
     first = paths.index(min(paths))
-    frames = frames[first:] + frames[:first]
-    paths = paths[first:] + paths[:first]
-    cycle = " -> ".join(map(shown, [*paths, paths[0]]))
+    frames, paths = frames[first:] + frames[:first], paths[first:] + paths[:first]
     spans = [frame.span for frame in frames]
-    labels = tuple(Label(span, "through this") for span in spans[1:])
     if len(frames) == 1:
         message = f"'{shown(paths[0])}' includes itself"
         return Diagnostic(CYCLE, message, spans[0], hint="remove the include")
+    cycle = " -> ".join(map(shown, [*paths, paths[0]]))
+    labels = tuple(Label(span, "through this") for span in spans[1:])
     return Diagnostic(CYCLE, f"this includes itself: {cycle}", spans[0], labels)
-
-
-def system_file(tree: Mapping, source: SourceFile, folder: Path) -> SystemFile:
-    """Return the file of the including system."""
-    return SystemFile(folder / Path(source.path).name, source, tree)
 
 
 def _line(diagnostic: Diagnostic) -> tuple[str, int]:

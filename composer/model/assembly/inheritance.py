@@ -14,7 +14,8 @@ from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE
 from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
-from composer.language.tree import Mapping, Scalar
+from composer.language.tree import Mapping
+from composer.language.tree_values import text
 from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, LimitExceeded
 from composer.model.assembly.merging import merge_maps
 from composer.project import Project
@@ -34,10 +35,7 @@ class NodeTypeFile:
     @property
     def base(self) -> Located[str] | None:
         """The type that it extends; None if there is none, or if it is not a text."""
-        written = self.tree.get(EXTENDS)
-        if isinstance(written, Scalar) and isinstance(written.value, str):
-            return Located(written.value, written.span)
-        return None
+        return text(self.tree.get(EXTENDS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +108,8 @@ def _base(
     diagnostics += found
     if tree is None:
         return None
-    limits.read(len(source.text), name.span)
-    limits.add(measure(tree).values, name.span)
+    limits.count("characters", len(source.text), name.span)
+    limits.count("values", measure(tree).values, name.span)
     wrong_kind = check_kind(tree, source, (NODE,))
     if wrong_kind is not None:
         diagnostics.append(wrong_kind)

@@ -9,17 +9,14 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.rules import DUPLICATE_NAME
 from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
+from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.limits import INVALID_INCLUDE, UNKNOWN_OVERRIDE
 
 PARAMETERS = "parameters"
 #: Keys that exclude each other: one replaces the other.
 _ALTERNATIVES = frozenset({"period_ms", "rate_hz"})
-_SECTIONS = {
-    "nodes": "node",
-    "qos_profiles": "QoS profile",
-    "executors": "executor",
-    "chains": "chain",
-}
+#: Sections whose entries an include can override.
+_OVERRIDABLE = ("nodes", "qos_profiles", "executors", "chains")
 INCLUDE = "include"
 #: Sections that are joined, with the term for their entries.
 _MAPS = {
@@ -93,10 +90,9 @@ def apply_overrides(
     """
     known: list[Entry] = []
     for section in overrides:
-        of_system = tree.get(section.name)
-        if section.name not in _SECTIONS or not isinstance(section.value, Mapping):
+        if section.name not in _OVERRIDABLE or not isinstance(section.value, Mapping):
             continue
-        names = [entry.name for entry in of_system] if isinstance(of_system, Mapping) else []
+        names = [entry.name for entry in entries(tree.get(section.name))]
         diagnostics.extend(_unknown(section, names, source))
         kept = tuple(
             entry
@@ -109,9 +105,9 @@ def apply_overrides(
 
 
 def _unknown(section: Entry, names: list[str], source: SourceFile) -> Iterator[Diagnostic]:
-    for entry in section.value if isinstance(section.value, Mapping) else ():
+    for entry in entries(section.value):
         if entry.name not in names:
-            what = _SECTIONS[section.name]
+            what = _MAPS[section.name]
             message = f"'{source.path}' has no {what} '{shown(entry.name)}'"
             hint = suggestion(entry.name, names)
             yield Diagnostic(UNKNOWN_OVERRIDE, message, entry.key.span, hint=hint)
@@ -147,9 +143,7 @@ def _without_repeats(parts: Iterable[Part], diagnostics: list[Diagnostic]) -> It
     """Yield the parts, without repeated files whose nodes have the same names."""
     known: dict[tuple[str, str], Part] = {}
     for part in parts:
-        nodes = part.tree.get("nodes")
-        entries = nodes.entries if isinstance(nodes, Mapping) else ()
-        named = [entry for entry in entries if "${" not in entry.name]
+        named = [entry for entry in entries(part.tree.get("nodes")) if not is_opaque(entry.name)]
         names = [(entry.name, str(entry.key.span)) for entry in named]
         earlier = next((known[name] for name in names if name in known), None)
         if earlier is None:
@@ -171,8 +165,7 @@ def _joined_maps(name: str, all_parts: list[Part], diagnostics: list[Diagnostic]
         return next(iter(sections), None)
     found: dict[str, Entry] = {}
     for part in all_parts:
-        section = part.tree.get(name)
-        for entry in section if isinstance(section, Mapping) else ():
+        for entry in entries(part.tree.get(name)):
             earlier = found.setdefault(entry.name, entry)
             if earlier is not entry:
                 diagnostics.extend(_conflict(name, entry, earlier))

@@ -1,0 +1,108 @@
+"""References to nodes in a system: change all of them, or expand wildcards such as ``camera_*``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import field
+from functools import partial
+from typing import TypeAlias
+
+from composer.base.fast_dataclass import dataclass
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.tree_values import changed_at, entries
+from composer.model.assembly.limits import IncludeLimits
+from composer.model.names import matches_wildcard
+
+WILDCARD = "*"
+#: Where a system names nodes, and where it names ports of nodes.
+_NODES = (("nodes", "*", "lifecycle", "depends_on"), ("processes", "*", "nodes"))
+_PORTS = tuple(("connections", "*", end) for end in ("from", "to", "server", "clients"))
+_CHAINS = ("chains", "*", "through")
+
+#: Returns the references in place of one; the same object if it does not change.
+Change: TypeAlias = Callable[[Scalar], tuple[Scalar, ...]]
+
+
+def add_prefix(tree: Mapping, prefix: str) -> Mapping:
+    """Return a system with ``prefix`` before the names of its nodes, where it refers to them."""
+
+    def prefixed(name: Scalar) -> tuple[Scalar, ...]:
+        return (with_prefix(name, prefix),)
+
+    for path in (*_NODES, *_PORTS, _CHAINS):
+        tree = changed_at(tree, path, partial(_changed, change=prefixed))
+    return tree
+
+
+def with_prefix(name: Scalar, prefix: str) -> Scalar:
+    """Return a name with a prefix, unless it has an unknown variable."""
+    if not isinstance(name.value, str) or "${" in name.value or not prefix:
+        return name
+    return Scalar(f"{prefix}{name.value}", name.span, verbatim=False)
+
+
+def expand_wildcards(tree: Mapping, limits: IncludeLimits) -> Mapping:
+    """Return a system with the names of nodes in place of patterns. Raises LimitExceeded.
+
+    Chains have no patterns: their ports have an order.
+    """
+    wildcards = _Wildcards(tuple(entry.name for entry in entries(tree.get("nodes"))), limits)
+    for path in _NODES:
+        tree = changed_at(tree, path, partial(_changed, change=wildcards.nodes))
+    for path in _PORTS:
+        tree = changed_at(tree, path, partial(_changed, change=wildcards.ports))
+    return tree
+
+
+def _changed(tree: Tree, change: Change) -> Tree:
+    """Return a reference, a list of references, or a map with references as keys, changed."""
+    match tree:
+        case Scalar():
+            changed = change(tree)
+            return changed[0] if len(changed) == 1 else Sequence(changed, tree.span)
+        case Sequence():
+            return Sequence(tuple(_changed_items(tree, change)), tree.span)
+        case Mapping():
+            named = {
+                str(key.value): Entry(key, entry.value)
+                for entry in tree
+                for key in change(entry.key)
+            }
+            return Mapping(tuple(named.values()), tree.span)
+
+
+def _changed_items(tree: Sequence, change: Change) -> Iterator[Tree]:
+    for item in tree.items:
+        yield from change(item) if isinstance(item, Scalar) else (item,)
+
+
+@dataclass(slots=True)
+class _Wildcards:
+    """Replaces patterns, in which ``*`` matches any text, with the names of nodes.
+
+    A pattern without matches stays: a rule reports the unknown node.
+    """
+
+    names: tuple[str, ...]
+    limits: IncludeLimits
+    _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def nodes(self, reference: Scalar) -> tuple[Scalar, ...]:
+        return self._matching(reference, str(reference.value), "")
+
+    def ports(self, reference: Scalar) -> tuple[Scalar, ...]:
+        node, dot, port = str(reference.value).rpartition(".")
+        return self._matching(reference, node, f"{dot}{port}")
+
+    def _matching(self, reference: Scalar, pattern: str, port: str) -> tuple[Scalar, ...]:
+        if WILDCARD not in pattern:
+            return (reference,)
+        span = reference.span
+        if pattern not in self._found:
+            self.limits.count("comparisons", len(self.names) * (1 + len(pattern) // 64), span)
+            self._found[pattern] = tuple(
+                name for name in self.names if matches_wildcard(pattern, name)
+            )
+        names = self._found[pattern]
+        self.limits.count("matches", len(names), span)
+        return tuple(Scalar(f"{name}{port}", span, False) for name in names) or (reference,)
