@@ -74,6 +74,12 @@ def integer(tree: Tree | None) -> Located[int] | None:
     return None
 
 
+def integers(tree: Tree | None) -> tuple[int, ...]:
+    """Return the integers of a list."""
+    found = map(integer, items(tree))
+    return tuple(item.value for item in found if item is not None)
+
+
 def number(tree: Tree | None) -> Located[float] | None:
     """Return a number with its location; an integer stays an integer."""
     if isinstance(tree, Scalar) and isinstance(tree.value, int | float):

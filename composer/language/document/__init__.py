@@ -67,14 +67,17 @@ _parse_cached = lru_cache(maxsize=64)(_parse)
 
 
 def parse_document(
-    source: SourceFile, resolve: Callable[[str], ScalarValue] = resolve_plain
+    source: SourceFile,
+    resolve: Callable[[str], ScalarValue] = resolve_plain,
+    text: str | None = None,
 ) -> tuple[Mapping | None, list[Diagnostic]]:
     """Return the tree of a text and the diagnostics of its YAML.
 
-    ``resolve`` returns the value of an unquoted scalar, or raises NumberRefused.
+    ``resolve`` returns the value of an unquoted scalar, or raises NumberRefused. ``text`` is what
+    to parse in place of the source's own text; lines and columns are those of the source.
     """
     builder = TreeBuilder(source, resolve)
-    diagnostics = _build(builder, source)
+    diagnostics = _build(builder, source, text)
     if diagnostics is not None:
         return None, diagnostics
     return _root(builder.root, builder.diagnostics, source, _FIRST_KEY_HINT)
@@ -103,7 +106,11 @@ def read_parameter_document(path: Path, shown: str) -> tuple[Mapping | None, lis
 
 
 def _build(
-    builder: TreeBuilder, source: SourceFile, *, may_be_invisible: bool = False
+    builder: TreeBuilder,
+    source: SourceFile,
+    text: str | None = None,
+    *,
+    may_be_invisible: bool = False,
 ) -> list[Diagnostic] | None:
     """Let ``builder`` handle the events of a text; return the diagnostics if it has no tree."""
     is_large = len(source.text) > MAX_BYTES
@@ -111,7 +118,7 @@ def _build(
     if diagnostics:
         return diagnostics
     try:
-        with closing(parse_events(source.text)) as stream:
+        with closing(parse_events(source.text if text is None else text)) as stream:
             for event in stream:
                 builder.handle(event)
     except (Stopped, TooManyErrors) as stopped:

@@ -8,7 +8,16 @@ from typing import TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language.tree import Entry, Mapping, Sequence, Tree
-from composer.language.tree_values import choice, entries, is_opaque, key, number, text, texts
+from composer.language.tree_values import (
+    choice,
+    entries,
+    is_opaque,
+    key,
+    mapping,
+    number,
+    text,
+    texts,
+)
 from composer.model import (
     Chain,
     ChannelKind,
@@ -153,7 +162,7 @@ def read_chains(tree: Tree | None) -> tuple[Chain, ...]:
 
 
 def _chain(entry: Entry) -> Chain | None:
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    tree = mapping(entry)
     latency_ms = number(tree.get("latency_ms"))
     endpoints = tuple(Endpoint(name) for name in texts(tree.get("through")))
     if latency_ms is None or not endpoints:

@@ -6,14 +6,16 @@ from collections.abc import Iterable
 from collections.abc import Mapping as Map
 
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Sequence, Tree
+from composer.language.tree import Entry, Mapping, Tree
 from composer.language.tree_values import (
     choice,
     entries,
     environment,
     flag,
     integer,
+    integers,
     key,
+    mapping,
     number,
     text,
     texts,
@@ -37,15 +39,13 @@ def processes_of_nodes(processes: Iterable[Process]) -> Map[str, Located[str]]:
 
 
 def _process(entry: Entry) -> Process:
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
-    cpus = tree.get("cpus")
-    numbers = map(integer, cpus.items if isinstance(cpus, Sequence) else ())
+    tree = mapping(entry)
     priority = integer(tree.get("priority"))
     return Process(
         name=key(entry),
         span=entry.key.span,
-        nodes=texts(tree.get("nodes")) if tree.get("nodes") is not None else (),
-        cpus=tuple(number.value for number in numbers if number is not None),
+        nodes=texts(tree.get("nodes")),
+        cpus=integers(tree.get("cpus")),
         priority=None if priority is None else priority.value,
         environment=environment(tree.get("environment")),
         memory_mb=number(tree.get("memory_mb")),
@@ -59,9 +59,8 @@ def read_hosts(tree: Tree | None) -> tuple[Host, ...]:
 
 
 def _host(entry: Entry) -> Host:
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    tree = mapping(entry)
     port = integer(tree.get("port"))
-    setup = tree.get("setup")
     return Host(
         name=key(entry),
         span=entry.key.span,
@@ -70,7 +69,7 @@ def _host(entry: Entry) -> Host:
         user=text(tree.get("user")),
         workspace=text(tree.get("workspace")),
         python=_plain(tree.get("python")),
-        setup=() if setup is None else tuple(item.value for item in texts(setup)),
+        setup=tuple(item.value for item in texts(tree.get("setup"))),
         environment=environment(tree.get("environment")),
         identity_file=_plain(tree.get("identity_file")),
         known_hosts=_plain(tree.get("known_hosts")),
@@ -94,14 +93,10 @@ def read_discovery(entry: Entry | None) -> Discovery | None:
     return Discovery(
         kind=kind,
         span=entry.key.span,
-        interfaces=_texts(tree.get("interfaces")),
-        addresses=_texts(tree.get("address")),
+        interfaces=texts(tree.get("interfaces")),
+        addresses=texts(tree.get("address")),
         port=DEFAULT_SERVER_PORT if port is None else port.value,
         start=flag(tree.get("start"), default=False),
-        peers=_texts(tree.get("peers")),
+        peers=texts(tree.get("peers")),
         given=tuple(key(item) for item in entries(tree)),
     )
-
-
-def _texts(tree: Tree | None) -> tuple[Located[str], ...]:
-    return () if tree is None else texts(tree)

@@ -17,6 +17,7 @@ from composer.language.tree_values import (
     flag,
     is_opaque,
     key,
+    mapping,
     plain_text,
     text,
     text_or_opaque,
@@ -99,7 +100,7 @@ _NOTHING = Declaration("", Implementation(), (), (), (), (), ())
 
 def resolve_node(entry: Entry, context: SystemContext) -> Node:
     """Return the node of an entry in ``nodes``."""
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    tree = mapping(entry)
     type_entry = tree.entry("type")
     made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
     declared = made.declaration

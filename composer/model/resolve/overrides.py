@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from composer.base.diagnostics import Diagnostic, Label, error, shown
+from composer.base.diagnostics import Diagnostic, error, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
 from composer.language.document import parse_document
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.tree import Entry, Scalar, Tree
 from composer.model import USE_SIM_TIME
 
 SET = "--set"
@@ -102,47 +102,9 @@ def _value(
     text: str, start: int, source: SourceFile, line: int, diagnostics: list[Diagnostic]
 ) -> Tree | None:
     """Return the value after the equals sign."""
-    # Parse a one-line document of the same width, so that the columns are right.
+    # A document with the value at the same place as in the source.
     key = "v" * (start - 2)
-    document = SourceFile(SET, f"{key}: {text[start:]}")
-    tree, found = parse_document(document)
-    diagnostics.extend(_moved_diagnostic(item, source, line) for item in found)
-    value = tree.get(key) if tree is not None else None
-    return _moved(value, source, line) if value is not None else None
-
-
-def _moved(tree: Tree, source: SourceFile, line: int) -> Tree:
-    span = _moved_span(tree.span, source, line)
-    match tree:
-        case Scalar():
-            return Scalar(tree.value, span, tree.verbatim, tree.content_offset)
-        case Sequence():
-            return Sequence(tuple(_moved(item, source, line) for item in tree.items), span)
-        case Mapping():
-            return Mapping(
-                tuple(
-                    Entry(
-                        Scalar(entry.key.value, _moved_span(entry.key.span, source, line)),
-                        _moved(entry.value, source, line),
-                    )
-                    for entry in tree
-                ),
-                span,
-            )
-
-
-def _moved_span(span: Span, source: SourceFile, line: int) -> Span:
-    return Span(source, line, span.column, span.length)
-
-
-def _moved_diagnostic(diagnostic: Diagnostic, source: SourceFile, line: int) -> Diagnostic:
-    return Diagnostic(
-        diagnostic.rule,
-        diagnostic.message,
-        _moved_span(diagnostic.primary, source, line),
-        tuple(
-            Label(_moved_span(label.span, source, line), label.message)
-            for label in diagnostic.related
-        ),
-        diagnostic.hint,
-    )
+    document = "\n" * (line - 1) + f"{key}: {text[start:]}"
+    tree, found = parse_document(source, text=document)
+    diagnostics += found
+    return tree.get(key) if tree is not None else None

@@ -16,6 +16,7 @@ from composer.language.tree_values import (
     integer,
     is_opaque,
     key,
+    mapping,
     number,
     plain_text,
     text,
@@ -165,7 +166,7 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
     return tuple(
         replace(
             _port(kind, entry, qos, diagnostics),
-            isolation=_isolation(_mapping(entry), node),
+            isolation=_isolation(mapping(entry), node),
         )
         for kind in PortKind
         for entry in entries(node.get(kind.section))
@@ -187,7 +188,7 @@ def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ..
 
 def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnostic]) -> Port:
     span = entry.key.span
-    tree = _mapping(entry)
+    tree = mapping(entry)
     ros_name = text(tree.get(kind.channel.value)) or key(entry)
     accept = expression(tree.get("accept"), diagnostics)
     return Port(
@@ -212,10 +213,6 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnos
         required=_required(tree.get("required")),
         description=plain_text(tree.get("description")),
     )
-
-
-def _mapping(entry: Entry) -> Mapping:
-    return entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
 
 
 def _required(tree: Tree | None) -> bool | None:
@@ -255,7 +252,7 @@ def _feedback(entry: Entry | None, diagnostics: list[Diagnostic]) -> FeedbackSte
 
 def _timer(entry: Entry, diagnostics: list[Diagnostic]) -> Timer:
     span = entry.key.span
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), span)
+    tree = mapping(entry)
     clock = choice(tree.get("clock"), TimerClock)
     return Timer(
         name=key(entry),

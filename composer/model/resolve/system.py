@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, partial
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
 from composer.language.document.limits import LimitedDiagnostics
-from composer.language.tree import Entry, Mapping, Scalar, Sequence
+from composer.language.tree import Entry, Mapping, Scalar
 from composer.language.tree_values import (
     choice,
     entries,
     flag,
     integer,
+    integers,
     is_opaque,
     key,
+    mapping,
     plain_text,
     text_or_opaque,
 )
@@ -31,7 +34,6 @@ from composer.model import (
 )
 from composer.model.names import join
 from composer.model.resolve.connections import read_chains, read_connections
-from composer.model.resolve.declaration import declare
 from composer.model.resolve.deployment import (
     processes_of_nodes,
     read_discovery,
@@ -40,14 +42,10 @@ from composer.model.resolve.deployment import (
 )
 from composer.model.resolve.node import (
     SystemContext,
-    place_ports,
-    place_transforms,
     resolve_node,
     state,
 )
 from composer.model.resolve.node_settings import (
-    NodeNames,
-    read_introspection,
     read_supervision,
 )
 from composer.model.resolve.node_types import NodeTypeLoader
@@ -55,9 +53,6 @@ from composer.model.resolve.overrides import Overrides
 from composer.model.resolve.parameter_files import read_parameter_files
 from composer.model.resolve.parameters import (
     sections_of,
-    unknown_parameters,
-    with_use_sim_time,
-    with_values,
     without_sections_of_others,
 )
 from composer.model.resolve.qos import qos_table
@@ -65,6 +60,8 @@ from composer.project.node_types import SourceFolders
 
 ROOT = "/"
 DEFAULT_THREADS = 2
+#: Keys of the file of a node type that its nodes do not have.
+_NOT_OF_NODES = frozenset(("node", "variables", "extends", "type"))
 
 
 def resolve_system(
@@ -135,44 +132,14 @@ def resolve_node_type(
     tree: Mapping, source: SourceFile, folders: SourceFolders, overrides: Overrides
 ) -> tuple[System, list[Diagnostic]]:
     """Return a system with a single node of a node type, to validate the type alone."""
-    diagnostics = LimitedDiagnostics()
-    qos = qos_table(None)
-    declared = declare(tree, folders, qos, diagnostics)
-    name = _name(tree, "node")
-    span = _name_span(tree, "node")
-    namespace = _system_namespace(Mapping((), span), overrides)
-    given = overrides.by_node.get(name.value, {})
-    own = with_use_sim_time(declared.parameters, given)
-    names = NodeNames(name.value, namespace)
-    alone = Node(
-        name=name,
-        namespace=namespace,
-        span=span,
-        description=declared.description,
-        behavior=declared.implementation.behavior,
-        hosted_class=declared.implementation.hosted_class,
-        executable=declared.implementation.executable,
-        conflicting=declared.implementation.conflicting,
-        complete=not declared.implementation.conflicting,
-        gets_undeclared=declared.gets_undeclared,
-        parameters=with_values(own, given),
-        ports=place_ports(declared.ports, names, (), {}),
-        timers=declared.timers,
-        transforms=place_transforms(declared.transforms, names, ()),
-        state=declared.state,
-        reactions=declared.reactions,
-        introspection=read_introspection(declared.introspection),
-        unknown=() if declared.gets_undeclared else unknown_parameters(own, given),
-    )
-    system = System(
-        name=name,
-        source=source,
-        nodes=(alone,),
-        span=span,
-        description=declared.description,
-        qos_references=tuple(qos.references),
-        node_type=True,
-        unknown=_unknown_nodes((alone,), overrides),
+    name, span = _name(tree, "node"), _name_span(tree, "node")
+    declared = tuple(entry for entry in tree if entry.name not in _NOT_OF_NODES)
+    node = Entry(Scalar(name.value, name.span), Mapping(declared, tree.span))
+    nodes = Entry(Scalar("nodes", span), Mapping((node,), span))
+    system, diagnostics = resolve_system(Mapping((nodes,), span), source, folders, overrides)
+    alone = replace(system.nodes[0], given=())
+    system = replace(
+        system, name=name, nodes=(alone,), description=alone.description, node_type=True
     )
     return system, diagnostics
 
@@ -214,11 +181,9 @@ def _unknown_nodes(nodes: tuple[Node, ...], overrides: Overrides) -> tuple[Unkno
 
 
 def _executor(entry: Entry) -> Executor:
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    tree = mapping(entry)
     threads = integer(tree.get("threads"))
     kind = choice(tree.get("kind"), ExecutorKind)
-    cpus = tree.get("cpus")
-    numbers = map(integer, cpus.items if isinstance(cpus, Sequence) else ())
     priority = integer(tree.get("priority"))
     return Executor(
         name=key(entry),
@@ -226,6 +191,6 @@ def _executor(entry: Entry) -> Executor:
         span=entry.key.span,
         threads=threads.value if threads is not None else DEFAULT_THREADS,
         threads_span=threads.span if threads is not None else None,
-        cpus=tuple(number.value for number in numbers if number is not None),
+        cpus=integers(tree.get("cpus")),
         priority=None if priority is None else priority.value,
     )

@@ -11,6 +11,7 @@ from composer.language.tree_values import (
     entries,
     flag,
     key,
+    mapping,
     number,
     text,
     text_or_opaque,
@@ -66,7 +67,7 @@ def _lookup(tree: Tree | None) -> Located[tuple[Located[str], ...]] | None:
 
 
 def _static(entry: Entry) -> StaticTransform:
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    tree = mapping(entry)
     angles = (number(item.value) for item in entries(tree.get("rotation_rad")))
     return StaticTransform(
         key(entry),
@@ -112,6 +113,6 @@ def _numbers(tree: Tree | None, names: tuple[str, ...]) -> Iterator[float]:
 
 
 def _dynamic(entry: Entry) -> DynamicTransform:
-    tree = entry.value if isinstance(entry.value, Mapping) else Mapping((), entry.key.span)
+    tree = mapping(entry)
     parent = text_or_opaque(tree.get("parent"), entry.key.span)
     return DynamicTransform(key(entry), parent, text(tree.get("from")))
