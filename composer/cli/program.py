@@ -66,9 +66,7 @@ def _open_missing_streams() -> None:
 
 
 def _os_error(error: OSError) -> int:
-    """Report a full disk, a private file or a removed working directory; all else is an internal
-    error.
-    """
+    """Report a full disk, a private file or a removed directory; else an internal error."""
     if error.errno in _DISK_FULL:
         text = f"cannot write the output: {error.strerror}"
     elif isinstance(error, PermissionError) and error.filename is not None:
