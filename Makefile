@@ -173,7 +173,7 @@ $(STAMPS)/interfaces: $(INTERFACES) requirements/interfaces.txt | $(STAMPS)/comp
 	@echo "==> compiling the example interfaces and tf2_msgs (once, about a minute)"
 	@rm -rf $(BUILD) && $(BIN)/python -m venv --without-pip $(BUILD)
 	@$(PIP) --python $(BUILD) install -qq --require-hashes -r requirements/interfaces.txt
-	@$(BIN)/compose interfaces build tf2_msgs --generate $(BUILD)/tf2_msgs >/dev/null
+	@$(BIN)/compose interface build tf2_msgs --generate $(BUILD)/tf2_msgs >/dev/null
 	@$(if $(HEADERS),CPATH=$(HEADERS):$(dir $(HEADERS))) $(PIP) --python $(BUILD) wheel -qq \
 	  --no-deps --no-build-isolation --wheel-dir $(BUILD)/dist \
 	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) ./interfaces $(abspath $(BUILD))/tf2_msgs

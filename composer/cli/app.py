@@ -15,49 +15,55 @@ from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import write
 
 #: The commands under the headings of the help, each with its module in composer.cli.commands. A
-#: module has an ``app`` with subcommands, or a function with the name of the command and the
-#: epilogs of its commands in ``EPILOGS``.
+#: module has ``<name>_app`` with subcommands, or a function with the name of the command and its
+#: epilog in ``EPILOGS``.
 COMMANDS = {
     "Commands for systems": {
         "run": "systems.run",
+        "down": "systems.down",
         "ps": "systems.ps",
         "top": "systems.top",
         "logs": "systems.logs",
         "dashboard": "systems.dashboard",
-        "up": "systems.manage",
-        "down": "systems.manage",
-        "pause": "systems.manage",
-        "resume": "systems.manage",
-        "reset": "systems.manage",
-        "restart": "systems.restart",
-        "sync": "systems.sync",
-        "discovery-server": "systems.discovery_server",
+        "hosts": "systems.hosts",
     },
     "Commands for files": {
         "validate": "files.validate",
-        "rule": "files.rule",
         "config": "files.config",
         "graph": "files.graph",
         "diff": "files.diff",
         "new": "files.new",
         "import": "files.import_nodes",
         "export": "files.export",
-        "interfaces": "files.interfaces",
-        "schema": "files.schema",
-        "stubs": "files.stubs",
     },
     "Commands for ROS 2": {
         "lifecycle": "ros.lifecycle",
-        "node": "ros.node",
+        "node": "ros.graph",
         "topic": "ros.topic",
-        "service": "ros.service",
-        "action": "ros.action",
+        "service": "ros.calls",
+        "action": "ros.calls",
         "param": "ros.param",
         "interface": "ros.interface",
         "doctor": "ros.doctor",
     },
 }
 _MODULES = {name: module for group in COMMANDS.values() for name, module in group.items()}
+
+#: What users of docker compose, ruff and ros2 type, and the command that does it here.
+ELSEWHERE = {
+    "up": "run",
+    "start": "run",
+    "launch": "run",
+    "stop": "down",
+    "restart": "lifecycle restart",
+    "pause": "lifecycle pause",
+    "unpause": "lifecycle resume",
+    "check": "validate",
+    "rule": "validate --explain",
+    "init": "new project",
+    "build": "interface build",
+    "pkg": "new",
+}
 
 EPILOG = examples(
     "compose run pipeline                        run an example system",
@@ -70,6 +76,13 @@ EPILOG = examples(
 
 class _Program(TyperGroup):
     """The program; its help lists the commands under headings."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that ``args`` name; for a word of another tool, name ours."""
+        ours = ELSEWHERE.get(args[0])
+        if ours is not None:
+            ctx.fail(f"No such command '{args[0]}'. Use 'compose {ours}'.")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - as in the base
         """Write the commands to the help page."""
@@ -112,10 +125,11 @@ def _needed_commands(arguments: Sequence[str]) -> Sequence[str]:
 
 def _add(app: typer.Typer, name: str) -> None:
     module = import_module(f"composer.cli.commands.{_MODULES[name]}")
-    if hasattr(module, "app"):
-        app.add_typer(module.app, name=name)
+    group = getattr(module, f"{name}_app", None)
+    if group is not None:
+        app.add_typer(group, name=name)
     else:
-        app.command(name, epilog=module.EPILOGS[name])(getattr(module, name.replace("-", "_")))
+        app.command(name, epilog=module.EPILOGS[name])(getattr(module, name))
 
 
 def _print_version(requested: bool) -> None:

@@ -48,9 +48,9 @@ def how_to_build(package: str, folder: Path | None) -> str:
     if folder is None:
         if package not in Bundle().packages():
             return by_colcon
-        return f"compose interfaces build {package}   or: apt install {_debian_name(package)}"
+        return f"compose interface build {package}   or: apt install {_debian_name(package)}"
     if not (folder / "pyproject.toml").is_file():
-        return f"compose interfaces build {package}   or: {by_colcon}"
+        return f"compose interface build {package}   or: {by_colcon}"
     return f"pip install {shown_path(folder)}   or: {by_colcon}"
 
 

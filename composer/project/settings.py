@@ -222,7 +222,11 @@ def _unknown(text: Located[str], rules: Iterable[Rule]) -> Diagnostic:
     names = [name for rule in rules for name in (rule.code, rule.name)]
     message = f"there is no rule '{shown(text.value)}'"
     close = nearest(text.value, names)
-    hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
+    hint = (
+        f"did you mean '{close}'?"
+        if close is not None
+        else "'compose validate --explain RC' lists the rules"
+    )
     return Diagnostic(BAD_SETTING, message, text.span, hint=hint)
 
 

@@ -1,4 +1,4 @@
-"""The rules: their pages in docs/rules, text for ``compose rule``, and which ones are selected."""
+"""The rules: their pages in docs/rules, their text for a terminal, and which ones are selected."""
 
 from __future__ import annotations
 

@@ -163,7 +163,11 @@ def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagno
         message = f"there is no '{ignore.rule}' to ignore here"
         return Diagnostic(UNUSED_IGNORE, message, ignore.span, hint="remove it")
     close = nearest(ignore.rule, names)
-    hint = f"did you mean '{close}'?" if close is not None else "'compose rule' lists the rules"
+    hint = (
+        f"did you mean '{close}'?"
+        if close is not None
+        else "'compose validate --explain RC' lists the rules"
+    )
     return Diagnostic(
         UNUSED_IGNORE, f"no rule is named '{shown(ignore.rule)}'", ignore.span, hint=hint
     )

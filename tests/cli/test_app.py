@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from composer import cli
-from composer.cli.app import application
+from composer.cli.app import ELSEWHERE, application
 from composer.cli.program import INTERNAL
 from composer.cli.support.options import examples
 from tests.cli.compose import compose
@@ -118,7 +118,9 @@ def test_standard_streams_can_be_closed() -> None:
         assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("arguments", [["rule"], ["--help"], ["graph", "systems/pipeline.yaml"]])
+@pytest.mark.parametrize(
+    "arguments", [["validate", "--explain", "RC"], ["--help"], ["graph", "systems/pipeline.yaml"]]
+)
 def test_a_full_disk_is_not_an_internal_error(arguments: list[str]) -> None:
     done = redirected("> /dev/full", *arguments)
     assert done.returncode == 1
@@ -202,6 +204,14 @@ def test_a_mistyped_command_gets_a_suggestion() -> None:
     assert "Did you mean 'validate'?" in compose("valdate").err
 
 
+@pytest.mark.parametrize(("word", "ours"), ELSEWHERE.items())
+def test_a_command_of_another_tool_gets_the_name_of_ours(word: str, ours: str) -> None:
+    done = compose(word, "anything")
+    assert (done.code, done.out) == (2, "")
+    assert f"Use 'compose {ours}'." in done.err
+    assert ours.replace(" --explain", "").split() in COMMANDS
+
+
 def test_an_internal_error_prints_a_traceback_only_on_request(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -223,7 +233,7 @@ def test_a_closed_pipe_ends_quietly() -> None:
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run(
-        [*COMPOSE, "schema", "system"],
+        [*COMPOSE, "export", "schema", "system"],
         check=False,
         stdout=write,
         stderr=subprocess.PIPE,

@@ -45,7 +45,7 @@ RUN pip install --no-cache-dir -r requirements.txt
 """
 _INTERFACES = """\
 RUN apt-get update && apt-get install -y --no-install-recommends g++ \\
-    && compose interfaces build {packages} \\
+    && compose interface build {packages} \\
     && apt-get purge -y --auto-remove g++ && rm -rf /var/lib/apt/lists/* build
 """
 _UNKNOWN = """\

@@ -61,13 +61,13 @@ class Service:
     def command(self, file: str) -> list[str]:
         """Return the words after ``compose`` that run it; ``file`` is that of the system."""
         if self.is_server:
-            return ["discovery-server", file]
+            return ["hosts", "discovery-server", file]
         return ["run", file, *self.options]
 
     def readiness(self, file: str) -> list[str]:
         """Return the words after ``compose`` that ask whether it is ready."""
         if self.is_server:
-            return ["discovery-server", file, "--ready"]
+            return ["hosts", "discovery-server", file, "--ready"]
         return ["ps", self.full_name, "--ready"]
 
     @property

@@ -141,7 +141,7 @@ def units(
             limit="" if service.is_server else _start_limit(system),
             command=" ".join(_quoted(word.replace("$", "$$")) for word in command),
             start=_START_SERVER if service.is_server else _START_SYSTEM,
-            compose="compose discovery-server" if service.is_server else "compose run",
+            compose="compose hosts discovery-server" if service.is_server else "compose run",
             place=place,
             environment=_environment(service.environment),
             resources=_resources(service),

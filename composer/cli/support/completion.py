@@ -38,24 +38,6 @@ def complete_node(incomplete: str) -> list[str]:
 
 
 @silent
-def complete_topic(incomplete: str) -> list[str]:
-    """Complete the name of a topic; the leading slash may be missing."""
-    return _absolute("topic", incomplete)
-
-
-@silent
-def complete_service(incomplete: str) -> list[str]:
-    """Complete the name of a service."""
-    return _absolute("service", incomplete)
-
-
-@silent
-def complete_action(incomplete: str) -> list[str]:
-    """Complete the name of an action."""
-    return _absolute("action", incomplete)
-
-
-@silent
 def complete_running_system(incomplete: str) -> list[str]:
     """Complete the full name of a running system, or its last part."""
     from composer.runtime.process.instance_lock import local_systems
@@ -78,51 +60,11 @@ def complete_rule(incomplete: str) -> list[str]:
 
 
 @silent
-def complete_message_type(incomplete: str) -> list[str]:
-    """Complete a message type."""
-    return _types(incomplete, "msg")
-
-
-@silent
-def complete_service_type(incomplete: str) -> list[str]:
-    """Complete a service type."""
-    return _types(incomplete, "srv")
-
-
-@silent
-def complete_action_type(incomplete: str) -> list[str]:
-    """Complete an action type."""
-    return _types(incomplete, "action")
-
-
-@silent
-def complete_type(incomplete: str) -> list[str]:
-    """Complete a message, service or action type."""
-    return _types(incomplete, "msg", "srv", "action")
-
-
-@silent
 def complete_interface_package(incomplete: str) -> list[str]:
     """Complete the name of a package with message, service or action types."""
     from composer.interfaces import Interfaces
 
     return _starting_with(incomplete, sorted(Interfaces.load().packages()))
-
-
-def _types(incomplete: str, *folders: str) -> list[str]:
-    from composer.interfaces import Interfaces
-
-    interfaces = Interfaces.load()
-    return _starting_with(
-        incomplete, [name for folder in folders for name in interfaces.names(folder)]
-    )
-
-
-def _absolute(kind: str, incomplete: str) -> list[str]:
-    names = _graph_names(kind, incomplete)
-    if incomplete and not incomplete.startswith("/"):
-        names = [name.removeprefix("/") for name in names]
-    return _starting_with(incomplete, names)
 
 
 def _graph_names(kind: str, incomplete: str) -> list[str]:
@@ -135,3 +77,41 @@ def _graph_names(kind: str, incomplete: str) -> list[str]:
 
 def _starting_with(incomplete: str, names: Iterable[str]) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
+
+
+def _complete_graph(kind: str) -> Complete:
+    """Return a function that completes names of topics, services or actions.
+
+    The leading slash may be missing.
+    """
+
+    @silent
+    def complete(incomplete: str) -> list[str]:
+        names = _graph_names(kind, incomplete)
+        if incomplete and not incomplete.startswith("/"):
+            names = [name.removeprefix("/") for name in names]
+        return _starting_with(incomplete, names)
+
+    return complete
+
+
+def _complete_types(*folders: str) -> Complete:
+    """Return a function that completes types of these kinds: ``msg``, ``srv``, ``action``."""
+
+    @silent
+    def complete(incomplete: str) -> list[str]:
+        from composer.interfaces import Interfaces
+
+        interfaces = Interfaces.load()
+        return _starting_with(
+            incomplete, [name for folder in folders for name in interfaces.names(folder)]
+        )
+
+    return complete
+
+
+complete_topic = _complete_graph("topic")
+complete_service = _complete_graph("service")
+complete_action = _complete_graph("action")
+complete_message_type = _complete_types("msg")
+complete_type = _complete_types("msg", "srv", "action")

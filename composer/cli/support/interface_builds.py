@@ -43,7 +43,7 @@ def complete_package(name: str, folder: Path | None, target: Path, *, for_pip: b
             files = package.files(wheel_versions())
         except NotForPip as error:
             if for_pip:
-                hint = f"build it with colcon: compose interfaces build {name} --generate FOLDER"
+                hint = f"build it with colcon: compose interface build {name} --generate FOLDER"
                 raise CommandError(str(error), hint=hint) from error
             files = package.files(None)
         _replace_folder(target, files)

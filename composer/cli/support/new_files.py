@@ -10,35 +10,45 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from composer.cli.support.errors import CommandError
+from composer.cli.support.output.terminal import say, write_raw
 
 
-def write_new_files(root: Path, files: Mapping[str, str]) -> None:
-    """Write new files below ``root``, all or none, and their folders.
+def write_output(text: str, output: Path | None, *, replace: bool | None = None) -> None:
+    """Write to stdout, or to a file and its folder, and say so. Raises CommandError."""
+    if output is None:
+        write_raw(text)
+    else:
+        write_and_say(output.parent, {output.name: text}, replace=replace)
 
-    Raises CommandError, also for a name that leads out of ``root``.
-    """
-    _write(_encoded(root, files), replace=False)
+
+def write_and_say(
+    root: Path, files: Mapping[str, str | bytes], *, replace: bool | None = None
+) -> None:
+    """Write files below ``root``, all or none, and say which. Raises CommandError."""
+    written = write_files(root, files, replace=replace)
+    for name in files:
+        path = root / name
+        say(f"wrote {path}" if path in written else f"{path} is up to date")
 
 
-def write_exports(root: Path, files: Mapping[str, str | bytes], *, replace: bool) -> list[Path]:
+def write_files(
+    root: Path, files: Mapping[str, str | bytes], *, replace: bool | None
+) -> list[Path]:
     """Write files below ``root``, all or none; return those that were not there like that.
 
-    With ``replace``, files that exist are replaced. Raises CommandError.
+    With ``replace``, files that exist are replaced. None stands for a command that never does so.
+    Raises CommandError.
     """
     encoded = _encoded(root, files)
     changed = {path: data for path, data in encoded.items() if not _has_content(path, data)}
-    try:
-        _write(changed, replace=replace)
-    except CommandError as error:
-        if error.hint is None:
-            raise
-        raise CommandError(error.message, hint="--force replaces it") from error
+    for path in () if replace else encoded if replace is None else changed:
+        if path.is_file():
+            hint = "choose another name, or remove it first"
+            raise CommandError(
+                f"'{path}' exists already", hint=hint if replace is None else "--force replaces it"
+            )
+    _write(changed, replace=bool(replace))
     return list(changed)
-
-
-def write_new_file(path: Path, text: str) -> None:
-    """Write a new file, whole or not at all, and its folder. Raises CommandError."""
-    _write({path: text.encode()}, replace=False)
 
 
 def write_file(path: Path, data: bytes) -> None:

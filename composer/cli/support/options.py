@@ -28,27 +28,18 @@ def examples(*lines: str) -> str:
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+def command_group(text: str, *lines: str) -> typer.Typer:
+    """Return an application for commands below one word, with its help text and examples."""
+    return typer.Typer(
+        help=text, epilog=examples(*lines), no_args_is_help=True, rich_markup_mode=None
+    )
 
-# The options of lists, spelled as in ros2 and, shorter, the same for all lists.
-_COUNT_HELP = "Print only the number of names."
-_HIDDEN_HELP = "Include names that start with an underscore."
-CountNodes = Annotated[bool, typer.Option("--count-nodes", "--count", "-c", help=_COUNT_HELP)]
-CountTopics = Annotated[bool, typer.Option("--count-topics", "--count", "-c", help=_COUNT_HELP)]
-CountServices = Annotated[bool, typer.Option("--count-services", "--count", "-c", help=_COUNT_HELP)]
-CountActions = Annotated[bool, typer.Option("--count-actions", "--count", "-c", help=_COUNT_HELP)]
-AllNodes = Annotated[bool, typer.Option("--all", "--include-hidden", "-a", help=_HIDDEN_HELP)]
-HiddenNodes = Annotated[
-    bool, typer.Option("--include-hidden-nodes", "--include-hidden", "-a", help=_HIDDEN_HELP)
-]
-HiddenTopics = Annotated[
-    bool, typer.Option("--include-hidden-topics", "--include-hidden", "-a", help=_HIDDEN_HELP)
-]
-HiddenServices = Annotated[
-    bool, typer.Option("--include-hidden-services", "--include-hidden", "-a", help=_HIDDEN_HELP)
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Hidden = Annotated[
+    bool, typer.Option("--all", "-a", help="Include names that start with an underscore.")
 ]
 ShowTypes = Annotated[bool, typer.Option("--show-types", "-t", help="Print the types as well.")]
-Hidden = Annotated[bool, typer.Option("--include-hidden", "-a", help=_HIDDEN_HELP)]
 
 #: The time limit of a command for everything that it waits for.
 Timeout = Annotated[
@@ -62,6 +53,8 @@ Timeout = Annotated[
     ),
 ]
 DEFAULT_TIMEOUT_S = 5.0
+#: As long as a transition may take by default, with a margin.
+CHANGE_TIMEOUT_S = 15.0
 
 #: Named explicitly: typer takes a metavar equal to the parameter's name in capitals for the name.
 Namespace = Annotated[
@@ -93,7 +86,7 @@ class LogSeverity(StrEnum):
     FATAL = "fatal"
 
 
-# How to start a system.
+# How to start a system; commands that compare a file with the running system need the same options.
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -143,25 +136,6 @@ def options_of_run(
     words += [] if level is None else ["--log-level", level.value]
     return [*words, "--use-sim-time"] if use_sim_time else words
 
-
-# How a system was started, for commands that compare its file with the running system.
-SettingsOfRun = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NODE.PARAMETER=VALUE",
-        help="A parameter override, as given to 'compose run'. Repeatable.",
-        show_default=False,
-    ),
-]
-AutostartOfRun = Annotated[
-    Autostart | None,
-    typer.Option(
-        "--autostart",
-        help="The state up to which nodes were brought up, as given to 'compose run'.",
-        show_default="as declared in the system",
-    ),
-]
 
 NewFile = Annotated[
     Path | None,

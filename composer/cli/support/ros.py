@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.cli.support.errors import CONFIG, CommandError, UsageError
+from composer.cli.support.errors import CONFIG, CommandError
 from composer.cli.support.output.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
@@ -162,36 +162,6 @@ def graph_names(
         from composer.client.graph_names import GraphNames
 
         return GraphNames(session, deadline).names(kind, hidden=hidden)
-
-
-def types_of(command: str, kind: str, name: str, timeout_s: float) -> tuple[str, ...]:
-    """Return the types of a topic, service or action. Raises CommandError if there is none."""
-    require_ros(command)
-    from composer.client.systems.local_graph import local_names
-
-    known = dict(local_names(kind, timeout_s, hidden=True) or ())
-    absolute = name if name.startswith("/") else f"/{name}"
-    if absolute in known:
-        return known[absolute]
-    with ros_session(command, timeout_s) as (session, deadline):
-        from composer.client.graph_names import GraphNames
-
-        return GraphNames(session, deadline).types(kind, name)
-
-
-def names_of_type(
-    command: str, kind: str, type_name: str, timeout_s: float, *, hidden: bool = False
-) -> tuple[str, ...]:
-    """Return the names of all topics, services or actions with a type. Raises UsageError."""
-    from composer.interfaces import split_name
-
-    if split_name(type_name) is None:
-        raise UsageError(
-            f"'{type_name}' is not a type",
-            hint="a type has three parts, such as std_msgs/msg/String",
-        )
-    known = graph_names(command, kind, timeout_s, hidden=hidden)
-    return tuple(name for name, types in known if type_name in types)
 
 
 def _warn_of_skipped(session: Session) -> None:

@@ -71,9 +71,9 @@ def project_stubs(project: Project, paths: Sequence[Path] = ()) -> ProjectStubs:
 
 def write_changes(folder: Path, changes: FolderChanges) -> None:
     """Bring the folder up to date. Raises CommandError."""
-    from composer.cli.support.new_files import write_exports
+    from composer.cli.support.new_files import write_files
 
-    write_exports(folder, changes.outdated, replace=True)
+    write_files(folder, changes.outdated, replace=True)
     for name in changes.obsolete:
         path = folder / name
         try:

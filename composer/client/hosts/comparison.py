@@ -15,8 +15,8 @@ class Kind(Enum):
     """What differs, with what to do about it."""
 
     VERSION = "install the same versions on all computers"
-    INTERFACE = "build it there from the same definitions: compose interfaces build"
-    FILE = "copy the project with 'compose sync'"
+    INTERFACE = "build it there from the same definitions: compose interface build"
+    FILE = "copy the project with 'compose hosts sync'"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The commands: ``compose up --hosts`` and ``compose sync`` as one call each."""
+"""The commands: ``compose hosts run`` and ``compose hosts sync`` as one call each."""
 
 from __future__ import annotations
 

@@ -70,7 +70,8 @@ async def prepare_workspace(
     if done.status == _NOT_OURS:
         raise HostError(
             host,
-            f"the workspace '{name}' holds other files, which were not copied by 'compose sync'",
+            f"the workspace '{name}' holds other files, which were not copied by"
+            " 'compose hosts sync'",
             f"choose another folder; or permit it: ssh {host.login} touch {name}/{MARK}",
         )
     path = folder_in(done.text)

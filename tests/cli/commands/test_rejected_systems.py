@@ -14,7 +14,7 @@ COMMANDS = [
     ("doctor", 1),
     ("export launch", 1),
     ("dashboard", 1),
-    ("discovery-server", 78),
+    ("hosts discovery-server", 78),
 ]
 
 

@@ -45,7 +45,7 @@ def complete(*words: str) -> list[str]:
 
 def test_commands_options_and_choices_are_completed() -> None:
     assert complete("gra") == ["graph"]
-    assert complete("lifecycle", "s") == ["set"]
+    assert complete("lifecycle", "se") == ["set"]
     assert complete("run", "--auto") == ["--autostart"]
     assert complete("run", "pipeline", "--autostart", "in") == ["inactive"]
 

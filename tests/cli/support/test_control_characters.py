@@ -12,17 +12,17 @@ import yaml
 
 from composer.base.characters import is_safe
 from composer.cli.commands.files import diff
-from composer.cli.commands.ros import doctor
-from composer.cli.commands.ros.topic.info import _as_text
-from composer.cli.commands.ros.topic.message_format import MessageFormat
+from composer.cli.commands.ros import doctor, graph
+from composer.cli.commands.ros.topic import info_text
 from composer.cli.commands.systems import ps
 from composer.cli.support.output.progress import Progress
-from composer.cli.support.output.results import as_json, as_yaml, print_names
+from composer.cli.support.output.results import as_json, as_yaml
 from composer.cli.support.output.terminal import columns, lines, say, write
 from composer.client.doctor import warning
 from composer.model import LogLevel
 from composer.plan.drift.drift import Drift, DriftKind
 from composer.runtime.supervision.events import Logged, Stopping
+from tests.cli.compose import compose
 
 #: Sets the title of the terminal, forges a line, turns the direction of the text, and reports CSI.
 HOSTILE = "a\x1b]0;b\x07\n[ERROR] forged\r\u202ec\x9b2J"
@@ -55,14 +55,15 @@ def test_numbers_stay_aligned() -> None:
     ]
 
 
-@pytest.mark.parametrize("types", [False, True])
+@pytest.mark.parametrize("options", [(), ("--show-types",)])
 def test_a_hostile_name_is_one_line_of_a_list(
-    types: bool, capsys: pytest.CaptureFixture[str]
+    options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    print_names("topic", [(HOSTILE, (HOSTILE,))], types=types, count=False, json=False)
-    out = capsys.readouterr().out
-    assert is_safe(out)
-    assert out.count("\n") == 1
+    monkeypatch.setattr(graph, "graph_names", lambda *_, **__: [(HOSTILE, (HOSTILE,))])
+    done = compose("topic", "list", *options)
+    assert done.code == 0
+    assert is_safe(done.out)
+    assert done.out.count("\n") == 1
 
 
 @pytest.mark.parametrize("value", [HOSTILE, "\u202e", "\x7f", "\ud800", "\u2028", "caf\xe9"])
@@ -82,12 +83,6 @@ def test_texts_that_are_not_ascii_are_shown_as_they_are() -> None:
     assert as_json({"name": "\u4e16 caf\xe9"}) == '{"name": "\u4e16 caf\xe9"}'
 
 
-@pytest.mark.parametrize("options", [{}, {"json": True}, {"csv": True}, {"flow_style": True}])
-def test_payloads_are_escaped(options: dict[str, bool], capsys: pytest.CaptureFixture[str]) -> None:
-    write(MessageFormat(**options).text({"data": HOSTILE}))
-    assert is_safe(capsys.readouterr().out)
-
-
 def test_a_hostile_drift_has_the_usual_lines(capsys: pytest.CaptureFixture[str]) -> None:
     drift = Drift(DriftKind.EXTRA_NODE, HOSTILE, hint=HOSTILE)
     write(diff._event("drift", drift, json=False))
@@ -100,7 +95,7 @@ def test_a_hostile_check_has_the_usual_lines() -> None:
 
 def test_a_hostile_topic_has_the_usual_lines() -> None:
     found = {"types": [HOSTILE], "publishers": [], "subscriptions": []}
-    assert len(_as_text(found, verbose=True).split("\n")) == 3
+    assert len(info_text(found, verbose=True).split("\n")) == 3
 
 
 def test_a_hostile_system_has_one_title() -> None:

@@ -26,22 +26,16 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "robot.yaml"
 
 
-def test_options_of_a_start_need_one(path: Path) -> None:
-    done = compose("up", str(path), "--log-level", "warn")
-    assert done.code == 2
-    assert "--log-level needs --hosts" in done.err
-
-
-@pytest.mark.parametrize("command", [("up", "--hosts"), ("sync",)])
+@pytest.mark.parametrize("command", ["run", "sync"])
 def test_the_extra_is_named_if_it_is_missing(
-    command: tuple[str, ...], path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     find = importlib.util.find_spec
     monkeypatch.setattr(
         "composer.cli.support.hosts.find_spec",
         lambda name: None if name == "asyncssh" else find(name),
     )
-    done = compose(*command, str(path))
+    done = compose("hosts", command, str(path))
     assert done.code == 1
     assert "needs asyncssh, which this Python does not have" in done.err
     assert 'pip install "ros2-composer[hosts]"' in done.err
@@ -73,6 +67,6 @@ def test_what_keeps_a_project_from_being_copied(
         pytest.skip("rsync or ssh is not installed")
     path.write_text(text, encoding="utf-8")
     with ThreadPoolExecutor() as threads:  # the main one may have the event loop of a browser test
-        done = threads.submit(compose, "sync", str(path), *words).result()
+        done = threads.submit(compose, "hosts", "sync", str(path), *words).result()
     assert done.code in (1, 2)
     assert error in done.err

@@ -10,7 +10,7 @@ import pytest
 from composer.cli.support import interface_builds
 from composer.cli.support.errors import CommandError
 from composer.cli.support.interface_builds import complete_package
-from composer.cli.support.new_files import write_exports, write_new_files
+from composer.cli.support.new_files import write_files
 
 
 def contents(root: Path) -> dict[str, str]:
@@ -22,7 +22,7 @@ def contents(root: Path) -> dict[str, str]:
 
 
 def test_new_files_are_written_with_their_folders(tmp_path: Path) -> None:
-    write_new_files(tmp_path, {"a/b/c.yaml": "c", "d.yaml": "d"})
+    write_files(tmp_path, {"a/b/c.yaml": "c", "d.yaml": "d"}, replace=False)
     assert contents(tmp_path) == {"a/": "", "a/b/": "", "a/b/c.yaml": "c", "d.yaml": "d"}
     assert (tmp_path / "d.yaml").stat().st_mode & 0o777 == 0o666 & ~current_umask()
 
@@ -36,14 +36,14 @@ def current_umask() -> int:
 def test_nothing_is_left_if_a_new_file_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(CommandError, match=r"cannot write '.*file/x.yaml': Not a directory"):
-        write_new_files(tmp_path, {"a/b/c.yaml": "c", "file/x.yaml": "x"})
+        write_files(tmp_path, {"a/b/c.yaml": "c", "file/x.yaml": "x"}, replace=False)
     assert contents(tmp_path) == {"file": "in the way"}
 
 
 def test_nothing_is_left_if_a_file_appears_meanwhile(tmp_path: Path) -> None:
     (tmp_path / "there").symlink_to("nowhere")  # exists() says no
     with pytest.raises(CommandError, match="there' exists already"):
-        write_new_files(tmp_path, {"a/b/c.yaml": "c", "there": "x"})
+        write_files(tmp_path, {"a/b/c.yaml": "c", "there": "x"}, replace=False)
     assert [path.name for path in tmp_path.iterdir()] == ["there"]
 
 
@@ -68,10 +68,10 @@ def test_exports_replace_all_files_or_none(
             (tmp_path / "sub").write_text("in the way")
             before = contents(tmp_path)
         with pytest.raises(CommandError, match=r"cannot write '.*: (No space|Not a dir)"):
-            write_exports(tmp_path, files, replace=True)
+            write_files(tmp_path, files, replace=True)
     assert contents(tmp_path) == before
     if step == "place":
-        write_exports(tmp_path, files, replace=True)
+        write_files(tmp_path, files, replace=True)
         assert contents(tmp_path) == {**files, "sub/": ""}
 
 
@@ -85,9 +85,9 @@ def test_files_outside_the_folder_are_not_written(tmp_path: Path, name: str) -> 
     (root / "link").symlink_to(outside)
     before = contents(tmp_path)
     with pytest.raises(CommandError, match=r"is not in the folder '.*root'"):
-        write_exports(root, {"first": "x", name.format(outside=outside): "x"}, replace=True)
+        write_files(root, {"first": "x", name.format(outside=outside): "x"}, replace=True)
     assert contents(tmp_path) == before
-    write_exports(root / "link", {"x": "x"}, replace=True)  # the user has named the link
+    write_files(root / "link", {"x": "x"}, replace=True)  # the user has named the link
     assert (outside / "x").read_text() == "x"
 
 
@@ -97,7 +97,7 @@ def test_folders_and_devices_are_not_replaced(tmp_path: Path, replace: bool) -> 
     (tmp_path / "device").symlink_to("/dev/zero")  # endless if it is read
     for name in ("folder", "device"):
         with pytest.raises(CommandError, match=f"{name}': it is not a regular file"):
-            write_exports(tmp_path, {"first": "new", name: "new"}, replace=replace)
+            write_files(tmp_path, {"first": "new", name: "new"}, replace=replace)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["device", "folder"]
 
 

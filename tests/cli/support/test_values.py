@@ -2,14 +2,15 @@ from __future__ import annotations
 
 import io
 import math
+import shlex
 
 import pytest
 import yaml
 
-from composer.cli.commands.ros.topic.message_format import truncated
+from composer.cli.commands.ros.topic_receive import without_items
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
-from composer.cli.support.output.results import as_json, as_yaml
+from composer.cli.support.output.results import as_json, as_yaml, truncated
 from composer.cli.support.output.terminal import columns
 from tests.cli.compose import compose
 
@@ -30,6 +31,8 @@ def test_long_lists_and_strings_are_truncated() -> None:
     assert truncated({"data": list(range(10))}, max_length=3) == {"data": [0, 1, 2, "... 10 items"]}
     assert truncated("abcdef", max_length=3) == "abc..."
     assert truncated(["abc", 5], max_length=3) == ["abc", 5]
+    scan = {"ranges": [0.5, 1.5], "pose": {"x": 1.0}, "frame": "laser"}
+    assert without_items(scan) == {**scan, "ranges": "<2 items>"}
 
 
 def test_columns_are_aligned_and_numbers_right_aligned() -> None:
@@ -55,9 +58,8 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
     ("arguments", "problem"),
     [
         ("topic echo /x --field transforms[x].header", "is not a path of fields and indices"),
-        ("topic echo /x --raw --field data", "--raw cannot be used with --field"),
-        ("topic echo /x --raw --json", "--raw cannot be used with --field"),
-        ("topic find String", "a type has three parts"),
+        ("topic echo /x --filter 'message.data >'", "--filter: "),
+        ("validate", "specify files or folders"),
         ("topic pub /x std_msgs/msg/String {} --stdin", "not both"),
         ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
         ("lifecycle set planner", "specify a transition of 'planner'"),
@@ -68,6 +70,6 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
     ],
 )
 def test_options_that_exclude_each_other(arguments: str, problem: str) -> None:
-    done = compose(*arguments.split())
+    done = compose(*shlex.split(arguments))
     assert done.code == 2
     assert problem in done.err

@@ -128,13 +128,13 @@ def test_the_server_ends_with_the_system(system: Running, port: int) -> None:
 
 def test_a_system_uses_a_server_that_does_not_end_with_it(port: int, tmp_path: Path) -> None:
     path = written(tmp_path, port)
-    assert compose("discovery-server", path, "--ready").returncode == 1
-    server = start("discovery-server", str(path))
+    assert compose("hosts", "discovery-server", path, "--ready").returncode == 1
+    server = start("hosts", "discovery-server", str(path))
     try:
-        listed((), "discovery-server", str(path), "--ready")
+        listed((), "hosts", "discovery-server", str(path), "--ready")
         running_now = servers(port)
         assert len(running_now) == 1
-        assert "runs already\n" in compose("discovery-server", path).stderr
+        assert "runs already\n" in compose("hosts", "discovery-server", path).stderr
         with running(tmp_path / "log.txt", str(path)) as run:
             run.wait_for("3 of 3 nodes active")
             code, _, log = run.stop()

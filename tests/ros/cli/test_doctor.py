@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import re
 import signal
 import subprocess
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
@@ -15,10 +13,7 @@ from composer.client.doctor import Level
 from composer.client.doctor.graph import check_types_built
 from tests.ros.support.commands import (
     PATIENCE_S,
-    expect_error,
     hand_written,
-    listed,
-    measured,
     repeated,
     start,
 )
@@ -80,35 +75,6 @@ def test_a_missing_type_is_reported_once() -> None:
     (result,) = check_types_built(used)
     assert result.level is Level.WARNING
     assert result.message.startswith("arm_interfaces/msg/Grip (topic /grip) is not installed")
-
-
-@pytest.mark.usefixtures("incompatible_nodes")
-def test_delay_is_the_age_of_the_stamp() -> None:
-    def is_prompt(delay: dict[str, Any]) -> bool:
-        """A command that is not scheduled for a moment receives older messages afterwards."""
-        assert delay["window"] == 20
-        assert 0.25 <= delay["shortest_s"] <= delay["average_s"]
-        return bool(delay["average_s"] < 0.35)
-
-    assert is_prompt(measured(is_prompt, "topic", "delay", "/lab/scan", "--count", "20", "--json"))
-    text = listed(("average",), "topic", "delay", "/lab/scan", "--count", "2")
-    match = re.match(r"average delay: (\d+\.\d{4}) s  min: ", text)
-    assert match is not None
-    assert float(match[1]) >= 0.25
-
-
-@pytest.mark.usefixtures("incompatible_nodes")
-def test_measurements_can_be_filtered() -> None:
-    # The limit also applies to the discovery of the topic.
-    options = ("--filter", "message.header.stamp.nanosec < 0", "--timeout", "5")
-    none = "no message received on '/lab/scan' for 5 s"
-    expect_error(none, "topic", "delay", "/lab/scan", "--count", "2", *options)
-
-
-@pytest.mark.usefixtures("incompatible_nodes")
-def test_delay_needs_a_header() -> None:
-    none = "Int32 has no header.stamp"
-    expect_error(none, "topic", "delay", "/lab/plain", "--qos-depth", "5")
 
 
 # Must be the last test, because it ends the process of the nodes.

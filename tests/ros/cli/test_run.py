@@ -254,8 +254,8 @@ def test_a_missing_interface_package_is_reported_before_the_start(
             "interactive_markers",
             "pip install interactive_markers   or, if it is a package of ROS: apt",
         ),
-        ("geographic_msgs.msg", "compose interfaces build geographic_msgs   or: apt install ros-"),
-        ("arm_interfaces.msg", "compose interfaces build arm_interfaces   or: colcon build"),
+        ("geographic_msgs.msg", "compose interface build geographic_msgs   or: apt install ros-"),
+        ("arm_interfaces.msg", "compose interface build arm_interfaces   or: colcon build"),
     ],
 )
 def test_a_module_that_a_class_imports_in_vain_is_reported_before_the_start(

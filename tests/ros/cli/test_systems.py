@@ -1,4 +1,4 @@
-"""Commands to running systems: ps, up, down, pause, resume, reset, top, lifecycle set."""
+"""Commands to running systems: ps, down, top, lifecycle."""
 
 from __future__ import annotations
 
@@ -156,32 +156,46 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
 
 
 def test_commands_to_a_whole_system(robot: Robot) -> None:
-    assert refused("pause", "zebra").endswith("\n  available: /fleet/robot\n")
-    assert repeated_until(bool, "pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
+    assert refused("lifecycle", "pause", "zebra").endswith("\n  available: /fleet/robot\n")
+    assert (
+        repeated_until(bool, "lifecycle", "pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
+    )
     assert robot.states() == dict.fromkeys(robot.states(), "inactive")
-    assert repeated_until(bool, "resume", "/fleet/robot") == "/fleet/robot: 2 of 3 nodes active\n"
-    assert repeated_until(bool, "reset", robot.path) == "/fleet/robot: 0 of 3 nodes active\n"
+    assert (
+        repeated_until(bool, "lifecycle", "resume", "/fleet/robot")
+        == "/fleet/robot: 2 of 3 nodes active\n"
+    )
+    assert (
+        repeated_until(bool, "lifecycle", "reset", robot.path)
+        == "/fleet/robot: 0 of 3 nodes active\n"
+    )
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
 
     set_fault("configure")
-    refusal = refused("up", "robot", "--all-or-nothing")
+    refusal = refused("lifecycle", "startup", "robot", "--all-or-nothing")
     assert refusal.startswith(
         "compose: /fleet/robot did not come up: /fleet/planner: configure failed: "
         "ValueError: no map; rolled back"
     )
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
-    assert refused("up", "robot").startswith(
+    assert refused("lifecycle", "startup", "robot").startswith(
         "compose: /fleet/robot did not come up: /fleet/planner failed; 0 of 3 nodes active, "
         "/fleet/planner is isolated: configure failed: ValueError: no map\n"
     )
     set_fault("none")
-    assert repeated_until(bool, "up", "robot") == "/fleet/robot: 2 of 3 nodes active\n"
-    assert refused("up", "rowbot").splitlines()[1] == "  did you mean '/fleet/robot'?"
+    assert (
+        repeated_until(bool, "lifecycle", "startup", "robot")
+        == "/fleet/robot: 2 of 3 nodes active\n"
+    )
+    assert (
+        refused("lifecycle", "startup", "rowbot").splitlines()[1]
+        == "  did you mean '/fleet/robot'?"
+    )
 
 
 def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> None:
     before = len(robot.messages("/fleet/motor active", robot.text.partition(" (")[0]))
-    assert repeated_until(bool, "restart", "planner") == (
+    assert repeated_until(bool, "lifecycle", "restart", "planner") == (
         "/fleet/planner: restarted (2 of 3 nodes active)\n"
     )
     requested = "restart of /fleet/planner requested externally"
@@ -198,16 +212,16 @@ def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> Non
     ]
     moved("planner", "shutdown")
     assert robot.states()["/fleet/planner"] == "finalized"
-    assert repeated_until(bool, "restart", "*/planner", "camera") == (
+    assert repeated_until(bool, "lifecycle", "restart", "*/planner", "camera") == (
         "/fleet/planner, /fleet/camera: restarted (2 of 3 nodes active)\n"
     )
     assert robot.states()["/fleet/motor"] == "active"
     assert robot.states()["/fleet/camera"] == "inactive"
     set_fault("configure")
-    refusal = refused("restart", "planner")
+    refusal = refused("lifecycle", "restart", "planner")
     assert "/fleet/planner: the restart failed: /fleet/planner: configure failed: " in refusal
     assert "no map" in listed(("no map",), "logs", "planner", "--level", "error")
-    expect_error("did you mean '/fleet/planner'?", "restart", "planer")
+    expect_error("did you mean '/fleet/planner'?", "lifecycle", "restart", "planer")
     assert "no line of" not in output_of("logs", "-n", 3, "motor", "--since", "10m")
 
 
@@ -273,7 +287,7 @@ def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> No
 
     robot.kill(signal.SIGSTOP)
     try:
-        refusal = refused("pause", "robot", "--timeout", 1.5)
+        refusal = refused("lifecycle", "pause", "robot", "--timeout", 1.5)
         assert f"its process is {robot.pid}" in refusal
         silent = "no response, its process may be busy or gone"
         assert silent in listed((silent,), "ps")
@@ -291,8 +305,8 @@ def test_a_killed_system_is_not_running(robot: Robot) -> None:
     assert output_of("ps") == "no system is running\n"
     assert output_of("lifecycle", "nodes") == ""
     none = "there is no running system 'robot'"
-    commands = ("ps", "up", "down", "pause", "resume", "reset")
-    expect_errors(*((none, command, "robot") for command in commands))
+    verbs = [("lifecycle", verb) for verb in ("startup", "pause", "resume", "reset")]
+    expect_errors(*((none, *words, "robot") for words in (("ps",), ("down",), *verbs)))
     by_path, misspelled, by_name, in_a_system, get = errors(
         ("ps", robot.path),
         ("ps", robot.path.with_name("robt.yaml")),
@@ -309,9 +323,9 @@ def test_a_killed_system_is_not_running(robot: Robot) -> None:
 
 def test_a_command_does_not_wait_for_an_ended_process(robot: Robot) -> None:
     set_fault("hang")
-    repeated_until(bool, "pause", "robot")
+    repeated_until(bool, "lifecycle", "pause", "robot")
     # By itself, it would wait longer than this test may take.
-    with start("resume", "robot", "--timeout", "600") as resuming:
+    with start("lifecycle", "resume", "robot", "--timeout", "600") as resuming:
         assert resuming.stderr is not None
         wait_until(lambda: robot.states()["/fleet/planner"] == "activating", "it hangs")
         robot.kill()

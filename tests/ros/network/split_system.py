@@ -75,7 +75,7 @@ class SplitSystem:
         return self.console.run(*COMPOSE, *words, timeout_s=PATIENCE_S)
 
     def up(self, *options: str) -> UpOnHosts:
-        """Start ``compose up --hosts`` there."""
+        """Start ``compose hosts run`` there."""
         return UpOnHosts(self, *options)
 
     def members(self) -> list[tuple[str, int]]:
@@ -94,12 +94,12 @@ class SplitSystem:
 
 
 class UpOnHosts:
-    """A running ``compose up --hosts``, with its output."""
+    """A running ``compose hosts run``, with its output."""
 
     def __init__(self, system: SplitSystem, *options: str) -> None:
         self._system = system
         self.lines: list[str] = []
-        command = (*COMPOSE, "up", str(system.path), "--hosts", *options)
+        command = (*COMPOSE, "hosts", "run", str(system.path), *options)
         self.process = system.console.start(
             *command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
@@ -113,7 +113,7 @@ class UpOnHosts:
         if self.process.poll() is None:
             self.kill()
         if error is not None:
-            error.add_note("compose up printed:\n" + "\n".join(self.lines))
+            error.add_note("compose hosts run printed:\n" + "\n".join(self.lines))
 
     def wait_for(self, part: str, after: int = 0) -> int:
         """Wait for a line that contains ``part`` after so many lines; return how many there are."""
@@ -132,7 +132,7 @@ class UpOnHosts:
         def is_sent() -> bool:  # it may not have started yet, or have ended meanwhile
             if self.process.poll() is not None:
                 return True
-            found = self._system.console.processes("--hosts")
+            found = self._system.console.processes("hosts run")
             pids = [pid for pid, words in found.items() if "nsenter" not in words]
             # A child that has just been forked has the same command line.
             kill = ("kill", f"-{number.value}", str(min(pids, default=0)))

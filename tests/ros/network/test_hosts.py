@@ -40,7 +40,7 @@ def split(
             keys.trust(*computers[1:])
         system = SplitSystem(folder / "project", computers, keys)
         if trusted:
-            done = system.compose("sync", str(system.path))
+            done = system.compose("hosts", "sync", str(system.path))
             assert done.returncode == 0, done.stderr
         yield system, keys
 
@@ -51,7 +51,7 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
         (robot,) = system.others
         path = str(system.path)
 
-        refused = system.compose("up", path, "--hosts")
+        refused = system.compose("hosts", "run", path)
         assert refused.returncode == 1
         assert "robot (root@10.77.0.2): its host key is unknown" in refused.stderr
         assert "compare the fingerprint: ssh -o" in refused.stderr
@@ -59,27 +59,27 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
 
         robot.check("mkdir", WORKSPACE)
         robot.check("touch", f"{WORKSPACE}/precious")
-        refused = system.compose("sync", path, "--delete")
+        refused = system.compose("hosts", "sync", path, "--delete")
         assert refused.returncode == 1
-        assert "holds other files, which were not copied by 'compose sync'" in refused.stderr
+        assert "holds other files, which were not copied by 'compose hosts sync'" in refused.stderr
         assert robot.check("ls", "-A", WORKSPACE) == "precious\n"
         robot.check("rm", f"{WORKSPACE}/precious")
 
         system.path.with_name("build").mkdir()
         system.path.with_name("build").joinpath("made").touch()
-        listed = system.compose("sync", path, "--dry-run")
+        listed = system.compose("hosts", "sync", path, "--dry-run")
         assert "robot: copy detector.py\n" in listed.stdout
         assert "robot: 3 files would be copied\n" in listed.stdout
         assert robot.check("ls", "-A", WORKSPACE) == ""
-        assert system.compose("sync", path).stdout == "robot: 3 files copied\n"
+        assert system.compose("hosts", "sync", path).stdout == "robot: 3 files copied\n"
 
         robot.check("touch", f"{WORKSPACE}/old.py", f"{WORKSPACE}/.venv")
         robot.check("sh", "-c", f"echo >> {WORKSPACE}/detector.py")
-        refused = system.compose("up", path, "--hosts")
+        refused = system.compose("hosts", "run", path)
         assert refused.returncode == 1
         assert "robot (root@10.77.0.2): detector.py differs" in refused.stderr
-        assert "copy the project with 'compose sync'" in refused.stderr
-        done = system.compose("sync", path, "--delete")
+        assert "copy the project with 'compose hosts sync'" in refused.stderr
+        done = system.compose("hosts", "sync", path, "--delete")
         assert done.stdout == "robot: 1 file copied, 1 file deleted\n"
         names = ".compose-sync\n.venv\ncomposer.yaml\ndetector.py\nrobot.yaml\n"
         assert robot.check("ls", "-A", WORKSPACE) == names
@@ -155,7 +155,7 @@ def test_the_doctor_checks_discovery_from_each_computer(tmp_path: Path) -> None:
     with split(tmp_path, "robot") as (system, _):
         server = f"discovery: {{kind: server, address: {system.console.address}, start: true}}\n"
         system.path.write_text(system.path.read_text() + server)
-        assert system.compose("sync", str(system.path)).returncode == 0
+        assert system.compose("hosts", "sync", str(system.path)).returncode == 0
         done = system.compose("doctor", str(system.path), "--hosts")
         assert done.returncode == 0, done.stdout + done.stderr
         through = f"through the discovery server {system.console.address}:11811"
@@ -164,7 +164,7 @@ def test_the_doctor_checks_discovery_from_each_computer(tmp_path: Path) -> None:
         assert "robot: " not in local
 
         system.path.write_text(system.path.read_text().replace("start: true", "start: false"))
-        assert system.compose("sync", str(system.path)).returncode == 0
+        assert system.compose("hosts", "sync", str(system.path)).returncode == 0
         done = system.compose("doctor", str(system.path), "--hosts")
         assert done.returncode == 1
         assert "robot: discovery server 10.77.0.1:11811 does not run: nothing" in done.stdout

@@ -220,9 +220,9 @@ def check_the_drawn_processes() -> None:
 
 def test_commands_for_the_system_include_all_processes(split: RunningSystem, path: Path) -> None:
     for command, state in (("pause", "inactive"), ("resume", "active"), ("reset", "unconfigured")):
-        listed((), command, "pipeline")
+        listed((), "lifecycle", command, "pipeline")
         wait_until(lambda expected={state}: states_of_all() == expected, command)
-    listed((), "up", "pipeline")
+    listed((), "lifecycle", "startup", "pipeline")
     top = ("top", "pipeline", "--json", "--once")
     assert shows_all_callbacks(repeated_until(shows_all_callbacks, *top))
     for words in (("ps", "--json"), ("ps", "pipeline", "--json")):
@@ -236,7 +236,7 @@ def test_commands_for_the_system_include_all_processes(split: RunningSystem, pat
     line = "/planning/planner active"
     assert line in listed((line,), "logs", "--system", "pipeline", "planner")
     assert "subgraph" in output_of("graph", path, "--view", "deployment", "--format", "mermaid")
-    for command in (("restart", "planner"), ("up", "pipeline")):
+    for command in (("lifecycle", "restart", "planner"), ("lifecycle", "startup", "pipeline")):
         check_that_a_node_comes_back(path, command)
 
 

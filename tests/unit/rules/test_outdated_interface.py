@@ -20,7 +20,7 @@ nodes:
 
 @pytest.mark.parametrize(
     ("files", "command"),
-    [([], "compose interfaces build arm_interfaces   or: "), (["pyproject.toml"], "pip install ")],
+    [([], "compose interface build arm_interfaces   or: "), (["pyproject.toml"], "pip install ")],
 )
 def test_a_changed_message_is_an_error_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: list[str], command: str

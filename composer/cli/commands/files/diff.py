@@ -11,10 +11,10 @@ import typer
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import (
     Autostart,
-    AutostartOfRun,
+    AutostartTo,
     Json,
     Namespace,
-    SettingsOfRun,
+    Settings,
     Timeout,
     examples,
     finite,
@@ -50,9 +50,9 @@ Compare = Callable[["Snapshot"], tuple["Drift", ...]]
 def diff(
     system: SystemName,
     *,
-    settings: SettingsOfRun = None,
+    settings: Settings = None,
     namespace: Namespace = None,
-    autostart: AutostartOfRun = None,
+    autostart: AutostartTo = None,
     ignore: Annotated[
         list[str] | None,
         typer.Option(

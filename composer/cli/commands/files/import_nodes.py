@@ -11,27 +11,24 @@ import typer
 
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import NewFile, Timeout, examples
-from composer.cli.support.output.terminal import lines, say, write_raw
+from composer.cli.support.new_files import write_and_say, write_output
+from composer.cli.support.options import NewFile, Timeout, command_group, examples
+from composer.cli.support.output.terminal import lines, say
 from composer.cli.support.ros import require_launch, require_ros, ros_session
 from composer.model.names import node_name_problem
 
 if TYPE_CHECKING:
     from composer.bridges.importing import FoundNode
 
-app = typer.Typer(
-    help="""Describe existing nodes in YAML.
+import_app = command_group(
+    """Describe existing nodes in YAML.
 
     The result is a valid file to start from: edit it, and compare it with the running nodes with
     'compose diff'.
     """,
-    epilog=examples(
-        "compose import live -o systems/robot.yaml                   the nodes that run now",
-        "compose import class driver:Driver -o nodes/driver.yaml     an rclpy class",
-        "compose import launch robot.launch.py                       a launch file",
-    ),
-    no_args_is_help=True,
-    rich_markup_mode=None,
+    "compose import live -o systems/robot.yaml                   the nodes that run now",
+    "compose import class driver:Driver -o nodes/driver.yaml     an rclpy class",
+    "compose import launch robot.launch.py                       a launch file",
 )
 
 
@@ -54,7 +51,7 @@ SystemToWrite = Annotated[
 ]
 
 
-@app.command(
+@import_app.command(
     "live",
     epilog=examples(
         "compose import live",
@@ -105,11 +102,11 @@ def live(
     from composer.bridges.importing import readable, write_system
 
     found = readable(found)
-    _write(write_system(found), output)
+    write_output(write_system(found), output)
     _report_left_out(found.left_out)
 
 
-@app.command(
+@import_app.command(
     "class",
     epilog=examples(
         "compose import class demo_nodes_py.topics.talker:Talker -o nodes/talker.yaml",
@@ -157,7 +154,7 @@ def import_class(
         except ClassNotFound as error:
             raise CommandError(str(error), hint=error.hint) from error
     type_name = found.name if output is None else output.stem
-    _write(write_node_type(type_name, found), output)
+    write_output(write_node_type(type_name, found), output)
     if unknown:
         say(lines(["the source does not show:", *(f"  {text}" for text in unknown)]))
     if output is not None and not _is_found(reference, output):
@@ -191,7 +188,7 @@ def _constructed(reference: str, timeout_s: float) -> FoundNode:
     return describe_constructed(reference, json.loads(text))
 
 
-@app.command(
+@import_app.command(
     "launch",
     epilog=examples(
         "compose import launch robot.launch.py -o systems/robot.yaml",
@@ -245,14 +242,11 @@ def import_launch(
         if found.sections:
             others = f"parameters of {', '.join(found.sections)}: with --output, a file has them"
             found = replace(found, left_out=(*found.left_out, others))
-        _write(write_system(found), output)
+        write_output(write_system(found), output)
     else:
-        from composer.cli.support.new_files import write_new_files
-
         name = f"{output.stem}_parameters.yaml"
         texts = {output.name: write_system(found, name), name: write_parameters(found)}
-        write_new_files(output.parent, texts)
-        say(f"wrote {output} and {output.with_name(name)}")
+        write_and_say(output.parent, texts)
     _report_left_out(found.left_out)
 
 
@@ -263,17 +257,6 @@ def _known_types() -> set[str]:
 
     types = Interfaces.load(interface_folders(Project.at(Path.cwd())))
     return {name for kind in ("msg", "srv", "action") for name in types.names(kind)}
-
-
-def _write(text: str, output: Path | None) -> None:
-    """Write a new file, or to stdout. Raises CommandError; then there is no incomplete file."""
-    if output is None:
-        write_raw(text)
-        return
-    from composer.cli.support.new_files import write_new_file
-
-    write_new_file(output, text)
-    say(f"wrote {output}")
 
 
 def _report_left_out(left_out: tuple[str, ...]) -> None:

@@ -11,24 +11,20 @@ from typing import Annotated
 import typer
 
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.new_files import write_new_files
-from composer.cli.support.options import examples
+from composer.cli.support.new_files import write_files
+from composer.cli.support.options import command_group, examples
 from composer.cli.support.output.terminal import lines, say, write
 
-app = typer.Typer(
-    help="""Create a project, or files in it.
+new_app = command_group(
+    """Create a project, or files in it.
 
     Systems, node types and interface packages that are created are valid and have a test. Existing
     files are not replaced.
     """,
-    epilog=examples(
-        "compose new project my_robot        a project in the folder my_robot",
-        "compose new node planner            nodes/planner.yaml and nodes/planner.py",
-        "compose new system arm              systems/arm.yaml",
-        "compose new interfaces my_msgs      interfaces/my_msgs",
-    ),
-    no_args_is_help=True,
-    rich_markup_mode=None,
+    "compose new project my_robot        a project in the folder my_robot",
+    "compose new node planner            nodes/planner.yaml and nodes/planner.py",
+    "compose new system arm              systems/arm.yaml",
+    "compose new interfaces my_msgs      interfaces/my_msgs",
 )
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -42,7 +38,7 @@ Name = Annotated[
 ]
 
 
-@app.command("project", epilog=examples("compose new project my_robot"))
+@new_app.command("project", epilog=examples("compose new project my_robot"))
 def project(name: Name) -> None:
     """Create a project in a new folder.
 
@@ -57,7 +53,7 @@ def project(name: Name) -> None:
     say(f"try: cd {name} && compose run systems/{name}.yaml")
 
 
-@app.command("system", epilog=examples("compose new system arm"))
+@new_app.command("system", epilog=examples("compose new system arm"))
 def system(name: Name) -> None:
     """Create a system and its test."""
     from composer.bridges.scaffolding import new_system
@@ -65,7 +61,7 @@ def system(name: Name) -> None:
     _create(_root(), new_system(_checked(name)))
 
 
-@app.command("node", epilog=examples("compose new node planner"))
+@new_app.command("node", epilog=examples("compose new node planner"))
 def node(name: Name) -> None:
     """Create a node type with a behavior, and its test."""
     from composer.bridges.scaffolding import new_node
@@ -78,11 +74,11 @@ def node(name: Name) -> None:
         say(f"note: it replaces the built-in node type '{name}' in this project")
 
 
-@app.command("interfaces", epilog=examples("compose new interfaces my_msgs"))
+@new_app.command("interfaces", epilog=examples("compose new interfaces my_msgs"))
 def interfaces(name: Name) -> None:
     """Create a package of messages, services and actions.
 
-    Only its definitions and a short package.xml are needed: see 'compose interfaces build'.
+    Only its definitions and a short package.xml are needed: see 'compose interface build'.
     """
     from composer.bridges.scaffolding import new_interfaces
     from composer.interfaces.sources import Bundle, package_name
@@ -91,7 +87,7 @@ def interfaces(name: Name) -> None:
     if name in Bundle().packages() or name == package_name(root / "package.xml"):
         raise _in_use(name)
     _create(root, new_interfaces(_checked(name)))
-    say("next: compose interfaces build")
+    say("next: compose interface build")
 
 
 def _checked(name: str) -> str:
@@ -117,7 +113,7 @@ def _root() -> Path:
 
 
 def _create(root: Path, files: Mapping[str, str]) -> None:
-    write_new_files(root, files)
+    write_files(root, files, replace=None)
     write(lines(_shown(root / path) for path in files))
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.base.fast_dataclass import dataclass
+from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import examples
-from composer.cli.support.output.terminal import say, use_color, write_raw
+from composer.cli.support.output.terminal import columns, say, use_color, write, write_raw
 from composer.cli.support.system_arguments import (
     example_systems,
     nearest_path,
@@ -34,6 +35,8 @@ EPILOGS = {
         "compose validate systems --format sarif > report.sarif",
         "compose validate systems --ignore qos-implicit --ignore RC5",
         "cat pipeline.yaml | compose validate -",
+        "compose validate --explain RC202      what a rule is about, with examples",
+        "compose validate --explain RC         list all rules",
     )
 }
 
@@ -57,13 +60,13 @@ _RULE = "a code (RC301), a code prefix (RC3) or a name. Repeatable."
 
 def validate(
     paths: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="PATH...",
             help="Files, folders to search for systems and node types, or - for stdin.",
             show_default=False,
         ),
-    ],
+    ] = None,
     *,
     output_format: Annotated[
         ReportFormat | None,
@@ -103,6 +106,15 @@ def validate(
             metavar="PATH", help="The file name of stdin, used in reports and to find node types."
         ),
     ] = "<stdin>",
+    explain: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RULE",
+            help="Explain a rule, or list those whose code begins like this; check nothing.",
+            show_default=False,
+            autocompletion=complete_rule,
+        ),
+    ] = None,
 ) -> None:
     """Check systems and node types.
 
@@ -113,6 +125,11 @@ def validate(
 
     Exit code 1 if there are errors, or warnings with --strict, also if they are not shown.
     """
+    if explain is not None:
+        _explain(explain)
+        return
+    if not paths:
+        raise UsageError("specify files or folders", hint="for example: compose validate systems")
     checked = _check(paths, stdin_name)
     diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
     _print(diagnostics, output_format or _default_format(), max_diagnostics)
@@ -159,6 +176,23 @@ def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
         foreign=found.foreign,
         projects=tuple({item.project.root: item.project for item in results}.values()),
     )
+
+
+def _explain(text: str) -> None:
+    """Print the page of a rule, or the rules with a code prefix. Raises UsageError."""
+    from composer.base.diagnostics import suggestion
+    from composer.report.rules import all_rules, explain, find_rule
+
+    rules = all_rules()
+    rule = find_rule(text, rules)
+    matching = [item for item in rules if item.code.startswith(text.upper())]
+    if rule is not None:
+        write_raw(explain(rule))
+    elif matching:
+        write(columns([(item.code, item.severity.value, item.name) for item in matching]))
+    else:
+        names = [name for item in rules for name in (item.code, item.name)]
+        raise UsageError(f"there is no rule '{text}'", hint=suggestion(text, names))
 
 
 def _path_hint(path: Path) -> str | None:

@@ -1,106 +1,69 @@
-"""``compose interface``: message, service and action types. ROS is not needed."""
+"""``compose interface``: message, service and action types, and the packages of the project."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from composer.cli.support.completion import complete_interface_package, complete_type
-from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import Json, examples
-from composer.cli.support.output.results import as_json, as_yaml
-from composer.cli.support.output.terminal import lines, write
+from composer.cli.support.errors import FAILED, CommandError
+from composer.cli.support.options import Json, command_group, examples
+from composer.cli.support.output.results import as_json
+from composer.cli.support.output.terminal import lines, say_raw, use_color, write
 
 if TYPE_CHECKING:
     from composer.interfaces import Interface, Interfaces, Message
 
-app = typer.Typer(
-    help="""Show message, service and action types.
+interface_app = command_group(
+    """Show interface types, and build interface packages.
 
-    These are the types of installed packages and of the project, and the common types of ROS 2. ROS
-    is not needed.
+    The types are those of installed packages and of the project, and the common types of ROS 2. To
+    list and show types, ROS is not needed.
     """,
-    epilog=examples(
-        "compose interface list --only-srvs",
-        "compose interface show nav_msgs/msg/Odometry",
-        "compose interface proto geometry_msgs/msg/Twist",
-    ),
-    no_args_is_help=True,
-    rich_markup_mode=None,
+    "compose interface list std_srvs",
+    "compose interface show nav_msgs/msg/Odometry",
+    "compose interface build",
 )
 
-Type = Annotated[
-    str,
-    typer.Argument(
-        metavar="TYPE", help="Such as std_msgs/msg/String.", autocompletion=complete_type
-    ),
-]
-OnlyMessages = Annotated[bool, typer.Option("--only-msgs", "-m", help="Only messages.")]
-OnlyServices = Annotated[bool, typer.Option("--only-srvs", "-s", help="Only services.")]
-OnlyActions = Annotated[bool, typer.Option("--only-actions", "-a", help="Only actions.")]
 
-
-@app.command("list", epilog=examples("compose interface list", "compose interface list -s"))
+@interface_app.command(
+    "list", epilog=examples("compose interface list", "compose interface list std_srvs")
+)
 def list_interfaces(
-    *,
-    only_messages: OnlyMessages = False,
-    only_services: OnlyServices = False,
-    only_actions: OnlyActions = False,
-    json: Json = False,
-) -> None:
-    """List the known types."""
-    _print(_names(_interfaces(), only_messages, only_services, only_actions), json)
-
-
-@app.command("packages", epilog=examples("compose interface packages --only-actions"))
-def list_packages(
-    *,
-    only_messages: OnlyMessages = False,
-    only_services: OnlyServices = False,
-    only_actions: OnlyActions = False,
-    json: Json = False,
-) -> None:
-    """List the packages that define types."""
-    from composer.interfaces.listing import packages
-
-    _print(packages(_names(_interfaces(), only_messages, only_services, only_actions)), json)
-
-
-@app.command("package", epilog=examples("compose interface package std_srvs"))
-def list_package(
     package: Annotated[
-        str, typer.Argument(metavar="PACKAGE", autocompletion=complete_interface_package)
-    ],
+        str | None,
+        typer.Argument(
+            metavar="[PACKAGE]",
+            help="Only the types of this package.",
+            show_default=False,
+            autocompletion=complete_interface_package,
+        ),
+    ] = None,
     *,
-    only_messages: OnlyMessages = False,
-    only_services: OnlyServices = False,
-    only_actions: OnlyActions = False,
     json: Json = False,
 ) -> None:
-    """List the types of a package."""
+    """List the types, or those of a package."""
     from composer.base.diagnostics import suggestion
-    from composer.interfaces.listing import packages
 
-    interfaces = _interfaces()
-    known = packages(_names(interfaces))
-    if package not in known:
+    names = _names(_interfaces())
+    packages = {name.partition("/")[0] for name in names}
+    if package is not None and package not in packages:
         raise CommandError(
-            f"there is no package '{package}' with types", hint=suggestion(package, known)
+            f"there is no package '{package}' with types", hint=suggestion(package, packages)
         )
-    names = _names(interfaces, only_messages, only_services, only_actions)
-    _print([name for name in names if name.startswith(f"{package}/")], json)
+    if package is not None:
+        names = [name for name in names if name.startswith(f"{package}/")]
+    write(as_json(names, indent=2) if json else lines(names))
 
 
-@app.command(
+@interface_app.command(
     "show",
     epilog=examples(
         "compose interface show nav_msgs/msg/Odometry",
         "compose interface show composer_interfaces/action/Navigate --flat",
-        "compose topic type /sensor_data | compose interface show -",
     ),
 )
 def show(
@@ -108,14 +71,11 @@ def show(
         str,
         typer.Argument(
             metavar="TYPE",
-            help="Such as std_msgs/msg/String; - reads it from standard input.",
+            help="Such as std_msgs/msg/String.",
             autocompletion=complete_type,
         ),
     ],
     *,
-    all_comments: Annotated[
-        bool, typer.Option("--all-comments", help="Show the comments of nested messages too.")
-    ] = False,
     no_comments: Annotated[
         bool, typer.Option("--no-comments", help="Show no comments and no empty lines.")
     ] = False,
@@ -126,49 +86,122 @@ def show(
 
     Nested messages are expanded and indented, without their comments.
     """
-    if all_comments and no_comments:
-        raise UsageError("only one of --all-comments and --no-comments can be used")
     from composer.interfaces import parts
     from composer.interfaces.listing import ListingOptions, listing
 
-    wanted = sys.stdin.readline().strip() if name == "-" else name
     interfaces = _interfaces()
-    found = _find(interfaces, wanted)
+    definition = _find(interfaces, name)
     if json:
-        data = {title: _as_data(part) for title, part in parts(found).items()}
-        write(as_json({"name": wanted, **data}, indent=2))
+        data = {title: _as_data(part) for title, part in parts(definition).items()}
+        write(as_json({"name": name, **data}, indent=2))
         return
-    options = ListingOptions(not no_comments, all_comments, nested=not flat)
-    write("\n".join(listing(wanted, interfaces, options)))
+    options = ListingOptions(not no_comments, nested=not flat)
+    write("\n".join(listing(name, interfaces, options)))
 
 
-@app.command(
-    "proto",
+@interface_app.command(
+    "build",
     epilog=examples(
-        "compose interface proto geometry_msgs/msg/Twist",
-        "compose interface proto std_srvs/srv/SetBool --no-quotes",
+        "compose interface build",
+        "compose interface build my_msgs",
+        "compose interface build tf2_msgs                            a package of ROS",
+        "compose interface build my_msgs --generate src/my_msgs      a package for colcon",
     ),
 )
-def proto(
-    name: Type,
+def build(
+    packages: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PACKAGE]...",
+            help="By default, all packages of the project.",
+            show_default=False,
+        ),
+    ] = None,
     *,
-    no_quotes: Annotated[
-        bool, typer.Option("--no-quotes", help="Do not print quotes around the YAML.")
-    ] = False,
-    json: Json = False,
+    generate: Annotated[
+        Path | None,
+        typer.Option(
+            "--generate",
+            metavar="FOLDER",
+            help="Only write the complete package to this new folder.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Print a message, request or goal with default values, as YAML."""
-    from composer.interfaces import parts
-    from composer.interfaces.listing import prototype
+    """Build interface packages and install them for this Python.
 
-    interfaces = _interfaces()
-    message = next(iter(parts(_find(interfaces, name)).values()))
-    value = prototype(message, interfaces)
-    if json:
-        write(as_json(value, indent=2))
+    A package is a folder in 'interfaces' with the .msg, .srv and .action files in 'msg', 'srv' and
+    'action', and a package.xml that names it. The rest is generated in 'build/interfaces', and pip
+    builds it, with gcc. Packages that have a pyproject.toml of their own are built as they are.
+
+    tf2_msgs, control_msgs and other packages of ROS that are not on PyPI are built by their names,
+    from the definitions that come with the composer.
+
+    Building needs ROS 2 from PyPI. With a sourced ROS 2, and for packages with types of another one
+    that is not on PyPI, such as nav2_msgs, build the generated package with colcon.
+    """
+    from composer.cli.support.interface_builds import complete_package, install_package
+    from composer.project import Project
+
+    project = Project.at(Path.cwd())
+    chosen = _chosen(project.interface_folders, packages or [], install=generate is None)
+    _check(project.interface_folders, chosen)
+    if generate is not None:
+        if generate.exists():
+            raise CommandError(f"'{generate}' exists already", hint="choose a new folder")
+        if len(chosen) != 1:
+            raise CommandError("name one package", hint=f"packages: {', '.join(chosen)}")
+        ((name, folder),) = chosen.items()
+        complete_package(name, folder, generate, for_pip=False)
+        write(lines([f"{name}: {generate}"]))
         return
-    text = f"{as_yaml(value)}\n"
-    write(text if no_quotes else f'"{text}"')
+    for name, folder in chosen.items():
+        source = folder or Path()
+        if folder is None or not (folder / "pyproject.toml").is_file():
+            source = project.root / "build" / "interfaces" / name
+            complete_package(name, folder, source)
+        install_package(name, source)
+        write(lines([f"{name}: installed"]))
+
+
+def _check(folders: tuple[Path, ...], packages: dict[str, Path | None]) -> None:
+    """Check the definitions of the packages as 'compose validate' does. Raises typer.Exit."""
+    from composer.interfaces import Interfaces
+    from composer.report.text import render
+    from composer.rules.interfaces import invalid_definitions
+
+    own = [name for name, folder in packages.items() if folder is not None]
+    diagnostics = list(invalid_definitions(Interfaces.load(folders), own))
+    if diagnostics:
+        say_raw(render(diagnostics, color=use_color(sys.stderr)))
+        raise typer.Exit(FAILED)
+
+
+def _chosen(
+    folders: tuple[Path, ...], packages: list[str], *, install: bool
+) -> dict[str, Path | None]:
+    """Return the folders of packages by their names; None for those of ROS. Raises CommandError."""
+    from composer.base.diagnostics import suggestion
+    from composer.interfaces.sources import Bundle, find_packages, installed_prefixes
+
+    known: dict[str, Path | None] = dict(find_packages(folders).folders)
+    bundled = Bundle().packages() - known.keys()
+    for name in bundled.intersection(packages):
+        if install and any(prefix.has_package(name) for prefix in installed_prefixes()):
+            raise CommandError(f"package '{name}' is installed already")
+        known[name] = None
+    if not known and not packages:
+        raise CommandError(
+            "the project has no interface package",
+            hint="compose new interfaces NAME creates one",
+        )
+    for name in packages:
+        if name not in known:
+            raise CommandError(
+                f"the project has no interface package '{name}', and the composer has none",
+                hint=suggestion(name, {*known, *bundled}),
+            )
+    return {name: known[name] for name in packages or known}
 
 
 def _interfaces() -> Interfaces:
@@ -179,23 +212,8 @@ def _interfaces() -> Interfaces:
     return Interfaces.load(interface_folders(Project.at(Path.cwd())))
 
 
-def _names(
-    interfaces: Interfaces,
-    only_messages: bool = False,
-    only_services: bool = False,
-    only_actions: bool = False,
-) -> list[str]:
-    """Return the names of all types, or of those kinds that are chosen."""
-    only = {"msg": only_messages, "srv": only_services, "action": only_actions}
-    folders = [folder for folder, chosen in only.items() if chosen or not any(only.values())]
-    return [name for folder in folders for name in interfaces.names(folder)]
-
-
-def _print(names: Sequence[str], json: bool) -> None:
-    if json:
-        write(as_json(list(names), indent=2))
-    elif names:
-        write(lines(names))
+def _names(interfaces: Interfaces) -> list[str]:
+    return [name for folder in ("msg", "srv", "action") for name in interfaces.names(folder)]
 
 
 def _find(interfaces: Interfaces, name: str) -> Interface:

@@ -2,49 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.commands.ros.graph import NodeName
+from composer.cli.commands.ros.lifecycle_systems import add_system_commands
 from composer.cli.support.completion import complete_node, complete_running_system
 from composer.cli.support.errors import FAILED, CommandError, UsageError
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Json,
+    Timeout,
+    command_group,
+    examples,
+)
 from composer.cli.support.output.results import as_json, say_none_found
 from composer.cli.support.output.terminal import columns, lines, say, write
 from composer.cli.support.ros import require_ros, ros_session
 
 if TYPE_CHECKING:
-    from composer.client.lifecycle import LifecycleClient
     from composer.client.systems.lifecycle_batch import LifecycleBatch
 
-app = typer.Typer(
-    help="""Show and change lifecycle states of running nodes.
+lifecycle_app = command_group(
+    """Show and change lifecycle states of running nodes.
 
-    Works with every lifecycle node in the ROS graph.
+    'nodes', 'get', 'list' and 'set' work with every lifecycle node in the ROS graph. The others
+    send a command to a running system, which moves its nodes in order and applies their
+    'on_failure'.
     """,
-    epilog=examples(
-        "compose lifecycle nodes",
-        "compose lifecycle get planner",
-        "compose lifecycle list planner",
-        "compose lifecycle set planner deactivate",
-        "compose lifecycle set --system pipeline --to inactive",
-    ),
-    no_args_is_help=True,
-    rich_markup_mode=None,
+    "compose lifecycle nodes",
+    "compose lifecycle get planner",
+    "compose lifecycle set planner deactivate",
+    "compose lifecycle restart planner",
+    "compose lifecycle pause pipeline",
 )
 
-NodeName = Annotated[
-    str,
-    typer.Argument(
-        metavar="NODE",
-        help="The full name (/planning/planner), or its last part (planner) if unambiguous.",
-        show_default=False,
-        autocompletion=complete_node,
-    ),
-]
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _EXAMPLE = "for example: compose lifecycle set planner deactivate"
 
@@ -54,23 +49,20 @@ def _complete_word(incomplete: str) -> list[str]:
     return [*complete_node(incomplete), *transitions]
 
 
-@contextmanager
-def _client(timeout_s: float) -> Iterator[LifecycleClient]:
-    with ros_session("compose lifecycle", timeout_s) as (session, deadline):
-        from composer.client.lifecycle import LifecycleClient
-
-        yield LifecycleClient(session, deadline)
-
-
-@app.command("nodes", epilog=examples("compose lifecycle nodes", "compose lifecycle nodes --json"))
+@lifecycle_app.command(
+    "nodes", epilog=examples("compose lifecycle nodes", "compose lifecycle nodes --json")
+)
 def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
     """List lifecycle nodes and their states.
 
     Exit code 1 if a system on this computer does not respond, because its nodes are missing then.
     """
-    known = _local_states(timeout)
-    if known is not None:
-        _write_states(known, json=json)
+    require_ros("compose lifecycle")
+    from composer.client.systems.local_queries import local_states
+
+    local = local_states(timeout)
+    if local is not None:
+        _write_states(local, json=json)
         return
     with ros_session("compose lifecycle", timeout) as (session, deadline):
         from composer.client.lifecycle import LifecycleClient
@@ -91,14 +83,7 @@ def _write_states(states: Mapping[str, str | None], *, json: bool) -> None:
         write(columns([(name, state or "(no response)") for name, state in states.items()]))
 
 
-def _local_states(timeout: float) -> dict[str, str] | None:
-    require_ros("compose lifecycle")
-    from composer.client.systems.local_queries import local_states
-
-    return local_states(timeout)
-
-
-@app.command(
+@lifecycle_app.command(
     "get",
     epilog=examples(
         "compose lifecycle get planner", "compose lifecycle get /planning/planner --timeout 1"
@@ -111,21 +96,27 @@ def get(node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
 
     state = local_state(node, timeout)
     if state is None:
-        with _client(timeout) as client:
+        with ros_session("compose lifecycle", timeout) as (session, deadline):
+            from composer.client.lifecycle import LifecycleClient
+
+            client = LifecycleClient(session, deadline)
             state = client.state(client.find(node))
     write(lines([state]))
 
 
-@app.command("list", epilog=examples("compose lifecycle list planner"))
+@lifecycle_app.command("list", epilog=examples("compose lifecycle list planner"))
 def list_transitions(
     node: NodeName, timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False
 ) -> None:
     """List the available transitions of a node."""
-    with _client(timeout) as client:
+    with ros_session("compose lifecycle", timeout) as (session, deadline):
+        from composer.client.lifecycle import LifecycleClient
+
+        client = LifecycleClient(session, deadline)
         transitions = client.transitions(client.find(node))
     if json:
-        found = [{"id": item.id, "label": item.label, "goal": item.goal} for item in transitions]
-        write(as_json(found, indent=2))
+        data = [{"id": item.id, "label": item.label, "goal": item.goal} for item in transitions]
+        write(as_json(data, indent=2))
     elif transitions:
         write(lines(item.label for item in transitions))
 
@@ -139,7 +130,7 @@ class GoalState(StrEnum):
     FINALIZED = "finalized"
 
 
-@app.command(
+@lifecycle_app.command(
     "set",
     epilog=examples(
         "compose lifecycle set planner deactivate",
@@ -252,3 +243,6 @@ def _split(
     if system is not None and words:
         raise UsageError(f"specify nodes or --system, not both (got '{words[0]}')", hint=_EXAMPLE)
     return words, transition
+
+
+add_system_commands(lifecycle_app)  # below those of ros2

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from composer.cli.commands.ros.graph import NodeName
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, HiddenNodes, Json, Timeout, examples
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Hidden,
+    Json,
+    Timeout,
+    command_group,
+    examples,
+)
 from composer.cli.support.output.results import as_json, as_yaml, say_none_found
 from composer.cli.support.output.terminal import columns, lines, say, say_raw, use_color, write
 from composer.cli.support.ros import require_ros, ros_session
@@ -23,26 +31,14 @@ if TYPE_CHECKING:
     from composer.model.resolve.parameter_files import ParameterFiles
     from composer.runtime.ros.parameter_description import ParameterDescription
 
-app = typer.Typer(
-    help="List, get and set parameters of running nodes.",
-    epilog=examples(
-        "compose param list planner",
-        "compose param get planner max_velocity",
-        "compose param set planner max_velocity 0.5",
-        "compose param dump planner > planner.yaml",
-    ),
-    no_args_is_help=True,
-    rich_markup_mode=None,
+param_app = command_group(
+    "List, get and set parameters of running nodes.",
+    "compose param list planner",
+    "compose param get planner max_velocity",
+    "compose param set planner max_velocity 0.5",
+    "compose param dump planner > planner.yaml",
 )
 
-Node = Annotated[
-    str,
-    typer.Argument(
-        metavar="NODE",
-        help="The full name of a node, or its last part if unambiguous.",
-        autocompletion=complete_node,
-    ),
-]
 Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
 
 
@@ -73,7 +69,7 @@ def _readable(
         yield parameters
 
 
-@app.command("list", epilog=examples("compose param list planner", "compose param list"))
+@param_app.command("list", epilog=examples("compose param list planner", "compose param list"))
 def list_parameters(
     node: Annotated[
         str | None,
@@ -85,45 +81,30 @@ def list_parameters(
         ),
     ] = None,
     *,
-    types: Annotated[bool, typer.Option("--param-type", help="Print the types as well.")] = False,
-    hidden: HiddenNodes = False,
+    hidden: Hidden = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """List the parameters of a node or of all nodes."""
     if node is None:
-        _list_all(timeout, types=types, hidden=hidden, json=json)
+        _list_all(timeout, hidden=hidden, json=json)
         return
     with _readable(node, timeout) as parameters:
-        names = _listed(parameters, parameters.names(), types=types, json=json)
+        names = parameters.names()
     if json:
-        write(as_json(names, indent=2))
+        write(as_json(list(names), indent=2))
     elif names:
         write(lines(names))
 
 
-def _listed(
-    parameters: ParameterClient | LocalParameters, names: Sequence[str], *, types: bool, json: bool
-) -> list[Any]:
-    """Return the names as they are printed: text, or objects if the JSON has types."""
-    if not types:
-        return list(names)
-    described = parameters.describe(names)
+def _list_all(timeout: float, *, hidden: bool, json: bool) -> None:
+    names_by_node = _all_names(timeout, hidden=hidden)
     if json:
-        return [{"name": item.name, "type": item.type} for item in described]
-    return [f"{item.name} (type: {item.type})" for item in described]
-
-
-def _list_all(timeout: float, *, types: bool, hidden: bool, json: bool) -> None:
-    found = _ask_all(timeout, types=types, hidden=hidden, json=json)
-    if found is None:
-        found = _discover_all(timeout, types=types, hidden=hidden, json=json)
-    if json:
-        write(as_json(found, indent=2))
+        write(as_json(names_by_node, indent=2))
         return
-    if not found:
+    if not names_by_node:
         say_none_found("node")
-    for node, names in found.items():
+    for node, names in names_by_node.items():
         if names is None:
             say(
                 f"{node} did not respond: its parameter services may be disabled, or it may be busy"
@@ -132,37 +113,23 @@ def _list_all(timeout: float, *, types: bool, hidden: bool, json: bool) -> None:
             write(lines([f"{node}:", *(f"  {name}" for name in names)]))
 
 
-def _ask_all(
-    timeout: float, *, types: bool, hidden: bool, json: bool
-) -> dict[str, list[Any] | None] | None:
-    """Return the parameters of all nodes if the systems on this computer have them all."""
+def _all_names(timeout: float, *, hidden: bool) -> dict[str, list[str] | None]:
+    """Return the parameters of all nodes: from running systems, or else from the ROS graph."""
     require_ros("compose param")
     from composer.client.systems.local_queries import all_local_parameters
 
-    known = all_local_parameters(timeout, hidden=hidden)
-    if known is None:
-        return None
-    return {item.node: _listed(item, item.names(), types=types, json=json) for item in known}
-
-
-def _discover_all(
-    timeout: float, *, types: bool, hidden: bool, json: bool
-) -> dict[str, list[Any] | None]:
+    local = all_local_parameters(timeout, hidden=hidden)
+    if local is not None:
+        return {item.node: list(item.names()) for item in local}
     with ros_session("compose param", timeout) as (session, deadline):
-        from composer.client.parameters import ParameterClient, names_by_node
+        from composer.client.parameters import names_by_node
 
-        found: dict[str, list[Any] | None] = dict(names_by_node(session, deadline, hidden=hidden))
-        if types:
-            for node, known in found.items():
-                if known is not None:
-                    client = ParameterClient(session, deadline, node)
-                    found[node] = _listed(client, known, types=True, json=json)
-    return found
+        return names_by_node(session, deadline, hidden=hidden)
 
 
-@app.command("get", epilog=examples("compose param get planner max_velocity"))
+@param_app.command("get", epilog=examples("compose param get planner max_velocity"))
 def get(
-    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+    node: NodeName, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
 ) -> None:
     """Print the value of a parameter."""
     with _readable(node, timeout, [name]) as parameters:
@@ -170,7 +137,7 @@ def get(
     write(as_json(value) if json else as_yaml(value))
 
 
-@app.command(
+@param_app.command(
     "set",
     epilog=examples(
         "compose param set planner max_velocity 0.5",
@@ -179,7 +146,7 @@ def get(
     context_settings={"ignore_unknown_options": True},  # negative numbers are not options
 )
 def set_value(
-    node: Node,
+    node: NodeName,
     name: Name,
     value: Annotated[str, typer.Argument(metavar="VALUE", help="The value, as YAML.")],
     *,
@@ -196,26 +163,9 @@ def set_value(
     _print_values(parameters.node, values_set, json)
 
 
-@app.command("delete", epilog=examples("compose param delete planner max_velocity"))
-def delete(
-    node: Node, name: Name, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
-) -> None:
-    """Delete a parameter.
-
-    Exit code 1 if the node rejects that: only a parameter that was declared without a type can be
-    deleted.
-    """
-    with _parameters(node, timeout) as parameters:
-        parameters.delete(name)
-    if json:
-        write(as_json({"node": parameters.node, "deleted": name}))
-    else:
-        write("Deleted parameter successfully")
-
-
-@app.command("describe", epilog=examples("compose param describe planner max_velocity"))
+@param_app.command("describe", epilog=examples("compose param describe planner max_velocity"))
 def describe(
-    node: Node,
+    node: NodeName,
     names: Annotated[list[str], typer.Argument(metavar="PARAMETER...")],
     *,
     json: Json = False,
@@ -234,8 +184,8 @@ def describe(
     write("\n\n".join(tables))
 
 
-@app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
-def dump(node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
+@param_app.command("dump", epilog=examples("compose param dump planner > planner.yaml"))
+def dump(node: NodeName, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S) -> None:
     """Print the parameters of a node as a parameter file."""
     with _readable(node, timeout) as parameters:
         values = parameters.values(parameters.names())
@@ -243,9 +193,9 @@ def dump(node: Node, *, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
     write(as_json(content, indent=2) if json else as_yaml(content))
 
 
-@app.command("load", epilog=examples("compose param load planner planner.yaml"))
+@param_app.command("load", epilog=examples("compose param load planner planner.yaml"))
 def load(
-    node: Node,
+    node: NodeName,
     file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False)],
     *,
     json: Json = False,

@@ -17,9 +17,9 @@ from composer.cli.support.dashboard_process import (
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import (
     Autostart,
-    AutostartOfRun,
+    AutostartTo,
     Namespace,
-    SettingsOfRun,
+    Settings,
     examples,
 )
 from composer.cli.support.output.terminal import say, write
@@ -90,9 +90,9 @@ def dashboard(
         bool,
         typer.Option("--foxglove/--no-foxglove", help="Serve Foxglove and Lichtblick as well."),
     ] = True,
-    settings: SettingsOfRun = None,
+    settings: Settings = None,
     namespace: Namespace = None,
-    autostart: AutostartOfRun = None,
+    autostart: AutostartTo = None,
 ) -> None:
     """Show and control running systems in the browser.
 

@@ -97,7 +97,7 @@ def logs(
     there is none. A heading on stderr names it.
 
     The log of a system includes its processes on this computer, whatever has started them, and
-    those on other computers that 'compose up --hosts' has started here.
+    those on other computers that 'compose hosts run' has started here.
 
     The log has what 'compose run' prints about a system and its nodes, with the date and time.
     'compose run' keeps it in the folder 'compose' of the ROS log folder (ROS_LOG_DIR, by default

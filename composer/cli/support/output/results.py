@@ -1,14 +1,13 @@
-"""Results of commands on stdout: YAML, JSON and lists of names."""
+"""Results of commands on stdout: YAML and JSON."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from composer.base.characters import escape_json, is_safe
-from composer.cli.support.output.terminal import columns, lines, say, write
+from composer.cli.support.output.terminal import say
 
 
 def as_yaml(value: Any, *, one_line: bool = False) -> str:
@@ -57,38 +56,16 @@ def _with_json_numbers(value: Any) -> Any:
             return value
 
 
-def print_names(
-    kind: str, named: Sequence[tuple[str, tuple[str, ...]]], *, types: bool, count: bool, json: bool
-) -> None:
-    """Print names, optionally with their types, or the number of names."""
-    if count:
-        write(str(len(named)))
-    elif json:
-        write(as_json([{"name": name, "types": list(found)} for name, found in named], indent=2))
-    elif named:
-        rows = [(name, ", ".join(found)) if types else (name,) for name, found in named]
-        write(columns(rows))
-    else:
-        say_none_found(kind)
-
-
-def print_found(
-    kind: str, type_name: str, names: Sequence[str], *, count: bool, json: bool
-) -> None:
-    """Print the names that have a type, or their number."""
-    if count:
-        write(str(len(names)))
-    elif json:
-        write(as_json(list(names), indent=2))
-    elif names:
-        write(lines(names))
-    else:
-        say(f"no {kind} has the type {type_name}")
-
-
-def print_types(types: Sequence[str], *, json: bool) -> None:
-    """Print the types of a name, one per line."""
-    write(as_json(list(types), indent=2) if json else lines(types))
+def truncated(value: Any, max_length: int) -> Any:
+    """Return plain data with lists and strings cut to ``max_length`` items."""
+    if isinstance(value, dict):
+        return {name: truncated(item, max_length) for name, item in value.items()}
+    if isinstance(value, list):
+        shown = [truncated(item, max_length) for item in value[:max_length]]
+        return shown if len(value) <= max_length else [*shown, f"... {len(value)} items"]
+    if isinstance(value, str) and len(value) > max_length:
+        return f"{value[:max_length]}..."
+    return value
 
 
 def say_none_found(kind: str) -> None:

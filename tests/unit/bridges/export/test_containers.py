@@ -178,7 +178,7 @@ def test_each_computer_has_a_pod_in_the_network_of_its_computer(project: Path) -
 
 def test_a_discovery_server_is_ready_before_the_processes_start(project: Path) -> None:
     add(project, "discovery: {kind: server, address: 10.0.0.1, start: true}\n")
-    ask = ["compose", "discovery-server", "systems/robot.yaml", "--ready"]
+    ask = ["compose", "hosts", "discovery-server", "systems/robot.yaml", "--ready"]
     (deployment,) = kubernetes()
     pod = deployment["spec"]["template"]["spec"]
     assert pod["hostNetwork"]  # where the address is
@@ -232,7 +232,7 @@ def test_the_image_has_what_the_project_needs(project: Path) -> None:
     text = (project / "deploy" / "Containerfile").read_text()
     assert 'COPY ["deploy/ros2_composer-' in text
     assert "requirements.txt" not in text
-    assert "interfaces build" not in text
+    assert "interface build" not in text
     assert "RUN compose validate systems/robot.yaml\n" in text
     (project / "requirements.txt").write_text("numpy\n")
     package = project / "interfaces" / "my_msgs"
@@ -247,7 +247,7 @@ def test_the_image_has_what_the_project_needs(project: Path) -> None:
     export("docker-compose", "-o", "deploy", "--force")
     text = (project / "deploy" / "Containerfile").read_text()
     assert "COPY requirements.txt .\n" in text
-    assert "&& compose interfaces build my_msgs \\\n" in text
+    assert "&& compose interface build my_msgs \\\n" in text
     assert "Not in the image" not in text
 
 
@@ -263,7 +263,7 @@ def test_the_image_has_the_interfaces_that_ros_on_pypi_lacks(project: Path) -> N
         (folder / "package.xml").write_text(f"<package><name>{package}</name></package>\n")
     export("docker-compose", "-o", "deploy")
     text = (project / "deploy" / "Containerfile").read_text()
-    (line,) = (line for line in text.splitlines() if "interfaces build" in line)
+    (line,) = (line for line in text.splitlines() if "interface build" in line)
     assert set(line.split()[4:-1]) == {"tf2_msgs", "other_msgs", "base_msgs"}
 
 

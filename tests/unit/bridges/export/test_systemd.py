@@ -150,7 +150,7 @@ def test_a_discovery_server_starts_before_the_processes_of_its_computer(tmp_path
     found = {str(name): text for name, text in _units(tmp_path, text).items()}
     name = "robot-discovery.service"
     assert {name, "jetson/robot-discovery-jetson.service"} < found.keys()
-    assert f'composer discovery-server "{tmp_path / "my robot.yaml"}"\n' in found[name]
+    assert f'composer hosts discovery-server "{tmp_path / "my robot.yaml"}"\n' in found[name]
     assert "WatchdogSec" not in found[name]
     assert "PartOf=robot.target\n" in found[name]
     assert name in found["robot.target"]

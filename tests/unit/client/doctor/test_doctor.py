@@ -115,7 +115,7 @@ def test_interface_packages_that_are_not_built_are_reported(tmp_path: Path) -> N
     (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
     assert (result.level, result.area) == (Level.ERROR, "interfaces")
     assert "'arm_interfaces' is not built" in result.message
-    assert (result.remedy or "").startswith("compose interfaces build arm_interfaces ")
+    assert (result.remedy or "").startswith("compose interface build arm_interfaces ")
     (package / "pyproject.toml").touch()
     (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
     assert (result.remedy or "").startswith(f"pip install {package} ")

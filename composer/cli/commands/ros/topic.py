@@ -1,28 +1,99 @@
-"""``compose topic pub``: publish messages."""
+"""``compose topic``: list, inspect, print, measure and publish topics."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from composer.cli.commands.ros.topic.qos_options import QosOptions, qos_options
-from composer.cli.commands.ros.topic.receiving import Topic
+from composer.cli.commands.ros.graph import add_list, described
+from composer.cli.commands.ros.topic_receive import (
+    QosDepth,
+    QosDurability,
+    QosPreset,
+    QosReliability,
+    Topic,
+    echo,
+    hz,
+    with_policies,
+)
 from composer.cli.support.completion import complete_message_type
 from composer.cli.support.options import (
     DEFAULT_TIMEOUT_S,
     Json,
     Stdin,
     Timeout,
+    command_group,
+    examples,
     finite,
     yaml_or_stdin,
 )
 from composer.cli.support.output.results import as_json
-from composer.cli.support.output.terminal import say, write
+from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.ros import ros_session
+from composer.model.qos import PRESETS
+
+topic_app = command_group(
+    "List, inspect, measure and publish topics.",
+    "compose topic list -t",
+    "compose topic echo /sensor_data --once",
+    "compose topic hz /sensor_data",
+    "compose topic pub --once /chatter std_msgs/msg/String '{data: hello}'",
+)
+add_list(topic_app, "topic")
+
+topic_app.command(
+    "echo",
+    epilog=examples(
+        "compose topic echo /sensor_data",
+        "compose topic echo /sensor_data --once",
+        "compose topic echo /sensor_data --field pose.pose.position --count 3",
+        "compose topic echo /sensor_data --filter 'message.twist.twist.linear.x > 0.1'",
+        "compose topic echo /chatter --json | jq .data",
+    ),
+)(echo)
+topic_app.command("hz", epilog=examples("compose topic hz /sensor_data --window 100"))(hz)
 
 
-@qos_options
+@topic_app.command("info", epilog=examples("compose topic info -v /sensor_data"))
+def info(
+    topic: Topic,
+    *,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Print nodes, QoS profiles, GIDs and type hashes."),
+    ] = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Print the type and the endpoints of a topic.
+
+    Queue depths are not shown because DDS does not announce them to other processes.
+    """
+    facts = described("topic", topic, timeout)
+    write(as_json(facts, indent=2) if json else info_text(facts, verbose=verbose))
+
+
+def info_text(facts: dict[str, Any], *, verbose: bool) -> str:
+    """Return what ``compose topic info`` prints."""
+    shown = [f"Type: {', '.join(facts['types'])}"]
+    for title, key in (("Publisher", "publishers"), ("Subscription", "subscriptions")):
+        shown.append(f"{title} count: {len(facts[key])}")
+        for end in facts[key] if verbose else ():
+            policies = ", ".join(f"{name}: {value}" for name, value in end["qos"].items())
+            shown += [f"  {end['node']}  {end['type']}", f"    {policies}"]
+            shown += [f"    GID: {end['gid']}", f"    type hash: {end['type_hash']}"]
+    return lines(shown)
+
+
+@topic_app.command(
+    "pub",
+    epilog=examples(
+        "compose topic pub /chatter std_msgs/msg/String '{data: hello}'",
+        "compose topic pub --once /goal geometry_msgs/msg/Point '{x: 1.0, y: 2.0}'",
+        "compose topic pub -r 10 /chatter std_msgs/msg/String '{data: \"number {count}\"}'",
+    ),
+)
 def pub(
     topic: Topic,
     type_name: Annotated[
@@ -74,11 +145,11 @@ def pub(
             show_default="1 with --once or --times, else 0",
         ),
     ] = None,
-    every: Annotated[
-        int, typer.Option("--print", "-p", min=1, metavar="N", help="Print every Nth message.")
-    ] = 1,
     json: Json = False,
-    qos: QosOptions,
+    preset: QosPreset = None,
+    depth: QosDepth = None,
+    reliability: QosReliability = None,
+    durability: QosDurability = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Publish messages to a topic.
@@ -86,8 +157,6 @@ def pub(
     --timeout limits the wait for subscriptions. At the end, a warning is printed if a reliable
     subscription has not acknowledged all messages within one second.
     """
-    from composer.model.qos import PRESETS
-
     limit = 1 if once else times
     text = yaml_or_stdin(content, stdin)
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
@@ -99,15 +168,13 @@ def pub(
             topic=full_name("topic", topic),
             type_name=type_name,
             build=compile_content(text, class_of(type_name), "the message"),
-            qos=qos.applied_to(PRESETS["command"]),
+            qos=with_policies(PRESETS["command"], preset, depth, reliability, durability),
             rate_hz=rate,
             times=limit,
             wait_for=wait_for if wait_for is not None else int(limit is not None),
         )
         try:
             for number, message in enumerate(publish(session, deadline, publication), 1):
-                if number % every:
-                    continue
                 if json:
                     write(as_json(to_plain(message)))
                 else:

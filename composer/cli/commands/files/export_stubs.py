@@ -1,4 +1,4 @@
-"""``compose stubs``: the types of messages, ports and parameters, for editors."""
+"""``compose export stubs``: the types of messages, ports and parameters, for editors."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from composer.cli.support.system_arguments import path_exists
 if TYPE_CHECKING:
     from composer.project import Project
 
-EPILOGS = {
-    "stubs": examples(
-        "compose stubs                    write 'typings' in the root of the project",
-        "compose stubs --check            fail if it is out of date, for CI",
-        "compose stubs -o build/typings   write another folder",
-        "compose stubs ../other_robot     write the stubs of another project",
+
+def add_stubs_command(app: typer.Typer) -> None:
+    """Add the command to ``compose export``."""
+    epilog = examples(
+        "compose export stubs                    write 'typings' in the root of the project",
+        "compose export stubs --check            fail if it is out of date, for CI",
+        "compose export stubs -o build/typings   write another folder",
+        "compose export stubs ../other_robot     write the stubs of another project",
     )
-}
+    app.command("stubs", epilog=epilog)(stubs)
 
 
 def stubs(
@@ -91,7 +93,7 @@ def stubs(
     elif check:
         write(lines(f"{shown}/{name}" for name in sorted(changed)))
         option = "" if output is None else f" -o {shown}"
-        raise CommandError(f"'{shown}' is out of date", hint=f"run 'compose stubs{option}'")
+        raise CommandError(f"'{shown}' is out of date", hint=f"run 'compose export stubs{option}'")
     else:
         write_changes(folder, changes)
         say(f"'{shown}': {counted(changes)}")

@@ -1,0 +1,129 @@
+"""``compose node``, and what ``list`` and ``info`` of all names in the ROS graph share."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+
+from composer.cli.support.completion import complete_node
+from composer.cli.support.options import (
+    DEFAULT_TIMEOUT_S,
+    Hidden,
+    Json,
+    ShowTypes,
+    Timeout,
+    command_group,
+    examples,
+)
+from composer.cli.support.output.results import as_json, say_none_found
+from composer.cli.support.output.terminal import columns, lines, write
+from composer.cli.support.ros import graph_names, require_ros, ros_session
+
+NodeName = Annotated[
+    str,
+    typer.Argument(
+        metavar="NODE",
+        help="The full name (/planning/planner), or its last part (planner) if unambiguous.",
+        show_default=False,
+        autocompletion=complete_node,
+    ),
+]
+
+_NODE_SECTIONS = (
+    ("Subscribers", "subscriptions"),
+    ("Publishers", "publishers"),
+    ("Service Servers", "services"),
+    ("Service Clients", "clients"),
+    ("Action Servers", "action_servers"),
+    ("Action Clients", "action_clients"),
+)
+
+
+def add_list(app: typer.Typer, kind: str) -> None:
+    """Add a command that lists the topics, services or actions in the ROS graph."""
+
+    def list_names(
+        *,
+        types: ShowTypes = False,
+        hidden: Hidden = False,
+        json: Json = False,
+        timeout: Timeout = DEFAULT_TIMEOUT_S,
+    ) -> None:
+        named = graph_names(f"compose {kind}", kind, timeout, hidden=hidden)
+        if json:
+            data = [{"name": name, "types": list(each)} for name, each in named]
+            write(as_json(data, indent=2))
+        elif named:
+            rows = [(name, ", ".join(each)) if types else (name,) for name, each in named]
+            write(columns(rows))
+        else:
+            say_none_found(kind)
+
+    epilog = examples(f"compose {kind} list", f"compose {kind} list --show-types")
+    app.command("list", help=f"List {kind}s.", epilog=epilog)(list_names)
+
+
+def described(kind: str, name: str, timeout: float, *, hidden: bool = False) -> dict[str, Any]:
+    """Return the endpoints of a node, topic or action, for JSON.
+
+    A running system on this computer answers at once; without one, join the ROS graph.
+    """
+    require_ros(f"compose {kind}")
+    from composer.client.systems.local_queries import local_action, local_node, local_topic
+
+    if kind == "node":
+        local = local_node(name, timeout, hidden=hidden)
+    else:
+        local = (local_topic if kind == "topic" else local_action)(name, timeout)
+    if local is not None:
+        return local
+    with ros_session(f"compose {kind}", timeout) as (session, deadline):
+        from composer.client.graph_names import GraphNames
+        from composer.client.messages.topics import Topics
+
+        if kind == "topic":
+            return Topics(session, deadline).info(name).plain()
+        names = GraphNames(session, deadline)
+        return asdict(names.action(name) if kind == "action" else names.node(name, hidden=hidden))
+
+
+node_app = command_group(
+    "List and inspect running nodes.", "compose node list", "compose node info planner"
+)
+
+
+@node_app.command("list", epilog=examples("compose node list", "compose node list --json"))
+def list_nodes(
+    *, hidden: Hidden = False, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
+) -> None:
+    """List nodes."""
+    nodes = [name for name, _ in graph_names("compose node", "node", timeout, hidden=hidden)]
+    if json:
+        write(as_json(nodes, indent=2))
+    elif nodes:
+        write(lines(nodes))
+    else:
+        say_none_found("node")
+
+
+@node_app.command("info", epilog=examples("compose node info planner"))
+def node_info(
+    name: NodeName,
+    *,
+    hidden: Hidden = False,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Print the topics, services and actions of a node."""
+    node = described("node", name, timeout, hidden=hidden)
+    if json:
+        write(as_json(node, indent=2))
+        return
+    shown = [node["name"]]
+    for title, key in _NODE_SECTIONS:
+        shown.append(f"  {title}:")
+        rows = [(f"    {item}:", ", ".join(types)) for item, types in node[key]]
+        shown += columns(rows).split("\n") if rows else []
+    write(lines(shown))

@@ -1,0 +1,295 @@
+"""``compose topic echo`` and ``hz``, and the options that the commands for topics share."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from composer.cli.support.completion import complete_topic
+from composer.cli.support.errors import UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, finite
+from composer.cli.support.output.results import as_json, as_yaml, truncated
+from composer.cli.support.output.terminal import say, write
+from composer.cli.support.ros import ros_session
+from composer.model.qos import PRESETS, Durability, QosProfile, Reliability
+
+if TYPE_CHECKING:
+    from composer.client.messages.rates import RateStatistics
+    from composer.client.messages.topics import TopicSubscription
+    from composer.language.expressions import Expression
+
+_REPORT_EVERY_S = 1.0
+#: Without --full-length, arrays and strings are cut to this length.
+_MAX_LENGTH = 128
+
+
+class Preset(StrEnum):
+    """The QoS presets of the language."""
+
+    SENSOR_DATA = "sensor_data"
+    COMMAND = "command"
+    STATE = "state"
+    SERVICES_DEFAULT = "services_default"
+    PARAMETERS = "parameters"
+    SYSTEM_DEFAULT = "system_default"
+
+
+Topic = Annotated[str, typer.Argument(metavar="TOPIC", autocompletion=complete_topic)]
+QosPreset = Annotated[Preset | None, typer.Option("--qos-profile", help="QoS preset.")]
+QosDepth = Annotated[
+    int | None, typer.Option("--qos-depth", min=1, metavar="N", help="Length of the queue.")
+]
+QosReliability = Annotated[
+    Reliability | None, typer.Option("--qos-reliability", help="QoS reliability.")
+]
+QosDurability = Annotated[
+    Durability | None, typer.Option("--qos-durability", help="QoS durability.")
+]
+#: One option for both limits. Without it, only the discovery of the topic is limited.
+ReceiveTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout",
+        metavar="SECONDS",
+        min=0.0,
+        callback=finite,
+        help="Maximum time to wait for the topic, and then for each message.",
+        show_default=f"{DEFAULT_TIMEOUT_S} for the topic, no limit for messages",
+    ),
+]
+
+
+def _filter(text: str | None) -> Expression | None:
+    """Compile ``--filter`` before ROS starts."""
+    if text is None:
+        return None
+    from composer.language.expressions import ExpressionError, compile_expression
+
+    try:
+        return compile_expression(text)
+    except ExpressionError as error:
+        raise UsageError(f"--filter: {error}") from error
+
+
+Filter = Annotated[
+    str | None,
+    typer.Option(
+        "--filter",
+        metavar="EXPRESSION",
+        help="Only messages for which the expression is true, such as 'message.data > 0'.",
+        show_default=False,
+    ),
+]
+
+
+def _path(path: str | None) -> str | None:
+    """Check ``--field`` before ROS starts."""
+    from composer.client.messages.field_paths import path_steps
+
+    if path is not None:
+        try:
+            path_steps(path)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from error
+    return path
+
+
+def echo(
+    topic: Topic,
+    type_name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[TYPE]",
+            help="The message type, needed if the topic has no publisher yet.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    once: Annotated[bool, typer.Option("--once", help="Exit after the first message.")] = False,
+    count: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Exit after N messages.", show_default=False),
+    ] = None,
+    field: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATH",
+            help="Print only this field, such as pose.position.x or transforms[0].header.",
+            show_default=False,
+            callback=_path,
+        ),
+    ] = None,
+    condition: Filter = None,
+    full_length: Annotated[
+        bool,
+        typer.Option(
+            "--full-length", "-f", help=f"Do not cut arrays and strings after {_MAX_LENGTH} items."
+        ),
+    ] = False,
+    no_arr: Annotated[
+        bool, typer.Option("--no-arr", help="Print the length of arrays instead of the items.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="One JSON object per line, uncut.")] = False,
+    preset: QosPreset = None,
+    depth: QosDepth = None,
+    reliability: QosReliability = None,
+    durability: QosDurability = None,
+    timeout: ReceiveTimeout = None,
+) -> None:
+    """Print messages from a topic.
+
+    By default, the QoS profile of the subscription is compatible with all current publishers. The
+    --qos-... options replace its policies.
+    """
+    expression = _filter(condition)
+    limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
+    with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
+        from composer.client.messages.topics import Topics, TopicSubscription
+        from composer.client.messages.values import part, to_plain
+        from composer.client.name_matching import full_name
+
+        topics = Topics(session, deadline)
+        name = full_name("topic", topic)
+        message_type = type_name or topics.type_of(name)
+        profile = with_policies(topics.compatible_qos(name), preset, depth, reliability, durability)
+        with TopicSubscription(session, name, message_type, profile) as subscription:
+            left = 1 if once else count
+            for message in _messages(subscription, timeout):
+                if not _matches(expression, message):
+                    continue
+                plain = to_plain(message if field is None else part(message, field))
+                plain = without_items(plain) if no_arr else plain
+                if json:
+                    write(as_json(plain))
+                else:
+                    shown = plain if full_length else truncated(plain, _MAX_LENGTH)
+                    write(f"{as_yaml(shown)}\n---")
+                left = None if left is None else left - 1
+                if left == 0:
+                    return
+
+
+def without_items(value: Any) -> Any:
+    """Return plain data with its lists replaced by their lengths."""
+    if isinstance(value, list):
+        return f"<{len(value)} items>"
+    if isinstance(value, dict):
+        return {name: without_items(item) for name, item in value.items()}
+    return value
+
+
+def _messages(subscription: TopicSubscription, timeout_s: float | None) -> Iterator[Any]:
+    from composer.client.session import Deadline
+
+    limit_s = float("inf") if timeout_s is None else timeout_s
+    while True:
+        received = subscription.take(Deadline(limit_s))
+        if not received:
+            raise subscription.no_message_error(limit_s)
+        for item in received:
+            yield item.content
+
+
+def _matches(expression: Expression | None, message: Any) -> bool:
+    """Say whether ``--filter`` is true. Raises RosError if it cannot be evaluated."""
+    if expression is None:
+        return True
+    from composer.client.session import RosError
+    from composer.language.expressions import EvaluationError
+
+    try:
+        return bool(expression.evaluate({"message": message}))
+    except EvaluationError as error:
+        raise RosError(f"--filter: {error}") from error
+
+
+def with_policies(
+    profile: QosProfile,
+    preset: Preset | None,
+    depth: int | None,
+    reliability: Reliability | None,
+    durability: Durability | None,
+) -> QosProfile:
+    """Return ``profile``, or the preset, with the policies that are given."""
+    policies = {"depth": depth, "reliability": reliability, "durability": durability}
+    given: dict[str, Any] = {name: value for name, value in policies.items() if value is not None}
+    return replace(profile if preset is None else PRESETS[preset.value], **given)
+
+
+def hz(
+    topic: Topic,
+    *,
+    window: Annotated[
+        int, typer.Option("--window", "-w", min=2, metavar="N", help="Use the last N messages.")
+    ] = 10_000,
+    count: Annotated[
+        int | None,
+        typer.Option(min=2, metavar="N", help="Exit after N messages.", show_default="no limit"),
+    ] = None,
+    condition: Filter = None,
+    json: Json = False,
+    preset: QosPreset = None,
+    depth: QosDepth = None,
+    reliability: QosReliability = None,
+    durability: QosDurability = None,
+    timeout: ReceiveTimeout = None,
+) -> None:
+    """Print the average rate of a topic every second."""
+    expression = _filter(condition)
+    limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
+    with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
+        from composer.client.messages.rates import RateWindow
+        from composer.client.messages.topics import Topics, TopicSubscription
+        from composer.client.name_matching import full_name
+        from composer.client.session import Deadline
+
+        topics = Topics(session, deadline)
+        name = full_name("topic", topic)
+        message_type = topics.type_of(name)
+        profile = with_policies(topics.measuring_qos(name), preset, depth, reliability, durability)
+        # Serialized messages are enough to count them.
+        raw = expression is None
+        rates = RateWindow(window)
+        silence_s = float("inf") if timeout is None else timeout
+        left = sys.maxsize if count is None else count
+        unreported = 0
+        with TopicSubscription(session, name, message_type, profile, raw=raw) as subscription:
+            next_report, next_message = Deadline(_REPORT_EVERY_S), Deadline(silence_s)
+            while left:
+                wait = Deadline(min(next_report.left_s, next_message.left_s))
+                received = subscription.take(wait)
+                items = [item for item in received if _matches(expression, item.content)][:left]
+                for item in items:
+                    rates.add(item.at_s)
+                left -= len(items)
+                unreported += len(items)
+                if items:
+                    next_message = Deadline(silence_s)
+                elif next_message.passed:
+                    raise subscription.no_message_error(silence_s)
+                if next_report.passed:
+                    _report(name, rates.statistics(), unreported, json=json)
+                    unreported, next_report = 0, Deadline(_REPORT_EVERY_S)
+        if unreported:
+            _report(name, rates.statistics(), unreported, json=json)
+
+
+def _report(topic: str, rate: RateStatistics | None, messages: int, *, json: bool) -> None:
+    """Print the rate after ``messages`` new messages."""
+    if not messages:
+        say(f"no new messages on '{topic}'")
+    elif rate is None:
+        say(f"too few messages on '{topic}' to measure them yet")
+    elif json:
+        write(as_json(asdict(rate)))
+    else:
+        write(
+            f"average rate: {rate.average_hz:.3f} Hz  min: {rate.shortest_s:.4f} s"
+            f"  max: {rate.longest_s:.4f} s  std dev: {rate.deviation_s:.5f} s"
+            f"  window: {rate.window}"
+        )
