@@ -63,7 +63,6 @@ Namespace = Annotated[
         "--namespace",
         metavar="NAMESPACE",
         help="Override the namespace of the system.",
-        show_default=False,
     ),
 ]
 
@@ -93,7 +92,6 @@ Settings = Annotated[
         "--set",
         metavar="NODE.PARAMETER=VALUE",
         help="Override a parameter. Repeatable.",
-        show_default=False,
     ),
 ]
 UseSimTime = Annotated[
@@ -144,7 +142,6 @@ NewFile = Annotated[
         "-o",
         metavar="FILE",
         help="Write to a new file instead of stdout.",
-        show_default=False,
     ),
 ]
 

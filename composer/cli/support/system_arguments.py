@@ -36,7 +36,6 @@ SystemName = Annotated[
     typer.Argument(
         metavar="SYSTEM",
         help="A system file, or the name of a system of the project or of an example system.",
-        show_default=False,
         autocompletion=complete_system,
     ),
 ]
@@ -45,7 +44,6 @@ RunningSystem = Annotated[
     typer.Argument(
         metavar="SYSTEM",
         help="The name of a running system (pipeline, /robot1/pipeline), or its file.",
-        show_default=False,
         autocompletion=complete_running_system,
     ),
 ]
@@ -55,7 +53,6 @@ AnyRunningSystem = Annotated[
     typer.Argument(
         metavar="[SYSTEM]",
         help="The name of a running system, or its file.",
-        show_default=False,
         autocompletion=complete_running_system,
     ),
 ]

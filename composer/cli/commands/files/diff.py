@@ -58,7 +58,6 @@ def diff(
         typer.Option(
             metavar="PATTERN",
             help="Ignore undeclared nodes whose full names match (* is any text). Repeatable.",
-            show_default=False,
         ),
     ] = None,
     json: Json = False,

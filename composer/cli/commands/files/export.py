@@ -45,7 +45,6 @@ NewPath = Annotated[
         "-o",
         metavar="PATH",
         help="Write to a new file instead of stdout; to a folder if there are several files.",
-        show_default=False,
     ),
 ]
 

@@ -39,7 +39,6 @@ NewFolder = Annotated[
         "-o",
         metavar="FOLDER",
         help="Write to files in this folder instead of stdout.",
-        show_default=False,
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]

@@ -34,7 +34,6 @@ def stubs(
         typer.Argument(
             metavar="[PATH]...",
             help="Systems, or folders with systems. Default: the project of the current folder.",
-            show_default=False,
         ),
     ] = None,
     *,
@@ -45,7 +44,6 @@ def stubs(
             "-o",
             metavar="FOLDER",
             help="Write to this folder. Default: 'typings' in the root of the project.",
-            show_default=False,
         ),
     ] = None,
     check: Annotated[

@@ -46,7 +46,6 @@ def graph(
         typer.Argument(
             metavar="SYSTEM...",
             help="System files or names of example systems, drawn in one diagram.",
-            show_default=False,
             autocompletion=complete_system,
         ),
     ] = None,
@@ -58,7 +57,6 @@ def graph(
             "-o",
             metavar="FILE",
             help="Write to FILE instead of stdout. Its suffix selects the format.",
-            show_default=False,
         ),
     ] = None,
     output_format: Annotated[
@@ -67,7 +65,6 @@ def graph(
             "--format",
             "-f",
             help="Output format. Default: from the suffix of FILE, else mermaid.",
-            show_default=False,
         ),
     ] = None,
     view: Annotated[

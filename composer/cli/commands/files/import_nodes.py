@@ -67,7 +67,6 @@ def live(
             "--node",
             metavar="NODE",
             help="Only this node: a full name, the last part of a name, or a pattern. Repeatable.",
-            show_default=False,
             autocompletion=complete_node,
         ),
     ] = None,
@@ -199,7 +198,7 @@ def import_launch(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A launch file.")],
     arguments: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME:=VALUE]...", help="Launch arguments.", show_default=False),
+        typer.Argument(metavar="[NAME:=VALUE]...", help="Launch arguments."),
     ] = None,
     *,
     system: SystemToWrite = "imported",

@@ -64,7 +64,6 @@ def validate(
         typer.Argument(
             metavar="PATH...",
             help="Files, folders to search for systems and node types, or - for stdin.",
-            show_default=False,
         ),
     ] = None,
     *,
@@ -74,7 +73,6 @@ def validate(
             "--format",
             "-f",
             help="Output format. Default: text, or github in GitHub Actions.",
-            show_default=False,
         ),
     ] = None,
     strict: Annotated[
@@ -82,7 +80,6 @@ def validate(
         typer.Option(
             "--strict/--no-strict",
             help="Treat warnings as errors. Default: as set in the project, else no.",
-            show_default=False,
         ),
     ] = None,
     select: Annotated[
@@ -97,7 +94,6 @@ def validate(
             metavar="N",
             min=0,
             help="Show at most N diagnostics as text, errors first; 0 for all. Default: 200.",
-            show_default=False,
         ),
     ] = None,
     stdin_name: Annotated[
@@ -111,7 +107,6 @@ def validate(
         typer.Option(
             metavar="RULE",
             help="Explain a rule, or list those whose code begins like this; check nothing.",
-            show_default=False,
             autocompletion=complete_rule,
         ),
     ] = None,

@@ -59,7 +59,6 @@ def call(
         typer.Argument(
             metavar="[TYPE] [REQUEST]",
             help="The type is optional if the service is running. The request is YAML.",
-            show_default=False,
         ),
     ] = None,
     *,
@@ -73,7 +72,6 @@ def call(
             callback=finite,
             metavar="HZ",
             help="Repeat the call until Ctrl-C, this often per second.",
-            show_default=False,
         ),
     ] = None,
     json: Json = False,
@@ -124,7 +122,6 @@ def send_goal(
         typer.Argument(
             metavar="[TYPE] [GOAL]",
             help="The type is optional if the action is running. The goal is YAML.",
-            show_default=False,
         ),
     ] = None,
     *,

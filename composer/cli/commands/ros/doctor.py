@@ -50,7 +50,6 @@ def doctor(
         typer.Argument(
             metavar="[SYSTEM]",
             help="Check the discovery of this system too: its file or name.",
-            show_default=False,
             autocompletion=complete_system,
         ),
     ] = None,

@@ -26,7 +26,6 @@ NodeName = Annotated[
     typer.Argument(
         metavar="NODE",
         help="The full name (/planning/planner), or its last part (planner) if unambiguous.",
-        show_default=False,
         autocompletion=complete_node,
     ),
 ]

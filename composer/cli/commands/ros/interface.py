@@ -38,7 +38,6 @@ def list_interfaces(
         typer.Argument(
             metavar="[PACKAGE]",
             help="Only the types of this package.",
-            show_default=False,
             autocompletion=complete_interface_package,
         ),
     ] = None,
@@ -114,7 +113,6 @@ def build(
         typer.Argument(
             metavar="[PACKAGE]...",
             help="By default, all packages of the project.",
-            show_default=False,
         ),
     ] = None,
     *,
@@ -124,7 +122,6 @@ def build(
             "--generate",
             metavar="FOLDER",
             help="Only write the complete package to this new folder.",
-            show_default=False,
         ),
     ] = None,
 ) -> None:

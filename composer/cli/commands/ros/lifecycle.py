@@ -148,7 +148,6 @@ def set_state(
             metavar="TARGET... TRANSITION",
             help="Nodes (names or patterns), followed by configure, activate, deactivate, cleanup "
             "or shutdown. With --to, no transition is given.",
-            show_default=False,
             autocompletion=_complete_word,
         ),
     ] = None,
@@ -159,7 +158,6 @@ def set_state(
             "--to",
             metavar="STATE",
             help="Go to this state: unconfigured, inactive, active or finalized.",
-            show_default=False,
         ),
     ] = None,
     system: Annotated[
@@ -168,7 +166,6 @@ def set_state(
             "--system",
             metavar="SYSTEM",
             help="Change all nodes of a running system, in order.",
-            show_default=False,
             autocompletion=complete_running_system,
         ),
     ] = None,

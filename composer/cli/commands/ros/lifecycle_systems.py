@@ -116,7 +116,6 @@ def restart(
         typer.Argument(
             metavar="NODE...",
             help="Nodes of running systems: full names, last parts of names, or patterns.",
-            show_default=False,
             autocompletion=complete_node,
         ),
     ],

@@ -76,7 +76,6 @@ def list_parameters(
         typer.Argument(
             metavar="[NODE]",
             help="The full name of a node, or its last part. Default: all nodes.",
-            show_default=False,
             autocompletion=complete_node,
         ),
     ] = None,

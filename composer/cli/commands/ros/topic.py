@@ -109,7 +109,6 @@ def pub(
         typer.Argument(
             metavar="[VALUES]",
             help="The fields as YAML; {expressions} can use count and now.",
-            show_default=False,
         ),
     ] = None,
     *,

@@ -82,7 +82,6 @@ Filter = Annotated[
         "--filter",
         metavar="EXPRESSION",
         help="Only messages for which the expression is true, such as 'message.data > 0'.",
-        show_default=False,
     ),
 ]
 
@@ -106,21 +105,19 @@ def echo(
         typer.Argument(
             metavar="[TYPE]",
             help="The message type, needed if the topic has no publisher yet.",
-            show_default=False,
         ),
     ] = None,
     *,
     once: Annotated[bool, typer.Option("--once", help="Exit after the first message.")] = False,
     count: Annotated[
         int | None,
-        typer.Option(min=1, metavar="N", help="Exit after N messages.", show_default=False),
+        typer.Option(min=1, metavar="N", help="Exit after N messages."),
     ] = None,
     field: Annotated[
         str | None,
         typer.Option(
             metavar="PATH",
             help="Print only this field, such as pose.position.x or transforms[0].header.",
-            show_default=False,
             callback=_path,
         ),
     ] = None,

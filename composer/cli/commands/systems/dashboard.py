@@ -55,7 +55,6 @@ def dashboard(
         typer.Argument(
             metavar="[SYSTEM]",
             help="The file of a system, or the name of a running or an example system.",
-            show_default=False,
             autocompletion=complete_system,
         ),
     ] = None,
@@ -80,7 +79,6 @@ def dashboard(
         typer.Option(
             metavar="FILE",
             help="Read the token from a private FILE instead of generating one.",
-            show_default=False,
         ),
     ] = None,
     read_only: Annotated[

@@ -41,7 +41,6 @@ def logs(
         typer.Argument(
             metavar="[NODE]...",
             help="Nodes: full names, last parts of names, or patterns.",
-            show_default=False,
             autocompletion=complete_node,
         ),
     ] = None,
@@ -55,7 +54,6 @@ def logs(
             "--since",
             metavar="TIME",
             help="Print lines since a time (2026-03-01T08:30), or within a duration (10m, 1h30m).",
-            show_default=False,
         ),
     ] = None,
     level: Annotated[
@@ -69,7 +67,6 @@ def logs(
             metavar="LINES",
             min=0,
             help="Begin with the last lines.",
-            show_default=False,
         ),
     ] = None,
     system: Annotated[

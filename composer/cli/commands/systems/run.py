@@ -79,7 +79,6 @@ def run(
             min=0.0,
             callback=finite,
             help="Shut down this long after the end of the bring-up.",
-            show_default=False,
         ),
     ] = None,
     dry_run: Annotated[
@@ -140,7 +139,6 @@ def run(
             "--process",
             metavar="NAME",
             help="Run only this process of the system; 'compose run' without it moves its nodes.",
-            show_default=False,
         ),
     ] = None,
     await_processes: Annotated[
