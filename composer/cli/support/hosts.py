@@ -57,11 +57,7 @@ def load_for_hosts(
 ) -> tuple[LoadResult, System, Path]:
     """Return a system without errors, and its file relative to the project. Raises CommandError."""
     system, path, result = runnable_system(
-        text,
-        settings=settings,
-        namespace=namespace,
-        use_sim_time=use_sim_time,
-        exit_code=CONFIG,
+        text, settings=settings, namespace=namespace, use_sim_time=use_sim_time, exit_code=CONFIG
     )
     if not system.hosts:
         raise CommandError(

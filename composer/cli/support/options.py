@@ -59,11 +59,7 @@ CHANGE_TIMEOUT_S = 15.0
 #: Named explicitly: typer takes a metavar equal to the parameter's name in capitals for the name.
 Namespace = Annotated[
     str | None,
-    typer.Option(
-        "--namespace",
-        metavar="NAMESPACE",
-        help="Override the namespace of the system.",
-    ),
+    typer.Option("--namespace", metavar="NAMESPACE", help="Override the namespace of the system."),
 ]
 
 
@@ -88,11 +84,7 @@ class LogSeverity(StrEnum):
 # How to start a system; commands that compare a file with the running system need the same options.
 Settings = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NODE.PARAMETER=VALUE",
-        help="Override a parameter. Repeatable.",
-    ),
+    typer.Option("--set", metavar="NODE.PARAMETER=VALUE", help="Override a parameter. Repeatable."),
 ]
 UseSimTime = Annotated[
     bool, typer.Option("--use-sim-time", help="Use /clock unless a node sets use_sim_time.")
@@ -113,8 +105,7 @@ LogLevelOption = Annotated[
 AllOrNothing = Annotated[
     bool,
     typer.Option(
-        "--all-or-nothing",
-        help="Undo the bring-up if a node fails, whatever its 'on_failure'.",
+        "--all-or-nothing", help="Undo the bring-up if a node fails, whatever its 'on_failure'."
     ),
 ]
 
@@ -137,12 +128,7 @@ def options_of_run(
 
 NewFile = Annotated[
     Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="Write to a new file instead of stdout.",
-    ),
+    typer.Option("--output", "-o", metavar="FILE", help="Write to a new file instead of stdout."),
 ]
 
 Stdin = Annotated[bool, typer.Option("--stdin", help="Read the YAML from standard input.")]

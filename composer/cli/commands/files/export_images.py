@@ -35,10 +35,7 @@ def _image_name(text: str | None) -> str | None:
 NewFolder = Annotated[
     Path | None,
     typer.Option(
-        "--output",
-        "-o",
-        metavar="FOLDER",
-        help="Write to files in this folder instead of stdout.",
+        "--output", "-o", metavar="FOLDER", help="Write to files in this folder instead of stdout."
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
@@ -166,10 +163,7 @@ def _image(
         unknown_interfaces=tuple(
             name for name in used if name not in own and name not in Bundle().packages()
         ),
-        ignored=(
-            tuple(docker_patterns(root)),
-            files.docker_patterns,
-        ),
+        ignored=(tuple(docker_patterns(root)), files.docker_patterns),
     )
     return contents, name or f"{services(system)[0].label}:latest"
 

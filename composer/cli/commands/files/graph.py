@@ -62,9 +62,7 @@ def graph(
     output_format: Annotated[
         Format | None,
         typer.Option(
-            "--format",
-            "-f",
-            help="Output format. Default: from the suffix of FILE, else mermaid.",
+            "--format", "-f", help="Output format. Default: from the suffix of FILE, else mermaid."
         ),
     ] = None,
     view: Annotated[
@@ -74,7 +72,7 @@ def graph(
             " lifecycle: dependencies between nodes. deployment: nodes by executor, with --live by"
             " process and host. states:"
             " lifecycle states. frames: the tree of frames of tf2. An HTML page contains all views"
-            " and opens with this one.",
+            " and opens with this one."
         ),
     ] = View.NODES,
     live: Annotated[

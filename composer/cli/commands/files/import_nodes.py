@@ -43,10 +43,7 @@ def _node_name(text: str) -> str:
 SystemToWrite = Annotated[
     str,
     typer.Option(
-        "--system",
-        metavar="NAME",
-        callback=_node_name,
-        help="Name of the system that is written.",
+        "--system", metavar="NAME", callback=_node_name, help="Name of the system that is written."
     ),
 ]
 
@@ -197,8 +194,7 @@ def _constructed(reference: str, timeout_s: float) -> FoundNode:
 def import_launch(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A launch file.")],
     arguments: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME:=VALUE]...", help="Launch arguments."),
+        list[str] | None, typer.Argument(metavar="[NAME:=VALUE]...", help="Launch arguments.")
     ] = None,
     *,
     system: SystemToWrite = "imported",

@@ -70,9 +70,7 @@ def validate(
     output_format: Annotated[
         ReportFormat | None,
         typer.Option(
-            "--format",
-            "-f",
-            help="Output format. Default: text, or github in GitHub Actions.",
+            "--format", "-f", help="Output format. Default: text, or github in GitHub Actions."
         ),
     ] = None,
     strict: Annotated[

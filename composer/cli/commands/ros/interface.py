@@ -69,9 +69,7 @@ def show(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="TYPE",
-            help="Such as std_msgs/msg/String.",
-            autocompletion=complete_type,
+            metavar="TYPE", help="Such as std_msgs/msg/String.", autocompletion=complete_type
         ),
     ],
     *,
@@ -110,10 +108,7 @@ def show(
 def build(
     packages: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[PACKAGE]...",
-            help="By default, all packages of the project.",
-        ),
+        typer.Argument(metavar="[PACKAGE]...", help="By default, all packages of the project."),
     ] = None,
     *,
     generate: Annotated[
@@ -189,8 +184,7 @@ def _chosen(
         known[name] = None
     if not known and not packages:
         raise CommandError(
-            "the project has no interface package",
-            hint="compose new interfaces NAME creates one",
+            "the project has no interface package", hint="compose new interfaces NAME creates one"
         )
     for name in packages:
         if name not in known:

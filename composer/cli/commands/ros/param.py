@@ -139,8 +139,7 @@ def get(
 @param_app.command(
     "set",
     epilog=examples(
-        "compose param set planner max_velocity 0.5",
-        "compose param set camera offset -1",
+        "compose param set planner max_velocity 0.5", "compose param set camera offset -1"
     ),
     context_settings={"ignore_unknown_options": True},  # negative numbers are not options
 )

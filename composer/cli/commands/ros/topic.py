@@ -107,8 +107,7 @@ def pub(
     content: Annotated[
         str | None,
         typer.Argument(
-            metavar="[VALUES]",
-            help="The fields as YAML; {expressions} can use count and now.",
+            metavar="[VALUES]", help="The fields as YAML; {expressions} can use count and now."
         ),
     ] = None,
     *,

@@ -103,15 +103,13 @@ def echo(
     type_name: Annotated[
         str | None,
         typer.Argument(
-            metavar="[TYPE]",
-            help="The message type, needed if the topic has no publisher yet.",
+            metavar="[TYPE]", help="The message type, needed if the topic has no publisher yet."
         ),
     ] = None,
     *,
     once: Annotated[bool, typer.Option("--once", help="Exit after the first message.")] = False,
     count: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Exit after N messages."),
+        int | None, typer.Option(min=1, metavar="N", help="Exit after N messages.")
     ] = None,
     field: Annotated[
         str | None,

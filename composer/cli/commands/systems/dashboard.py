@@ -15,13 +15,7 @@ from composer.cli.support.dashboard_process import (
     require_dashboard,
 )
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import (
-    Autostart,
-    AutostartTo,
-    Namespace,
-    Settings,
-    examples,
-)
+from composer.cli.support.options import Autostart, AutostartTo, Namespace, Settings, examples
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
@@ -77,8 +71,7 @@ def dashboard(
     token_file: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE",
-            help="Read the token from a private FILE instead of generating one.",
+            metavar="FILE", help="Read the token from a private FILE instead of generating one."
         ),
     ] = None,
     read_only: Annotated[

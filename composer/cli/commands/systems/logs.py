@@ -61,13 +61,7 @@ def logs(
     ] = LogSeverity.DEBUG,
     tail: Annotated[
         int | None,
-        typer.Option(
-            "--tail",
-            "-n",
-            metavar="LINES",
-            min=0,
-            help="Begin with the last lines.",
-        ),
+        typer.Option("--tail", "-n", metavar="LINES", min=0, help="Begin with the last lines."),
     ] = None,
     system: Annotated[
         str | None,

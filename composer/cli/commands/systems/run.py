@@ -91,10 +91,7 @@ def run(
     log_level: LogLevelOption = None,
     tracing: Annotated[
         bool,
-        typer.Option(
-            "--tracing/--no-tracing",
-            help="Record callback timings for 'compose top'.",
-        ),
+        typer.Option("--tracing/--no-tracing", help="Record callback timings for 'compose top'."),
     ] = True,
     check_mutation: Annotated[
         bool,
@@ -119,8 +116,7 @@ def run(
         ),
     ] = False,
     wait: Annotated[
-        bool,
-        typer.Option("--wait", help="Run in the background; return once the system is up."),
+        bool, typer.Option("--wait", help="Run in the background; return once the system is up.")
     ] = False,
     timeout: Annotated[
         float | None,
@@ -312,13 +308,7 @@ def _run(
     from composer.runtime.process import StartRefused
     from composer.runtime.process.instance_lock import ALREADY_RUNS, AlreadyRunning
     from composer.runtime.process.service_manager import ALIVE, READY, STOPPING, ServiceManager
-    from composer.runtime.supervision.events import (
-        BroughtUp,
-        Event,
-        Logged,
-        NodeFailed,
-        Stopping,
-    )
+    from composer.runtime.supervision.events import BroughtUp, Event, Logged, NodeFailed, Stopping
 
     with ExitStack() as stack:
         stack.enter_context(queued_output())

@@ -49,11 +49,7 @@ def top(
     interval: Annotated[
         float,
         typer.Option(
-            "--interval",
-            metavar="SECONDS",
-            min=1.0,
-            callback=finite,
-            help="Time between updates.",
+            "--interval", metavar="SECONDS", min=1.0, callback=finite, help="Time between updates."
         ),
     ] = 1.0,
     json: Annotated[
