@@ -14,40 +14,30 @@ from typer.core import TyperGroup
 from composer.cli.support.options import examples
 from composer.cli.support.output.terminal import write
 
-#: The commands under the headings of the help, each with its module in composer.cli.commands. A
-#: module has ``<name>_app`` with subcommands, or a function with the name of the command and its
-#: epilog in ``EPILOGS``.
+#: The commands under the headings of the help. The module of that name in composer.cli.commands has
+#: ``<name>_app`` with subcommands, or a function with the name of the command and its epilog,
+#: ``EPILOG``.
 COMMANDS = {
-    "Commands for systems": {
-        "run": "systems.run",
-        "down": "systems.down",
-        "ps": "systems.ps",
-        "top": "systems.top",
-        "logs": "systems.logs",
-        "dashboard": "systems.dashboard",
-        "hosts": "systems.hosts",
-    },
-    "Commands for files": {
-        "validate": "files.validate",
-        "config": "files.config",
-        "graph": "files.graph",
-        "diff": "files.diff",
-        "new": "files.new",
-        "import": "files.import_nodes",
-        "export": "files.export",
-    },
-    "Commands for ROS 2": {
-        "lifecycle": "ros.lifecycle",
-        "node": "ros.graph",
-        "topic": "ros.topic",
-        "service": "ros.calls",
-        "action": "ros.calls",
-        "param": "ros.param",
-        "interface": "ros.interface",
-        "doctor": "ros.doctor",
-    },
+    "Commands for systems": ("run", "down", "ps", "top", "logs", "dashboard", "hosts"),
+    "Commands for files": ("validate", "config", "graph", "diff", "new", "import", "export"),
+    "Commands for ROS 2": (
+        "lifecycle",
+        "node",
+        "topic",
+        "service",
+        "action",
+        "param",
+        "interface",
+        "doctor",
+    ),
 }
-_MODULES = {name: module for group in COMMANDS.values() for name, module in group.items()}
+_ALL = tuple(name for names in COMMANDS.values() for name in names)
+_OTHER_MODULES = {
+    "import": "import_nodes",
+    "node": "nodes",
+    "service": "calls",
+    "action": "calls",
+}
 
 #: What users of docker compose, ruff and ros2 type, and the command that does it here.
 ELSEWHERE = {
@@ -118,18 +108,18 @@ def _needed_commands(arguments: Sequence[str]) -> Sequence[str]:
         return ()
     options = list(takewhile(lambda text: text.startswith("-"), arguments))
     command = next(iter(arguments[len(options) :]), None)
-    if command not in _MODULES or not {"-h", "--help"}.isdisjoint(options):
-        return tuple(_MODULES)
+    if command not in _ALL or not {"-h", "--help"}.isdisjoint(options):
+        return _ALL
     return (command,)
 
 
 def _add(app: typer.Typer, name: str) -> None:
-    module = import_module(f"composer.cli.commands.{_MODULES[name]}")
+    module = import_module(f"composer.cli.commands.{_OTHER_MODULES.get(name, name)}")
     group = getattr(module, f"{name}_app", None)
     if group is not None:
         app.add_typer(group, name=name)
     else:
-        app.command(name, epilog=module.EPILOGS[name])(getattr(module, name))
+        app.command(name, epilog=module.EPILOG)(getattr(module, name))
 
 
 def _print_version(requested: bool) -> None:

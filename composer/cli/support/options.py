@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from composer.cli.support.errors import UsageError
 
@@ -28,11 +29,20 @@ def examples(*lines: str) -> str:
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
-def command_group(text: str, *lines: str) -> typer.Typer:
-    """Return an application for commands below one word, with its help text and examples."""
-    return typer.Typer(
-        help=text, epilog=examples(*lines), no_args_is_help=True, rich_markup_mode=None
-    )
+class _Group(TyperGroup):
+    """Commands below one word; the help ends with the first example of each."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - as in the base
+        """Write the examples to the help page."""
+        formatter.write("\n  Examples:\n")
+        for command in self.commands.values():
+            if not command.hidden and command.epilog:
+                formatter.write(f"  {command.epilog.splitlines()[2]}\n")
+
+
+def command_group(text: str) -> typer.Typer:
+    """Return an application for commands below one word, with its help text."""
+    return typer.Typer(cls=_Group, help=text, no_args_is_help=True, rich_markup_mode=None)
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -110,20 +120,25 @@ AllOrNothing = Annotated[
 ]
 
 
-def options_of_run(
-    settings: Sequence[str],
-    namespace: str | None,
-    autostart: Autostart | None,
-    level: LogSeverity | None,
-    *,
-    use_sim_time: bool,
-) -> list[str]:
-    """Return the options of ``compose run`` that say how a system is started."""
-    words = [word for text in settings for word in ("--set", text)]
-    words += [] if namespace is None else ["--namespace", namespace]
-    words += [] if autostart is None else ["--autostart", autostart.value]
-    words += [] if level is None else ["--log-level", level.value]
-    return [*words, "--use-sim-time"] if use_sim_time else words
+#: The parameters of commands with these options.
+START_OPTIONS = ("settings", "namespace", "use_sim_time", "autostart", "log_level")
+
+
+def given_options(context: typer.Context, names: Collection[str]) -> list[str]:
+    """Return the options with these parameter names as words of a command line, if given."""
+    words: list[str] = []
+    for option in context.command.params:
+        name = option.name or ""
+        source = context.get_parameter_source(name)
+        if name not in names or source is None or source.name != "COMMANDLINE":
+            continue
+        value = context.params[name]
+        for item in value if isinstance(value, list | tuple) else [value]:
+            if isinstance(item, bool):
+                words.append((option.opts if item else option.secondary_opts)[-1])
+            else:
+                words += [option.opts[-1], str(item)]
+    return words
 
 
 NewFile = Annotated[

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from array import array
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -160,21 +159,6 @@ def part(value: Any, path: str) -> Any:
     for step in path_steps(path):
         value = _step(value, step, path)
     return value
-
-
-def age_s(message: Any, arrived_s: float) -> float:
-    """Return the seconds between a message's ``header.stamp`` and its arrival.
-
-    ``arrived_s`` is by time.monotonic. Raises InvalidValueError for a message without a header.
-    """
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    if stamp is None:
-        raise InvalidValueError(
-            f"{type(message).__name__} has no header.stamp, so its age is not known",
-            "'compose topic hz' measures the rate",
-        )
-    now_s = time.time() - (time.monotonic() - arrived_s)
-    return float(now_s - (stamp.sec + stamp.nanosec * 1e-9))
 
 
 def _step(value: Any, step: str | int, path: str) -> Any:

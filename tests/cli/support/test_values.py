@@ -7,7 +7,7 @@ import shlex
 import pytest
 import yaml
 
-from composer.cli.commands.ros.topic_receive import without_items
+from composer.cli.commands.topic_receive import without_items
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
 from composer.cli.support.output.results import as_json, as_yaml, truncated
@@ -64,8 +64,6 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
         ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
         ("lifecycle set planner", "specify a transition of 'planner'"),
         ("lifecycle set activate", "specify nodes, or a system with --system"),
-        ("diff pipeline --for 5", "--for needs --watch"),
-        ("diff pipeline --watch --for 2", "--for 2 is not longer than --grace 2"),
         ("top --sort name", "cannot sort by 'name'"),
     ],
 )

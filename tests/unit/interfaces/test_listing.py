@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.interfaces import Interfaces, parts
-from composer.interfaces.listing import ListingOptions, listing, packages, prototype
+from composer.interfaces import Interfaces
+from composer.interfaces.listing import ListingOptions, listing
 from composer.interfaces.sources import Prefix
 
 OUTER = """\
@@ -46,11 +46,6 @@ def interfaces(tmp_path: Path) -> Interfaces:
             ListingOptions(comments=False),
             "Inner[2] inner\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\nint8 LIMIT=1",
         ),
-        (
-            ListingOptions(nested_comments=True),
-            "# outside\n\nInner[2] inner  # below\n\t# inside\n\n\tint32 x 3  # of it\n"
-            "\tbool[] flags\nstring name 'a'\nint8 LIMIT=1",
-        ),
         (ListingOptions(nested=False), OUTER.rstrip()),
     ],
 )
@@ -78,16 +73,6 @@ def test_a_definition_without_text_is_written_from_its_description(
     ]
 
 
-def test_a_prototype_has_the_defaults(interfaces: Interfaces) -> None:
-    outer = interfaces.message("my_msgs/msg/Outer")
-    assert outer is not None
-    inner = {"x": 3, "flags": []}
-    assert prototype(outer, interfaces) == {"inner": [inner, inner], "name": "a"}
-    ask = interfaces.find("my_msgs/srv/Ask")
-    assert ask is not None
-    assert list(parts(ask)) == ["request", "response"]
-
-
 def test_a_message_that_contains_itself_is_expanded_once(tmp_path: Path) -> None:
     folder = tmp_path / "share" / "my_msgs" / "msg"
     index = tmp_path / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
@@ -99,10 +84,3 @@ def test_a_message_that_contains_itself_is_expanded_once(tmp_path: Path) -> None
     interfaces = Interfaces([Prefix(tmp_path)])
     shown = list(listing("my_msgs/msg/Tree", interfaces, ListingOptions()))
     assert shown == ["Leaf leaf", "\tTree tree"]
-    tree = interfaces.message("my_msgs/msg/Tree")
-    assert tree is not None
-    assert prototype(tree, interfaces) == {"leaf": {"tree": {}}}
-
-
-def test_packages_are_sorted_and_listed_once() -> None:
-    assert packages(["b/msg/X", "a/srv/Y", "b/msg/Z"]) == ("a", "b")

@@ -10,17 +10,13 @@ from composer.base.characters import escape_json, is_safe
 from composer.cli.support.output.terminal import say
 
 
-def as_yaml(value: Any, *, one_line: bool = False) -> str:
+def as_yaml(value: Any) -> str:
     """Return plain data as YAML, keys in their order."""
     import yaml
 
     def dump(*, allow_unicode: bool) -> str:
         text: str = yaml.safe_dump(
-            value,
-            sort_keys=False,
-            allow_unicode=allow_unicode,
-            width=float("inf") if one_line else 120,
-            default_flow_style=one_line,
+            value, sort_keys=False, allow_unicode=allow_unicode, width=120, default_flow_style=False
         )
         return text
 

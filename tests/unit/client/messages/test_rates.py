@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.client.messages.rates import BandwidthWindow, DelayWindow, RateWindow
+from composer.client.messages.rates import RateWindow
 
 
 def test_rate_statistics() -> None:
@@ -22,7 +22,6 @@ def test_too_few_messages_have_no_statistics() -> None:
     assert window.statistics() is None
     window.add(1.0)
     assert window.statistics() is None
-    assert BandwidthWindow(10).statistics(5.0) is None
 
 
 def test_a_window_keeps_the_last_messages() -> None:
@@ -52,41 +51,3 @@ def test_a_fast_topic_has_its_rate_with_a_small_window() -> None:
     rate = window.statistics()
     assert rate is not None
     assert (rate.average_hz, rate.window) == (pytest.approx(1000.0, rel=0.02), 3)
-
-
-def test_bandwidth_is_that_of_a_steady_topic_from_the_second_message_on() -> None:
-    window = BandwidthWindow(100)
-    for number in range(21):
-        window.add(number / 10, 24)
-        found = window.statistics(number / 10)
-        assert found is None if number == 0 else found is not None
-        assert found is None or found.bytes_per_s == pytest.approx(240.0)
-
-
-def test_bandwidth_decreases_without_new_messages() -> None:
-    window = BandwidthWindow(10)
-    window.add(0.0, 100)
-    window.add(1.0, 300)
-    found = window.statistics(2.0)
-    assert found is not None
-    assert (found.bytes_per_s, found.mean, found.smallest, found.largest) == (
-        150.0,
-        200.0,
-        100,
-        300,
-    )
-    later = window.statistics(4.0)
-    assert later is not None
-    assert later.bytes_per_s == 75.0
-
-
-def test_delay_statistics() -> None:
-    delays = DelayWindow(2)
-    assert delays.statistics() is None
-    for delay_s in (9.0, 0.1, 0.3):
-        delays.add(delay_s)
-    found = delays.statistics()
-    assert found is not None
-    assert (found.shortest_s, found.longest_s, found.window) == (0.1, 0.3, 2)
-    assert found.average_s == pytest.approx(0.2)
-    assert found.deviation_s == pytest.approx(0.1)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.commands.ros.graph import NodeName
-from composer.cli.commands.ros.lifecycle_systems import add_system_commands
+from composer.cli.commands.lifecycle_systems import add_system_commands
+from composer.cli.commands.nodes import NodeName
 from composer.cli.support.completion import complete_node, complete_running_system
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, command_group, examples
@@ -26,12 +26,7 @@ lifecycle_app = command_group(
     'nodes', 'get', 'list' and 'set' work with every lifecycle node in the ROS graph. The others
     send a command to a running system, which moves its nodes in order and applies their
     'on_failure'.
-    """,
-    "compose lifecycle nodes",
-    "compose lifecycle get planner",
-    "compose lifecycle set planner deactivate",
-    "compose lifecycle restart planner",
-    "compose lifecycle pause pipeline",
+    """
 )
 
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")

@@ -22,10 +22,7 @@ interface_app = command_group(
 
     The types are those of installed packages and of the project, and the common types of ROS 2. To
     list and show types, ROS is not needed.
-    """,
-    "compose interface list std_srvs",
-    "compose interface show nav_msgs/msg/Odometry",
-    "compose interface build",
+    """
 )
 
 

@@ -88,9 +88,7 @@ def described(kind: str, name: str, timeout: float, *, hidden: bool = False) -> 
         return asdict(names.action(name) if kind == "action" else names.node(name, hidden=hidden))
 
 
-node_app = command_group(
-    "List and inspect running nodes.", "compose node list", "compose node info planner"
-)
+node_app = command_group("List and inspect running nodes.")
 
 
 @node_app.command("list", epilog=examples("compose node list", "compose node list --json"))

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from composer.cli.commands.ros.graph import add_list, described
+from composer.cli.commands.nodes import add_list, described
 from composer.cli.support.completion import complete_action, complete_service
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import (
@@ -27,17 +27,8 @@ from composer.cli.support.output.results import as_json, as_yaml
 from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.ros import ros_session
 
-service_app = command_group(
-    "List and call services.",
-    "compose service list -t",
-    "compose service call /plan_trajectory '{goal: {x: 1.0}, max_velocity: 0.5}'",
-)
-action_app = command_group(
-    "List actions and send goals.",
-    "compose action list -t",
-    "compose action info /navigate",
-    "compose action send-goal /navigate '{target: {x: 2.0}, max_velocity: 1.0}' --feedback",
-)
+service_app = command_group("List and call services.")
+action_app = command_group("List actions and send goals.")
 add_list(service_app, "service")
 add_list(action_app, "action")
 

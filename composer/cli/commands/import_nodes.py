@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,15 +27,15 @@ from composer.model.names import node_name_problem
 if TYPE_CHECKING:
     from composer.bridges.importing import FoundNode
 
+#: The name of an exception of the composer at the end of a traceback; its text says it all.
+_OWN_EXCEPTION = re.compile(r"^composer\.[\w.]+: ")
+
 import_app = command_group(
     """Describe existing nodes in YAML.
 
     The result is a valid file to start from: edit it, and compare it with the running nodes with
     'compose diff'.
-    """,
-    "compose import live -o systems/robot.yaml                   the nodes that run now",
-    "compose import class driver:Driver -o nodes/driver.yaml     an rclpy class",
-    "compose import launch robot.launch.py                       a launch file",
+    """
 )
 
 
@@ -176,11 +183,10 @@ def _constructed(reference: str, timeout_s: float) -> FoundNode:
     """Construct a class in a process of its own. Raises CommandError."""
     require_ros("compose import class --construct")
     from composer.bridges.importing.constructed import describe_constructed
-    from composer.cli.support.user_processes import run_user_process
 
     module = "composer.client.constructed_class"
     what = f"constructing '{reference}'"
-    text = run_user_process(what, module, [reference, str(Path.cwd())], timeout_s)
+    text = _run_user_process(what, module, [reference, str(Path.cwd())], timeout_s)
     return describe_constructed(reference, json.loads(text))
 
 
@@ -224,11 +230,10 @@ def import_launch(
     require_launch("compose import launch")
     from composer.bridges.importing import write_parameters, write_system
     from composer.bridges.importing.launch_file import describe_launch_file
-    from composer.cli.support.user_processes import run_user_process
 
     arguments_of_process = [str(file.absolute()), *given]
     what = f"evaluating '{file}'"
-    text = run_user_process(what, "composer.launch.visitor", arguments_of_process, timeout)
+    text = _run_user_process(what, "composer.launch.visitor", arguments_of_process, timeout)
     found = describe_launch_file(system, str(file), given, json.loads(text))
     if not found.nodes:
         _report_left_out(found.left_out)
@@ -257,3 +262,41 @@ def _known_types() -> set[str]:
 def _report_left_out(left_out: tuple[str, ...]) -> None:
     if left_out:
         say(lines(["left out:", *(f"  {text}" for text in left_out)]))
+
+
+def _run_user_process(what: str, module: str, arguments: Sequence[str], timeout_s: float) -> str:
+    """Run a module of the composer; return what it writes to the file that is its first argument.
+
+    ``what`` describes it, as in "constructing 'driver:Driver'". The user reads before it runs that
+    it will. Raises CommandError with the last line of its output if it fails or takes too long.
+    """
+    say(f"{what}: this runs its code, with all that you may do")
+    with tempfile.TemporaryDirectory(prefix="compose-") as folder:
+        report = Path(folder, "report")
+        process = subprocess.Popen(  # noqa: S603 - a module of this very program
+            # -P: do not import modules from the current folder
+            [sys.executable, "-P", "-m", module, str(report), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            env={**os.environ, "TMPDIR": folder},  # removes what it leaves behind
+            text=True,
+            errors="replace",
+        )
+        try:
+            shown, _ = process.communicate(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            raise CommandError(
+                f"{what} did not end within {timeout_s:g} s",
+                hint="its code must not wait or spin; --timeout sets another limit",
+            ) from None
+        if process.returncode != 0 or not report.is_file():
+            if os.environ.get("COMPOSE_DEBUG"):
+                say(shown.rstrip())
+            last = shown.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
+            text = _OWN_EXCEPTION.sub("", last[0])
+            raise CommandError(f"{what} failed: {text}", hint="COMPOSE_DEBUG=1 shows its output")
+        return report.read_text(encoding="utf-8")

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import select
+import shutil
+import sys
+import termios
+import tty
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
+from composer.base.characters import escape_lines
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
 from composer.cli.support.output.results import as_json
-from composer.cli.support.output.screen import Screen
-from composer.cli.support.output.terminal import write
+from composer.cli.support.output.terminal import write, write_raw
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
 
@@ -21,15 +27,13 @@ if TYPE_CHECKING:
     from composer.client.systems.managers import Systems
     from composer.client.systems.system_reports import SystemReport
 
-EPILOGS = {
-    "top": examples(
-        "compose top                   show the running system; press q to quit",
-        "compose top pipeline          show one of several systems",
-        "compose top --sort late       show the most delayed timers first",
-        "compose top --once            print one table and exit",
-        "compose top --json            print a line of JSON every second",
-    )
-}
+EPILOG = examples(
+    "compose top                   show the running system; press q to quit",
+    "compose top pipeline          show one of several systems",
+    "compose top --sort late       show the most delayed timers first",
+    "compose top --once            print one table and exit",
+    "compose top --json            print a line of JSON every second",
+)
 _SORT_KEYS = "busy, calls, mean, p99, max, late, dropped or node"
 #: Managers report about every second; accept a report that is this much early.
 _EARLY_S = 0.5
@@ -37,6 +41,10 @@ _EARLY_S = 0.5
 _NO_REPORT_S = 5.0
 #: The other processes of a system report in the same period, at times of their own.
 _OTHERS_WITHIN_S = 1.5
+
+_ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
+_HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
+_QUIT_KEYS = "qQ\x03\x04\x1b"
 
 
 def top(
@@ -75,7 +83,7 @@ def top(
         found = systems.only() if name is None else systems.find(name)
         follower = _Follower(session, systems, systems.report(found))
         key = SortKey(sort)
-        with Screen(full=not (once or json)) as screen:
+        with _Screen(full=not (once or json)) as screen:
             while follower.wait(interval, screen.quit_requested):
                 text = follower.json(key) if json else follower.table(key, screen.lines)
                 if once:
@@ -133,3 +141,49 @@ class _Follower:
         from composer.cli.support.output.callback_tables import sorted_rates, top_data
 
         return as_json(top_data(self._now, sorted_rates(self._before, self._now, key)))
+
+
+class _Screen:
+    """A full-screen display that is redrawn, for a ``with`` block.
+
+    Frames are printed one below the other if stdout is not a terminal or ``full`` is false.
+    """
+
+    def __init__(self, *, full: bool = True) -> None:
+        self._is_full = full and sys.stdout.isatty() and sys.stdin.isatty()
+        self._before: list[Any] = []
+
+    def __enter__(self) -> Self:
+        if self._is_full:
+            self._before = termios.tcgetattr(sys.stdin)
+            tty.setcbreak(sys.stdin)
+            write_raw(_ENTER)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._is_full:
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+            write_raw(_LEAVE)
+
+    @property
+    def lines(self) -> int | None:
+        """The height of the screen; None without a limit."""
+        return shutil.get_terminal_size().lines if self._is_full else None
+
+    def draw(self, text: str) -> None:
+        """Show ``text`` in place of the last frame."""
+        if not self._is_full:
+            write(f"{text}\n" if "\n" in text else text)  # a blank line between tables
+            return
+        width = shutil.get_terminal_size().columns
+        shown = "\n".join(f"{line[:width]}{_CLEAR_LINE}" for line in escape_lines(text).split("\n"))
+        write_raw(f"{_HOME}{shown}{_CLEAR_BELOW}")
+
+    def quit_requested(self) -> bool:
+        """Say whether the user has pressed q, Escape or Ctrl-C."""
+        if not self._is_full:
+            return False
+        with suppress(OSError):
+            if select.select([sys.stdin], [], [], 0.0)[0]:
+                return sys.stdin.read(1) in _QUIT_KEYS
+        return False

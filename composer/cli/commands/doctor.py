@@ -31,15 +31,13 @@ if TYPE_CHECKING:
     from composer.loading import LoadResult
     from composer.model import System
 
-EPILOGS = {
-    "doctor": examples(
-        "compose doctor",
-        "compose doctor robot.yaml   check the discovery of a system as well",
-        "compose doctor robot.yaml --hosts   from each computer of the system",
-        "compose doctor --json",
-        "compose doctor --strict     treat warnings as errors, for CI",
-    )
-}
+EPILOG = examples(
+    "compose doctor",
+    "compose doctor robot.yaml   check the discovery of a system as well",
+    "compose doctor robot.yaml --hosts   from each computer of the system",
+    "compose doctor --json",
+    "compose doctor --strict     treat warnings as errors, for CI",
+)
 _RETRY = "fix the errors above, then run 'compose doctor' again"
 _LEVEL_WIDTH, _AREA_WIDTH = 7, 11
 

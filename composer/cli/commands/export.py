@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.commands.files.export_images import Force, add_image_commands, exported_system
-from composer.cli.commands.files.export_stubs import add_stubs_command
+from composer.cli.commands.export_images import Force, add_image_commands, exported_system
+from composer.cli.commands.export_stubs import add_stubs_command
 from composer.cli.support.errors import CommandError
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
@@ -28,14 +28,7 @@ export_app = command_group(
     """Write files for other tools.
 
     The files are derived from the systems and node types: export again after changes.
-    """,
-    "compose export launch systems/robot.yaml -o launch/robot.launch.py",
-    "compose export systemd systems/robot.yaml -o robot.service",
-    "compose export docker-compose systems/robot.yaml -o deploy",
-    "compose export kubernetes systems/robot.yaml -o deploy",
-    "compose export sros2 systems/robot.yaml -o policies/robot.xml",
-    "compose export stubs",
-    "compose export schema system > system.schema.json",
+    """
 )
 
 NewPath = Annotated[

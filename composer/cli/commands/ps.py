@@ -19,14 +19,12 @@ from composer.cli.support.system_arguments import AnyRunningSystem, running_syst
 if TYPE_CHECKING:
     from composer.client.systems.system_reports import NodeReport, PartialReport, SystemReport
 
-EPILOGS = {
-    "ps": examples(
-        "compose ps                 all running systems and other lifecycle nodes",
-        "compose ps pipeline        a single system",
-        "compose ps --json          print JSON",
-        "compose ps pipeline --ready    check that all of its nodes are up, as containers do",
-    )
-}
+EPILOG = examples(
+    "compose ps                 all running systems and other lifecycle nodes",
+    "compose ps pipeline        a single system",
+    "compose ps --json          print JSON",
+    "compose ps pipeline --ready    check that all of its nodes are up, as containers do",
+)
 
 #: None stands for a system that did not respond.
 _Systems: TypeAlias = "Mapping[str, SystemReport | PartialReport | None]"

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from composer.cli.commands.ros.graph import add_list, described
-from composer.cli.commands.ros.topic_receive import (
+from composer.cli.commands.nodes import add_list, described
+from composer.cli.commands.topic_receive import (
     QosDepth,
     QosDurability,
     QosPreset,
@@ -33,13 +33,7 @@ from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.ros import ros_session
 from composer.model.qos import PRESETS
 
-topic_app = command_group(
-    "List, inspect, measure and publish topics.",
-    "compose topic list -t",
-    "compose topic echo /sensor_data --once",
-    "compose topic hz /sensor_data",
-    "compose topic pub --once /chatter std_msgs/msg/String '{data: hello}'",
-)
+topic_app = command_group("List, inspect, measure and publish topics.")
 add_list(topic_app, "topic")
 
 topic_app.command(

@@ -12,13 +12,11 @@ from composer.cli.support.output.results import as_json
 from composer.cli.support.output.terminal import say, write, write_raw
 from composer.cli.support.system_arguments import SystemName, load_system
 
-EPILOGS = {
-    "config": examples(
-        "compose config systems/fleet.yaml",
-        "compose config systems/fleet.yaml --json | jq .nodes",
-        "compose config nodes/watchdog.yaml",
-    )
-}
+EPILOG = examples(
+    "compose config systems/fleet.yaml",
+    "compose config systems/fleet.yaml --json | jq .nodes",
+    "compose config nodes/watchdog.yaml",
+)
 
 
 def config(

@@ -21,16 +21,14 @@ from composer.cli.support.system_arguments import running_system_name
 if TYPE_CHECKING:
     from composer.client.run_log import Record, Run, Selection, SystemLog
 
-EPILOGS = {
-    "logs": examples(
-        "compose logs                                  the latest run in this domain",
-        "compose logs planner motor_controller         two nodes",
-        "compose logs -f --level warn                  follow warnings and errors",
-        "compose logs --since 10m '/perception/*'      the last ten minutes",
-        "compose logs --system pipeline --list         the runs of a system",
-        "compose logs --json | jq -r .message          JSON, one object per line",
-    )
-}
+EPILOG = examples(
+    "compose logs                                  the latest run in this domain",
+    "compose logs planner motor_controller         two nodes",
+    "compose logs -f --level warn                  follow warnings and errors",
+    "compose logs --since 10m '/perception/*'      the last ten minutes",
+    "compose logs --system pipeline --list         the runs of a system",
+    "compose logs --json | jq -r .message          JSON, one object per line",
+)
 
 _COLORS = {"warn": "33", "error": "31", "fatal": "31"}
 

@@ -7,7 +7,6 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Mapping
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -18,6 +17,7 @@ import typer
 from composer.cli.support.dashboard_process import require_dashboard
 from composer.cli.support.errors import CONFIG, CommandError, UsageError
 from composer.cli.support.options import (
+    START_OPTIONS,
     AllOrNothing,
     Autostart,
     AutostartTo,
@@ -28,7 +28,7 @@ from composer.cli.support.options import (
     UseSimTime,
     examples,
     finite,
-    options_of_run,
+    given_options,
 )
 from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import (
@@ -46,29 +46,33 @@ if TYPE_CHECKING:
     from composer.runtime.host_options import HostOptions
     from composer.runtime.supervision.events import Outcome
 
-EPILOGS = {
-    "run": examples(
-        "compose run pipeline                                  run an example system until Ctrl-C",
-        "compose run systems/pipeline.yaml --for 10            run for ten seconds",
-        "compose run pipeline --dry-run                        print the plan; needs no ROS",
-        "compose run pipeline --set planner.max_velocity=0.5   set a parameter",
-        "compose run pipeline --namespace /robot1              use another namespace",
-        "compose run pipeline --for 10 --fail-on-error         test that no handler fails",
-        "compose run pipeline --use-sim-time                   use the time of a simulator",
-        "compose run pipeline --autostart inactive             configure nodes, do not activate",
-        "compose run pipeline --wait --timeout 10              run in the background",
-        "compose run robot.yaml --process perception           run one of its processes alone",
-        "compose run pipeline --dashboard                      watch and control it in the browser",
-    )
-}
+EPILOG = examples(
+    "compose run pipeline                                  run an example system until Ctrl-C",
+    "compose run systems/pipeline.yaml --for 10            run for ten seconds",
+    "compose run pipeline --dry-run                        print the plan; needs no ROS",
+    "compose run pipeline --set planner.max_velocity=0.5   set a parameter",
+    "compose run pipeline --namespace /robot1              use another namespace",
+    "compose run pipeline --for 10 --fail-on-error         test that no handler fails",
+    "compose run pipeline --use-sim-time                   use the time of a simulator",
+    "compose run pipeline --autostart inactive             configure nodes, do not activate",
+    "compose run pipeline --wait --timeout 10              run in the background",
+    "compose run robot.yaml --process perception           run one of its processes alone",
+    "compose run pipeline --dashboard                      watch and control it in the browser",
+)
 
 #: The default of ``--timeout`` with ``--wait``.
 _WAIT_S = 60.0
+#: The parameters of options that other processes of the system do not get.
+_ONLY_OF_ONE_PROCESS = (
+    *("process", "await_processes", "fail_on_error", "all_or_nothing", "dashboard"),
+    *("run_for", "grace"),
+)
 #: How long the process may take to start, on a busy machine, before its own limits apply.
 _START_S = 20.0
 
 
 def run(
+    context: typer.Context,
     system: SystemName,
     *,
     run_for: Annotated[
@@ -206,19 +210,13 @@ def run(
     _require(part, dashboard=dashboard)
     if member is None:
         announce_discovery(part)
-    start = [
-        *options_of_run(settings or (), namespace, autostart, log_level, use_sim_time=use_sim_time),
-        *_words({"--no-tracing": not tracing, "--check-mutation": check_mutation}),
-    ]
+    start = given_options(context, (*START_OPTIONS, "tracing", "check_mutation"))
     from composer.cli.support.process import compose_command, run_in_background
     from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
 
     if wait:
         up_s = _WAIT_S if timeout is None else timeout
-        start += _words({"--process": process, "--await-processes": await_processes})
-        start += _words({"--fail-on-error": fail_on_error, "--dashboard": dashboard})
-        start += _words({"--all-or-nothing": all_or_nothing})
-        start += _words({"--for": run_for, "--timeout": up_s, "--grace": grace})
+        start += [*given_options(context, _ONLY_OF_ONE_PROCESS), "--timeout", str(up_s)]
         limit_s = up_s + grace + _START_S
         write(run_in_background(part.name.value, [system, *start], limit_s))
         return
@@ -232,7 +230,7 @@ def run(
         report_key=os.environ.pop(REPORT_KEY_VARIABLE, ""),  # not for its own children
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
     )
-    shown = _dashboard_arguments(system, settings or [], namespace, autostart)
+    shown = [*given_options(context, ("settings", "namespace", "autostart")), "--", system]
     outcome = _run(part, (up, down), options, shown if dashboard else None)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
@@ -271,25 +269,6 @@ def _require(system: System, *, dashboard: bool) -> None:
     require_modules(system)
     if dashboard:
         require_dashboard("compose run --dashboard")
-
-
-def _dashboard_arguments(
-    system: str, settings: list[str], namespace: str | None, autostart: Autostart | None
-) -> list[str]:
-    """Return the arguments of the dashboard that shows this system."""
-    given = options_of_run(settings, namespace, autostart, None, use_sim_time=False)
-    return [*given, "--", system]
-
-
-def _words(options: Mapping[str, str | float | bool | None]) -> list[str]:
-    """Return options as words of a command line; None and False leave one out."""
-    words: list[str] = []
-    for name, value in options.items():
-        if value is True:
-            words.append(name)
-        elif value is not None and value is not False:
-            words += [name, str(value)]
-    return words
 
 
 def _run(

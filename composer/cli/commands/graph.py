@@ -21,18 +21,16 @@ if TYPE_CHECKING:
     from composer.graph.scene import Scene
     from composer.model import System
 
-EPILOGS = {
-    "graph": examples(
-        "compose graph systems/pipeline.yaml                   print Mermaid text",
-        "compose graph pipeline -o pipeline.html               write an interactive page",
-        "compose graph pipeline -o pipeline.svg                write an image",
-        "compose graph pipeline --view lifecycle -o order.png  draw the bring-up order",
-        "compose graph frames --view frames -o frames.svg       draw the frames of tf2",
-        "compose graph pipeline -f dot | dot -Tpdf > p.pdf     use Graphviz",
-        "compose graph pipeline robot -o both.svg               draw several systems together",
-        "compose graph --live -o now.html                      draw the running ROS graph",
-    )
-}
+EPILOG = examples(
+    "compose graph systems/pipeline.yaml                   print Mermaid text",
+    "compose graph pipeline -o pipeline.html               write an interactive page",
+    "compose graph pipeline -o pipeline.svg                write an image",
+    "compose graph pipeline --view lifecycle -o order.png  draw the bring-up order",
+    "compose graph frames --view frames -o frames.svg       draw the frames of tf2",
+    "compose graph pipeline -f dot | dot -Tpdf > p.pdf     use Graphviz",
+    "compose graph pipeline robot -o both.svg               draw several systems together",
+    "compose graph --live -o now.html                      draw the running ROS graph",
+)
 
 #: Views of what only a file declares.
 _DECLARED_ONLY = (View.LIFECYCLE, View.FRAMES)

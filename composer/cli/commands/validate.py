@@ -28,17 +28,15 @@ if TYPE_CHECKING:
     from composer.base.diagnostics import Diagnostic
     from composer.project import Project
 
-EPILOGS = {
-    "validate": examples(
-        "compose validate systems nodes",
-        "compose validate systems/pipeline.yaml --strict",
-        "compose validate systems --format sarif > report.sarif",
-        "compose validate systems --ignore qos-implicit --ignore RC5",
-        "cat pipeline.yaml | compose validate -",
-        "compose validate --explain RC202      what a rule is about, with examples",
-        "compose validate --explain RC         list all rules",
-    )
-}
+EPILOG = examples(
+    "compose validate systems nodes",
+    "compose validate systems/pipeline.yaml --strict",
+    "compose validate systems --format sarif > report.sarif",
+    "compose validate systems --ignore qos-implicit --ignore RC5",
+    "cat pipeline.yaml | compose validate -",
+    "compose validate --explain RC202      what a rule is about, with examples",
+    "compose validate --explain RC         list all rules",
+)
 
 
 _STDIN = Path("-")

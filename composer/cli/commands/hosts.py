@@ -21,6 +21,7 @@ from composer.cli.support.hosts import (
     write_staying,
 )
 from composer.cli.support.options import (
+    START_OPTIONS,
     AllOrNothing,
     AutostartTo,
     LogLevelOption,
@@ -29,7 +30,7 @@ from composer.cli.support.options import (
     UseSimTime,
     command_group,
     examples,
-    options_of_run,
+    given_options,
 )
 from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.process import compose_command
@@ -47,9 +48,7 @@ hosts_app = command_group(
 
     The system declares its 'hosts', and which process runs on which host. 'compose doctor --hosts'
     checks the other computers.
-    """,
-    "compose hosts sync robot.yaml",
-    "compose hosts run robot.yaml",
+    """
 )
 
 
@@ -61,14 +60,15 @@ hosts_app = command_group(
     ),
 )
 def run(
+    context: typer.Context,
     system: SystemName,
     *,
     settings: Settings = None,
     namespace: Namespace = None,
     use_sim_time: UseSimTime = False,
-    autostart: AutostartTo = None,
-    log_level: LogLevelOption = None,
-    all_or_nothing: AllOrNothing = False,
+    autostart: AutostartTo = None,  # noqa: ARG001 - given_options passes them on
+    log_level: LogLevelOption = None,  # noqa: ARG001
+    all_or_nothing: AllOrNothing = False,  # noqa: ARG001
 ) -> None:
     """Run a system on all of its hosts.
 
@@ -84,10 +84,7 @@ def run(
     from composer.client.hosts.start import remote_processes, run_on_hosts
     from composer.client.hosts.used_files import question_about
 
-    start = options_of_run(
-        settings or (), namespace, autostart, log_level, use_sim_time=use_sim_time
-    )
-    start += ["--all-or-nothing"] if all_or_nothing else []
+    start = given_options(context, (*START_OPTIONS, "all_or_nothing"))
     processes = remote_processes(declared)
     check_workspaces([item.host for item in processes])
     question = question_about(declared, result.project.root / relative, result.project)

@@ -20,11 +20,7 @@ new_app = command_group(
 
     Systems, node types and interface packages that are created are valid and have a test. Existing
     files are not replaced.
-    """,
-    "compose new project my_robot        a project in the folder my_robot",
-    "compose new node planner            nodes/planner.yaml and nodes/planner.py",
-    "compose new system arm              systems/arm.yaml",
-    "compose new interfaces my_msgs      interfaces/my_msgs",
+    """
 )
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.support.errors import FAILED, UsageError
+from composer.cli.support.errors import FAILED
 from composer.cli.support.options import (
     Autostart,
     AutostartTo,
@@ -29,15 +29,13 @@ if TYPE_CHECKING:
     from composer.model import System
     from composer.plan.drift import Drift, Snapshot
 
-EPILOGS = {
-    "diff": examples(
-        "compose diff pipeline                         exit with 1 if there are differences",
-        "compose diff systems/pipeline.yaml --json     print JSON",
-        "compose diff pipeline --watch                 print changes until Ctrl-C",
-        "compose diff pipeline --ignore '/rviz*'       ignore undeclared nodes",
-        "compose diff pipeline --autostart inactive    as given to compose run",
-    )
-}
+EPILOG = examples(
+    "compose diff pipeline                         exit with 1 if there are differences",
+    "compose diff systems/pipeline.yaml --json     print JSON",
+    "compose diff pipeline --watch                 print changes until Ctrl-C",
+    "compose diff pipeline --ignore '/rviz*'       ignore undeclared nodes",
+    "compose diff pipeline --autostart inactive    as given to compose run",
+)
 
 _TIMEOUT_S = 10.0
 _GRACE_S = 2.0
@@ -67,17 +65,6 @@ def diff(
             "--watch", "-w", help="Keep comparing; print differences as they appear and resolve."
         ),
     ] = False,
-    watch_for: Annotated[
-        float | None,
-        typer.Option(
-            "--for",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
-            help="Stop --watch after this time.",
-            show_default="until Ctrl-C",
-        ),
-    ] = None,
     grace: Annotated[
         float,
         typer.Option(
@@ -96,12 +83,6 @@ def diff(
 
     Exit code 1 if there are differences.
     """
-    if watch_for is not None and not watch:
-        raise UsageError("--for needs --watch")
-    if watch_for is not None and watch_for <= grace:
-        raise UsageError(
-            f"--for {watch_for:g} is not longer than --grace {grace:g}: nothing would be reported"
-        )
     declared = runnable_system(system, settings=settings or (), namespace=namespace).system
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
@@ -109,7 +90,7 @@ def diff(
 
         with GraphObserver(session) as observer:
             if watch:
-                remaining = _watched(observer, compare, (timeout, grace, watch_for), json=json)
+                remaining = _watched(observer, compare, timeout, grace, json=json)
             else:
                 remaining = _settled(observer, compare, deadline.left_s, grace)
                 _print(declared, remaining, json=json)
@@ -144,26 +125,25 @@ def _settled(
 def _watched(
     observer: GraphObserver,
     compare: Compare,
-    seconds: tuple[float, float, float | None],
+    timeout_s: float,
+    grace_s: float,
     *,
     json: bool,
 ) -> tuple[Drift, ...]:
-    """Print changes until Ctrl-C or the end of the time; return the remaining differences."""
+    """Print changes until Ctrl-C; return the remaining differences."""
     from composer.client.session import Deadline
     from composer.plan.drift import Debouncer
 
-    timeout_s, grace_s, watch_for_s = seconds
-    end = Deadline(watch_for_s if watch_for_s is not None else float("inf"))
     debouncer = Debouncer(grace_s)
     try:
-        while not end.passed:
-            drifts = compare(observer.snapshot(Deadline(min(timeout_s, end.left_s))))
+        while True:
+            drifts = compare(observer.snapshot(Deadline(timeout_s)))
             change = debouncer.update(time.monotonic(), drifts)
             for drift in change.resolved:
                 write(_event("resolved", drift, json=json))
             for drift in change.appeared:
                 write(_event("drift", drift, json=json))
-            time.sleep(min(_PAUSE_S, end.left_s))
+            time.sleep(_PAUSE_S)
     except KeyboardInterrupt:
         pass  # the normal way to stop
     return debouncer.reported

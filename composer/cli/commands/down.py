@@ -7,13 +7,11 @@ from composer.cli.support.output.terminal import lines, write
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import RunningSystem, running_system_name
 
-EPILOGS = {
-    "down": examples(
-        "compose down pipeline",
-        "compose down systems/pipeline.yaml",
-        "compose down /robot1/pipeline",
-    )
-}
+EPILOG = examples(
+    "compose down pipeline",
+    "compose down systems/pipeline.yaml",
+    "compose down /robot1/pipeline",
+)
 
 
 def down(system: RunningSystem, timeout: Timeout = CHANGE_TIMEOUT_S) -> None:

@@ -31,15 +31,13 @@ from composer.cli.support.system_arguments import (
 if TYPE_CHECKING:
     from composer.dashboard.declared import Declared
 
-EPILOGS = {
-    "dashboard": examples(
-        "compose dashboard                            the whole ROS graph",
-        "compose dashboard systems/pipeline.yaml      with source lines, plan and drift",
-        "compose dashboard --open                     open the browser",
-        "compose dashboard --read-only                change nothing",
-        "compose dashboard --host 0.0.0.0 --token-file token    for other computers",
-    )
-}
+EPILOG = examples(
+    "compose dashboard                            the whole ROS graph",
+    "compose dashboard systems/pipeline.yaml      with source lines, plan and drift",
+    "compose dashboard --open                     open the browser",
+    "compose dashboard --read-only                change nothing",
+    "compose dashboard --host 0.0.0.0 --token-file token    for other computers",
+)
 _HIGHEST_PORT = 65535
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.commands.ros.graph import NodeName
+from composer.cli.commands.nodes import NodeName
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import (
@@ -31,13 +31,7 @@ if TYPE_CHECKING:
     from composer.model.resolve.parameter_files import ParameterFiles
     from composer.runtime.ros.parameter_description import ParameterDescription
 
-param_app = command_group(
-    "List, get and set parameters of running nodes.",
-    "compose param list planner",
-    "compose param get planner max_velocity",
-    "compose param set planner max_velocity 0.5",
-    "compose param dump planner > planner.yaml",
-)
+param_app = command_group("List, get and set parameters of running nodes.")
 
 Name = Annotated[str, typer.Argument(metavar="PARAMETER")]
 

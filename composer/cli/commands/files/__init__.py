@@ -1,1 +1,0 @@
-"""Commands for the files of systems, node types and projects."""
