@@ -6,7 +6,7 @@ report it.
 
 from composer.model.dependencies import Channel, PortOfNode, channels
 from composer.model.discovery import Discovery, DiscoveryKind
-from composer.model.hosts import Host
+from composer.model.hosts import Host, Process
 from composer.model.implementation import (
     BehaviorReference,
     Executable,
@@ -15,6 +15,21 @@ from composer.model.implementation import (
     HostedClass,
     ImplementationKind,
     LifecycleKind,
+)
+from composer.model.node import (
+    DEFAULT_INTROSPECTION,
+    DEFAULT_SUPERVISION,
+    DRIVEN_BY_MANAGER,
+    Dependency,
+    Introspection,
+    Node,
+    OnFailure,
+    PrimaryState,
+    Remapping,
+    RestartBudget,
+    Supervision,
+    UnknownKey,
+    Watch,
 )
 from composer.model.ports import (
     SEVERITIES,
@@ -39,33 +54,18 @@ from composer.model.ports import (
     Timer,
     TimerClock,
 )
-from composer.model.processes import Process, member_system
-from composer.model.supervision import (
-    DEFAULT_INTROSPECTION,
-    DEFAULT_SUPERVISION,
-    DRIVEN_BY_MANAGER,
-    Introspection,
-    OnFailure,
-    RestartBudget,
-    Supervision,
-    Watch,
-)
 from composer.model.system import (
     DEFAULT_EXECUTOR,
     Chain,
     Connection,
-    Dependency,
     Endpoint,
     Executor,
     ExecutorKind,
     NamedQos,
-    Node,
-    PrimaryState,
     QosReference,
-    Remapping,
     System,
-    UnknownKey,
     UnmatchedParameters,
+    member_system,
 )
 from composer.model.transforms import (
     POSE_TYPES,

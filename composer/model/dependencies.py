@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 
 from composer.base.fast_dataclass import dataclass
+from composer.model.node import Node, PrimaryState
 from composer.model.ports import ChannelKind, Port, PortKind
-from composer.model.system import Node, PrimaryState, System
+from composer.model.system import System
 
 
 @dataclass(frozen=True, slots=True)

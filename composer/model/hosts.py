@@ -1,8 +1,9 @@
-"""The computers of a system."""
+"""The processes of a system, each with some of its nodes, and the computers that run them."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import field
 from pathlib import Path, PurePosixPath
@@ -16,6 +17,29 @@ HIGHEST_DOMAIN_ID = 232
 #: RFC 1123, as Kubernetes and docker compose accept it for names.
 _DNS_LABEL = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 _USER = re.compile(r"\w[\w.+-]*")
+
+
+#: ROS reads from it in which enclave a process is.
+ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """A process with nodes of the system.
+
+    ``nodes`` are the nodes that it names; a node may also name its process itself. ``cpus`` and
+    ``priority`` are as for executors, and apply to all of its threads. If it uses more than
+    ``memory_mb`` of memory, it fails. Without a ``host``, it runs on the computer of the system.
+    """
+
+    name: Located[str]
+    span: Span = field(compare=False)
+    nodes: tuple[Located[str], ...] = ()
+    cpus: tuple[int, ...] = ()
+    priority: int | None = None
+    environment: tuple[tuple[Located[str], str], ...] = ()
+    memory_mb: Located[float] | None = None
+    host: Located[str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +66,15 @@ class Host:
     def login(self) -> str:
         """The address, with the user if that is set: ``robot@192.168.1.20``."""
         return self.address.value if self.user is None else f"{self.user}@{self.address}"
+
+
+def own_enclave(environment: Mapping[str, str], full_name: str) -> dict[str, str]:
+    """Return the variable for a process of a system, if ``environment`` sets an enclave at all.
+
+    As in the policy that ``compose export sros2`` writes, the enclave of a process is its full
+    name.
+    """
+    return {ENCLAVE_VARIABLE: full_name} if environment.get(ENCLAVE_VARIABLE) else {}
 
 
 def key_file(name: str, root: Path) -> Path:

@@ -18,8 +18,8 @@ from composer.model import (
     System,
 )
 from composer.model.discovery import is_loopback
+from composer.model.hosts import ENCLAVE_VARIABLE, own_enclave
 from composer.model.names import join
-from composer.model.processes import ENCLAVE_VARIABLE, own_enclave
 
 #: Longer than --grace of compose run, by which the process ends in any case.
 STOP_WITHIN_S = 15

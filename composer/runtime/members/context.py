@@ -11,7 +11,7 @@ from rclpy.node import Node as RosNode
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Process
-from composer.model.processes import own_enclave
+from composer.model.hosts import own_enclave
 from composer.runtime.children.child_processes import ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.kept_goals import KeptGoals
