@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 
 from composer.base.fast_dataclass import dataclass
+from composer.base.graphs import cycles, strong_groups
 from composer.model.node import Node, PrimaryState
 from composer.model.ports import ChannelKind, Port, PortKind
 from composer.model.system import System
@@ -115,7 +116,7 @@ def _dependency_edges(system: System) -> tuple[DependencyEdge, ...]:
     implied = tuple(implied_edges(system))
     group = {
         name: number
-        for number, names in enumerate(_strong_groups(_graph(system, declared + implied)))
+        for number, names in enumerate(strong_groups(_graph(system, declared + implied)))
         for name in names
     }
     return declared + tuple(edge for edge in implied if group[edge.node] != group[edge.on])
@@ -136,14 +137,7 @@ def dependency_cycles(system: System) -> tuple[tuple[str, ...], ...]:
     ``("a", "b")`` means that a depends on b, which depends on a. Each cycle starts at its first
     declared node; cycles are ordered by these nodes.
     """
-    graph = _graph(system, declared_edges(system))
-    rank = {name: index for index, name in enumerate(graph)}
-    cycles = []
-    for names in _strong_groups(graph):
-        first = min(names, key=rank.__getitem__)
-        if len(names) > 1 or first in graph[first]:
-            cycles.append(_shortest_cycle(graph, first, set(names)))
-    return tuple(sorted(cycles, key=lambda cycle: rank[cycle[0]]))
+    return cycles(_graph(system, declared_edges(system)))
 
 
 def in_dependency_order(system: System) -> tuple[str, ...]:
@@ -178,9 +172,6 @@ def _in_dependency_order(system: System) -> tuple[str, ...]:
     return tuple(placed)
 
 
-Graph = Mapping[str, Mapping[str, None]]
-
-
 def _graph(
     system: System, edges: Sequence[DependencyEdge] | Iterator[DependencyEdge]
 ) -> dict[str, dict[str, None]]:
@@ -189,66 +180,3 @@ def _graph(
     for edge in edges:
         graph[edge.node][edge.on] = None
     return graph
-
-
-def _strong_groups(graph: Graph) -> Iterator[tuple[str, ...]]:
-    """Yield the strongly connected components (Tarjan's algorithm), without recursion."""
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    open_names: dict[str, None] = {}
-    for root in graph:
-        if root in index:
-            continue
-        index[root] = low[root] = len(index)
-        open_names[root] = None
-        path = [(root, iter(graph[root]))]
-        while path:
-            name, rest = path[-1]
-            successor = next(rest, None)
-            if successor is None:
-                path.pop()
-                if path:
-                    parent = path[-1][0]
-                    low[parent] = min(low[parent], low[name])
-                if low[name] == index[name]:
-                    yield _close(open_names, name)
-            elif successor not in index:
-                index[successor] = low[successor] = len(index)
-                open_names[successor] = None
-                path.append((successor, iter(graph[successor])))
-            elif successor in open_names:
-                low[name] = min(low[name], index[successor])
-
-
-def _close(open_names: dict[str, None], name: str) -> tuple[str, ...]:
-    """Remove and return ``name`` and all names opened after it."""
-    group = []
-    while True:
-        last, _ = open_names.popitem()
-        group.append(last)
-        if last == name:
-            return tuple(group)
-
-
-def _shortest_cycle(graph: Graph, start: str, allowed: set[str]) -> tuple[str, ...]:
-    """Return the shortest path from ``start`` back to itself within a component."""
-    came_from: dict[str, str] = {}
-    frontier = [start]
-    while frontier:
-        reached = []
-        for name in frontier:
-            for other in graph[name]:
-                if other == start:
-                    return _path_back(came_from, start, name)
-                if other in allowed and other not in came_from:
-                    came_from[other] = name
-                    reached.append(other)
-        frontier = reached
-    return (start,)
-
-
-def _path_back(came_from: Mapping[str, str], start: str, last: str) -> tuple[str, ...]:
-    path = [last]
-    while path[-1] != start:
-        path.append(came_from[path[-1]])
-    return tuple(reversed(path))

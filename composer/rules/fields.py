@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, error, warning
 from composer.interfaces import Interfaces, Message
-from composer.interfaces.field_types import constant_problem, enumerator_problem
+from composer.interfaces.field_types.constants import constant_problem, enumerator_problem
 from composer.language.templates import Constant, Items, Record, Template
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.expressions import message_templates

@@ -9,7 +9,7 @@ from dataclasses import replace
 from composer.base.diagnostics import Diagnostic, Label, Subject, error
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.interfaces.field_types import Problem
+from composer.interfaces.field_types.types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
 from composer.model.names import join
 from composer.rules.analysis.context import Context

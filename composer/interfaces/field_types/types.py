@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
+from dataclasses import replace
 from itertools import takewhile
 from typing import TypeAlias
 
@@ -86,8 +87,8 @@ class PathProblem:
     """A path that cannot be resolved; ``index`` is the invalid part."""
 
     message: str
-    index: int
     hint: str | None = None
+    index: int = 0
 
 
 def parameter_type(declared: str, choices: Iterable[Plain] = ()) -> ValueType:
@@ -125,8 +126,8 @@ def resolve_path(
     while index < len(parts):
         name, taken = _next_name(found, parts[index:])
         step = _element(found, name) if isinstance(name, int) else _field(found, name, interfaces)
-        if isinstance(step, _PathFailure):
-            return PathProblem(step.message, index, step.hint)
+        if isinstance(step, PathProblem):
+            return replace(step, index=index)
         found, index = step, index + taken
     return found
 
@@ -150,34 +151,36 @@ def fields_of(type_: ValueType, interfaces: Interfaces) -> Message | None:
 
 def is_number(type_: ValueType) -> bool:
     """Return whether values of the type are numbers."""
-    return is_integer(type_) or (
-        isinstance(type_, FieldType) and not type_.is_array and type_.name in FLOATS
-    )
+    return is_integer(type_) or _is_one_of(type_, FLOATS)
 
 
 def is_integer(type_: ValueType) -> bool:
     """Return whether values of the type are integers."""
-    return isinstance(type_, FieldType) and not type_.is_array and type_.name in INTEGER_RANGES
+    return _is_one_of(type_, INTEGER_RANGES)
 
 
 def is_string(type_: ValueType) -> bool:
     """Return whether values of the type are strings."""
-    return isinstance(type_, FieldType) and not type_.is_array and type_.name in TEXTS
+    return _is_one_of(type_, TEXTS)
 
 
 def is_bool(type_: ValueType) -> bool:
     """Return whether values of the type are bools."""
-    return isinstance(type_, FieldType) and not type_.is_array and type_.name == "bool"
+    return _is_one_of(type_, ("bool",))
+
+
+def is_seconds(type_: ValueType) -> bool:
+    """Return whether a number is converted to it as seconds: Time and Duration."""
+    return _is_one_of(type_, _SECONDS)
+
+
+def _is_one_of(type_: ValueType, names: Container[str]) -> bool:
+    return isinstance(type_, FieldType) and not type_.is_array and type_.name in names
 
 
 def is_array(type_: ValueType) -> bool:
     """Return whether values of the type are lists."""
     return isinstance(type_, FieldType) and type_.is_array
-
-
-def is_seconds(type_: ValueType) -> bool:
-    """Return whether a number is converted to it as seconds: Time and Duration."""
-    return isinstance(type_, FieldType) and not type_.is_array and type_.name in _SECONDS
 
 
 def described(type_: ValueType) -> str:
@@ -193,26 +196,20 @@ def described(type_: ValueType) -> str:
             return "a map"
 
 
-@dataclass(frozen=True, slots=True)
-class _PathFailure:
-    message: str
-    hint: str | None = None
-
-
-def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _PathFailure:
+def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | PathProblem:
     if isinstance(type_, Mapping):
         found = type_.get(name)
         return (
             found
             if found is not None
-            else _PathFailure(f"'{name}' does not exist", suggestion(name, type_))
+            else PathProblem(f"'{name}' does not exist", suggestion(name, type_))
         )
     if isinstance(type_, FieldType) and type_.is_array:
-        return _PathFailure(
+        return PathProblem(
             f"{type_} has no field '{name}'", "it is a list: use an index, as in [0]"
         )
     if isinstance(type_, FieldType) and type_.is_primitive:
-        return _PathFailure(f"{type_} has no field '{name}'", "it is a value, not a message")
+        return PathProblem(f"{type_} has no field '{name}'", "it is a value, not a message")
     message = fields_of(type_, interfaces)
     if message is None:  # an unknown type or message
         return ANYTHING
@@ -220,15 +217,15 @@ def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | _
     if field is not None:
         return field.type
     hint = suggestion(name, message.field_names)
-    return _PathFailure(f"{message.name} has no field '{name}'", hint)
+    return PathProblem(f"{message.name} has no field '{name}'", hint)
 
 
-def _element(type_: ValueType, index: int) -> ValueType | _PathFailure:
+def _element(type_: ValueType, index: int) -> ValueType | PathProblem:
     if isinstance(type_, Anything):
         return ANYTHING
     if not isinstance(type_, FieldType) or not type_.is_array:
-        return _PathFailure(f"{described(type_)} has no elements")
+        return PathProblem(f"{described(type_)} has no elements")
     limit = type_.array_size if type_.array_size is not None else type_.array_bound
     if limit is not None and not -limit <= index < limit:
-        return _PathFailure(f"{type_} has no element {index}")
+        return PathProblem(f"{type_} has no element {index}")
     return type_.element

@@ -84,7 +84,7 @@ def _evaluate(substitution: Substitution, given: Map[str, Entry]) -> list[Diagno
         for name, variable in scope.declared.items()
         if variable.value is not None and name not in given
     }
-    order, cycles = dependency_order({name: set(references(own[name])) for name in own})
+    order, cycles = dependency_order({name: [*references(own[name])] for name in own})
     for name in order:
         scope.values[name] = substitution.evaluate(own[name])
     return [_cycle(cycle, scope) for cycle in cycles]
@@ -133,7 +133,7 @@ def _declared_in(tree: Mapping) -> tuple[Label, ...]:
     return (Label(name.span, "declared here"),) if name is not None else ()
 
 
-def _cycle(names: list[str], scope: Scope) -> Diagnostic:
+def _cycle(names: tuple[str, ...], scope: Scope) -> Diagnostic:
     first, *others = names[:_MAX_CYCLE_NAMES]
     rest = ["..."] if len(names) > _MAX_CYCLE_NAMES else []
     written = " -> ".join([*map(shown, (first, *others)), *rest, shown(first)])

@@ -78,7 +78,7 @@ class _Copies:
         """Return the message without the names that differ between copies."""
         if not self.names:
             return diagnostic.message
-        if "${" in _written(diagnostic.primary):
+        if "${" in diagnostic.primary.text:
             return _QUOTED.sub("''", diagnostic.message)
         message = _QUOTED.sub(self._without_name, diagnostic.message)
         return _WORD.sub(lambda word: "" if word[0] in self.names else word[0], message)
@@ -93,9 +93,5 @@ class _Copies:
 
 def _prefix(name: Located[str]) -> str:
     """Return the prefix that was added to a name; empty if the written name is another."""
-    written = _written(name.span).strip("'\"")
+    written = name.span.text
     return name.value[: -len(written)] if written and name.value.endswith(written) else ""
-
-
-def _written(span: Span) -> str:
-    return span.file.line(span.line)[span.column - 1 :][: span.length]

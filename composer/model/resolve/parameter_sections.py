@@ -213,8 +213,7 @@ def _name_without_prefix(node: Node) -> str | None:
     """
     if node.own_name is not None:
         return None
-    span = node.name.span
-    text = span.file.line(span.line)[span.column - 1 :][: span.length].strip("'\"")
+    text = node.name.span.text
     if not text or text == node.name.value or not node.name.value.endswith(text):
         return None
     return join(node.namespace.value, text)

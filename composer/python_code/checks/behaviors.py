@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from composer.base.diagnostics import suggestion
-from composer.interfaces.field_types import STATUS, Word
+from composer.interfaces.field_types.types import STATUS, Word
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.nodes import array_length, published_port, reached_methods
 from composer.python_code.problems import Family, Problem

@@ -7,7 +7,11 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import suggestion
 from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
-from composer.interfaces.field_types import constant_problem, enumerator_problem, enumerators
+from composer.interfaces.field_types.constants import (
+    constant_problem,
+    enumerator_problem,
+    enumerators,
+)
 from composer.python_code.checks.scopes import NodeScope
 from composer.python_code.problems import Family, Problem
 from composer.python_code.trees import dotted, span_of

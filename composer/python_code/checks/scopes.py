@@ -14,7 +14,7 @@ from functools import cached_property
 
 from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Field, FieldType, Interfaces, Message, parts
-from composer.interfaces.field_types import ANYTHING, ValueType, fields_of
+from composer.interfaces.field_types.types import ANYTHING, ValueType, fields_of
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures

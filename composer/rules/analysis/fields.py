@@ -7,17 +7,17 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Action, Message, Service
-from composer.interfaces.field_types import (
+from composer.interfaces.field_types.checker import FieldChecker
+from composer.interfaces.field_types.constants import constant_problem
+from composer.interfaces.field_types.types import (
     ANYTHING,
     BOOL,
     INTEGER,
     NUMBER,
     STATUS,
     STRING,
-    FieldChecker,
     Problem,
     ValueType,
-    constant_problem,
     described,
     is_bool,
     is_number,

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.interfaces import Interfaces
-from composer.interfaces.field_types import INTEGER, NUMBER, STRING, FieldChecker, Scope, type_of
+from composer.interfaces.field_types.checker import FieldChecker
+from composer.interfaces.field_types.types import INTEGER, NUMBER, STRING, Scope, type_of
 from composer.language.expressions import EvaluationError
 from composer.runtime.ros.messages import MessageError, compile_message, interface_class
 from tests.examples import examples

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from composer.base.source import SourceFile, Span
 from composer.interfaces import Field, FieldType, Interfaces, Message
-from composer.interfaces.field_types import (
+from composer.interfaces.field_types.checker import FieldChecker
+from composer.interfaces.field_types.types import (
     INTEGER,
     NUMBER,
     STRING,
-    FieldChecker,
     Problem,
     Scope,
     parameter_type,

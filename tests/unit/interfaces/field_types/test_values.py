@@ -8,7 +8,7 @@ import pytest
 
 from composer.base.source import Span
 from composer.interfaces import FieldType, Message
-from composer.interfaces.field_types import (
+from composer.interfaces.field_types.types import (
     ANYTHING,
     INTEGER,
     PathProblem,
