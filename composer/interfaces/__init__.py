@@ -21,23 +21,3 @@ from composer.interfaces.definitions import (
 )
 from composer.interfaces.index import Interfaces, InvalidDefinition
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
-
-__all__ = [
-    "FLOATS",
-    "INTEGER_RANGES",
-    "PRIMITIVES",
-    "TEXTS",
-    "Action",
-    "DefinitionError",
-    "Field",
-    "FieldType",
-    "Interface",
-    "Interfaces",
-    "InvalidDefinition",
-    "Message",
-    "MessageConstant",
-    "Service",
-    "parse_definition",
-    "parts",
-    "split_name",
-]

@@ -13,6 +13,8 @@ from composer.base.source import Located, Span
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 E = TypeVar("E", bound=StrEnum)
+T = TypeVar("T")
+D = TypeVar("D")
 
 #: Placeholder for a missing text. Like any text with a load-time variable without value, it is not
 #: checked, so that one mistake gives one diagnostic.
@@ -54,8 +56,7 @@ def texts(tree: Tree | None) -> tuple[Located[str], ...]:
 
 def plain_text(tree: Tree | None) -> str:
     """Return a text without its location; empty by default."""
-    found = text(tree)
-    return found.value if found is not None else ""
+    return value_or(text(tree), "")
 
 
 def text_or_opaque(tree: Tree | None, span: Span) -> Located[str]:
@@ -94,6 +95,11 @@ def choice(tree: Tree | None, kind: type[E]) -> Located[E] | None:
     if written is None or written.value not in known:
         return None
     return written.map(known.__getitem__)
+
+
+def value_or(found: Located[T] | None, default: D) -> T | D:
+    """Return a value without its location; ``default`` if there is none."""
+    return default if found is None else found.value
 
 
 def flag(tree: Tree | None, default: bool) -> bool:

@@ -20,17 +20,3 @@ from composer.language.expressions.expression import (
 )
 from composer.language.expressions.operations import CONSTANTS, FUNCTIONS
 from composer.language.expressions.syntax import MAXIMUM_LENGTH, MAXIMUM_NODES
-
-__all__ = [
-    "CONSTANTS",
-    "FUNCTIONS",
-    "MAXIMUM_LENGTH",
-    "MAXIMUM_NODES",
-    "EvaluationError",
-    "Expression",
-    "ExpressionError",
-    "FieldPath",
-    "compile_expression",
-    "map_key",
-    "path_of",
-]

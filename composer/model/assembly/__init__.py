@@ -17,11 +17,11 @@ from composer.language.tree import Mapping
 from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
-from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit
+from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit, read_node_type
 from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits, LimitExceeded
 from composer.project import Project
 
-__all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit"]
+__all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit", "read_node_type"]
 
 
 #: Rules about nodes that are missing or have the wrong names.

@@ -55,6 +55,16 @@ class Inherited:
         return {file.source.path: file.path.parent for file in self.files}
 
 
+def read_node_type(path: Path, diagnostics: list[Diagnostic]) -> NodeTypeFile | None:
+    """Return the file at ``path``; None if it cannot be read, or is no node type."""
+    tree, source, found = read_document(path)
+    diagnostics += found
+    wrong_kind = None if tree is None else check_kind(tree, source, (NODE,))
+    if wrong_kind is not None:
+        diagnostics.append(wrong_kind)
+    return None if tree is None or wrong_kind else NodeTypeFile(path, source, tree)
+
+
 def inherit(file: NodeTypeFile) -> Inherited:
     """Return the node type in ``file`` merged with the types that it extends.
 
@@ -104,17 +114,11 @@ def _base(
     if len(files) > MAX_INCLUDE_DEPTH:
         message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
         raise LimitExceeded(message, name.span, "extend the base type directly")
-    tree, source, found = read_document(path)
-    diagnostics += found
-    if tree is None:
-        return None
-    limits.count("characters", len(source.text), name.span)
-    limits.count("values", measure(tree).values, name.span)
-    wrong_kind = check_kind(tree, source, (NODE,))
-    if wrong_kind is not None:
-        diagnostics.append(wrong_kind)
-        return None
-    return NodeTypeFile(path, source, tree)
+    file = read_node_type(path, diagnostics)
+    if file is not None:
+        limits.count("characters", len(file.source.text), name.span)
+        limits.count("values", measure(file.tree).values, name.span)
+    return file
 
 
 def _cycle(files: list[NodeTypeFile]) -> Diagnostic:

@@ -18,6 +18,7 @@ from composer.language.tree_values import (
     plain_text,
     text,
     texts,
+    value_or,
     word,
 )
 from composer.model import (
@@ -93,7 +94,7 @@ def read_external(entry: Entry | None) -> External | None:
         return None
     return External(
         entry.key.span,
-        lifecycle=_lifecycle(tree.get("lifecycle")),
+        lifecycle=value_or(choice(tree.get("lifecycle"), LifecycleKind), LifecycleKind.NONE),
         ready_timeout_ms=number(tree.get("ready_timeout_ms")),
     )
 
@@ -104,7 +105,6 @@ def _reference(written: Located[str], folders: SourceFolders) -> BehaviorReferen
 
 
 def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
-    kind = choice(tree.get("kind"), ExecutableKind)
     default = Executable(entry.key.span, folder)
     return Executable(
         entry.key.span,
@@ -116,27 +116,17 @@ def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
         nodes=texts(tree.get("nodes")) if isinstance(tree.get("nodes"), Sequence) else None,
         environment=environment(tree.get("environment")),
         working_directory=text(tree.get("working_directory")),
-        kind=default.kind if kind is None else kind.value,
-        lifecycle=_lifecycle(tree.get("lifecycle")),
+        kind=value_or(choice(tree.get("kind"), ExecutableKind), default.kind),
+        lifecycle=value_or(choice(tree.get("lifecycle"), LifecycleKind), LifecycleKind.NONE),
         ready_timeout_ms=number(tree.get("ready_timeout_ms")),
-        sigterm_timeout_ms=_milliseconds(
-            tree.get("sigterm_timeout_ms"), default.sigterm_timeout_ms
+        sigterm_timeout_ms=value_or(
+            number(tree.get("sigterm_timeout_ms")), default.sigterm_timeout_ms
         ),
-        sigkill_timeout_ms=_milliseconds(
-            tree.get("sigkill_timeout_ms"), default.sigkill_timeout_ms
+        sigkill_timeout_ms=value_or(
+            number(tree.get("sigkill_timeout_ms")), default.sigkill_timeout_ms
         ),
         given=tuple(key(item) for item in tree),
     )
-
-
-def _lifecycle(tree: Tree | None) -> LifecycleKind:
-    written = choice(tree, LifecycleKind)
-    return LifecycleKind.NONE if written is None else written.value
-
-
-def _milliseconds(tree: Tree | None, default: float) -> float:
-    written = number(tree)
-    return default if written is None else written.value
 
 
 def _words(tree: Tree | None) -> tuple[Located[str], ...]:

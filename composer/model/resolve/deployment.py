@@ -19,6 +19,7 @@ from composer.language.tree_values import (
     number,
     text,
     texts,
+    value_or,
 )
 from composer.model import Host, Process
 from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
@@ -40,13 +41,12 @@ def processes_of_nodes(processes: Iterable[Process]) -> Map[str, Located[str]]:
 
 def _process(entry: Entry) -> Process:
     tree = mapping(entry)
-    priority = integer(tree.get("priority"))
     return Process(
         name=key(entry),
         span=entry.key.span,
         nodes=texts(tree.get("nodes")),
         cpus=integers(tree.get("cpus")),
-        priority=None if priority is None else priority.value,
+        priority=value_or(integer(tree.get("priority")), None),
         environment=environment(tree.get("environment")),
         memory_mb=number(tree.get("memory_mb")),
         host=text(tree.get("host")),
@@ -60,25 +60,19 @@ def read_hosts(tree: Tree | None) -> tuple[Host, ...]:
 
 def _host(entry: Entry) -> Host:
     tree = mapping(entry)
-    port = integer(tree.get("port"))
     return Host(
         name=key(entry),
         span=entry.key.span,
         address=text(tree.get("address")) or key(entry),
-        port=None if port is None else port.value,
+        port=value_or(integer(tree.get("port")), None),
         user=text(tree.get("user")),
         workspace=text(tree.get("workspace")),
-        python=_plain(tree.get("python")),
+        python=value_or(text(tree.get("python")), None),
         setup=tuple(item.value for item in texts(tree.get("setup"))),
         environment=environment(tree.get("environment")),
-        identity_file=_plain(tree.get("identity_file")),
-        known_hosts=_plain(tree.get("known_hosts")),
+        identity_file=value_or(text(tree.get("identity_file")), None),
+        known_hosts=value_or(text(tree.get("known_hosts")), None),
     )
-
-
-def _plain(tree: Tree | None) -> str | None:
-    found = text(tree)
-    return None if found is None else found.value
 
 
 def read_discovery(entry: Entry | None) -> Discovery | None:
@@ -89,13 +83,12 @@ def read_discovery(entry: Entry | None) -> Discovery | None:
     kind = choice(tree.get("kind"), DiscoveryKind)
     if kind is None:
         return None
-    port = integer(tree.get("port"))
     return Discovery(
         kind=kind,
         span=entry.key.span,
         interfaces=texts(tree.get("interfaces")),
         addresses=texts(tree.get("address")),
-        port=DEFAULT_SERVER_PORT if port is None else port.value,
+        port=value_or(integer(tree.get("port")), DEFAULT_SERVER_PORT),
         start=flag(tree.get("start"), default=False),
         peers=texts(tree.get("peers")),
         given=tuple(key(item) for item in entries(tree)),

@@ -10,7 +10,7 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.tree import Entry, Mapping, Sequence, Tree
 from composer.language.tree_values import (
     choice,
     entries,
@@ -21,6 +21,7 @@ from composer.language.tree_values import (
     plain_text,
     text,
     text_or_opaque,
+    value_or,
 )
 from composer.model import (
     DRIVEN_BY_MANAGER,
@@ -153,7 +154,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         log_level=choice(tree.get("log_level"), LogLevel),
         required=flag(tree.get("required"), default=True),
         depends_on=_dependencies(lifecycle.get("depends_on")),
-        autostart=state(lifecycle.get("autostart")),
+        autostart=choice(lifecycle.get("autostart"), PrimaryState),
         supervision=read_supervision(lifecycle, context.supervision),
         introspection=DRIVEN_BY_MANAGER
         if external is not None or declared.implementation.executable is not None
@@ -282,12 +283,4 @@ def _dependencies(tree: Tree | None) -> tuple[Dependency, ...]:
 
 
 def _dependency(entry: Entry) -> Dependency:
-    needed = state(entry.value)
-    return Dependency(key(entry), needed.value if needed is not None else PrimaryState.ACTIVE)
-
-
-def state(tree: Tree | None) -> Located[PrimaryState] | None:
-    """Return a lifecycle state with its location."""
-    if isinstance(tree, Scalar) and tree.value in {item.value for item in PrimaryState}:
-        return Located(PrimaryState(str(tree.value)), tree.span)
-    return None
+    return Dependency(key(entry), value_or(choice(entry.value, PrimaryState), PrimaryState.ACTIVE))

@@ -16,6 +16,7 @@ from composer.language.tree_values import (
     key,
     number,
     text_or_opaque,
+    value_or,
 )
 from composer.model import Executable, Introspection, OnFailure, RestartBudget, Supervision, Watch
 from composer.model.names import join
@@ -75,9 +76,8 @@ def read_supervision(lifecycle: Tree | None, default: Supervision) -> Supervisio
     """Return the supervision under ``lifecycle`` of a node or a system, over ``default``."""
     if not isinstance(lifecycle, Mapping):
         return default
-    timeout_ms = number(lifecycle.get("timeout_ms"))
     return Supervision(
-        timeout_ms=default.timeout_ms if timeout_ms is None else timeout_ms.value,
+        timeout_ms=value_or(number(lifecycle.get("timeout_ms")), default.timeout_ms),
         on_failure=choice(lifecycle.get("on_failure"), OnFailure) or default.on_failure,
         restart=_restart(lifecycle.entry("restart"), default.restart),
         watch=_watch(lifecycle.get("watch"), default.watch),
@@ -88,17 +88,14 @@ def _restart(entry: Entry | None, default: RestartBudget) -> RestartBudget:
     if entry is None or not isinstance(entry.value, Mapping):
         return default
     tree = entry.value
-    attempts = integer(tree.get("max_attempts"))
-    then = choice(tree.get("then"), OnFailure)
     backoff = tree.get("backoff_ms") or tree.get("backoff_max_ms")
 
     def milliseconds(name: str, fallback: float) -> float:
-        found = number(tree.get(name))
-        return fallback if found is None else found.value
+        return value_or(number(tree.get(name)), fallback)
 
     return RestartBudget(
-        max_attempts=default.max_attempts if attempts is None else attempts.value,
-        then=default.then if then is None else then.value,
+        max_attempts=value_or(integer(tree.get("max_attempts")), default.max_attempts),
+        then=value_or(choice(tree.get("then"), OnFailure), default.then),
         window_ms=milliseconds("window_ms", default.window_ms),
         backoff_ms=milliseconds("backoff_ms", default.backoff_ms),
         backoff_max_ms=milliseconds("backoff_max_ms", default.backoff_max_ms),

@@ -15,13 +15,12 @@ from composer.base.diagnostics import (
 )
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
-from composer.language.document import read_document
 from composer.language.expand import expand, missing_variables
 from composer.language.schema import check_schema
-from composer.language.schema.kinds import NODE, check_kind
+from composer.language.schema.kinds import NODE
 from composer.language.tree import Entry, Mapping, Plain, Tree, plain
 from composer.language.tree_values import entries
-from composer.model.assembly import Inherited, NodeTypeFile, inherit
+from composer.model.assembly import Inherited, inherit, read_node_type
 from composer.model.resolve.declaration import Declaration, declare
 from composer.model.resolve.qos import QosTable
 from composer.project.node_types import SourceFolders
@@ -113,15 +112,10 @@ class NodeTypeLoader:
         return self._read[path]
 
     def _read_file(self, path: Path) -> Inherited | None:
-        tree, source, found = read_document(path)
-        self.diagnostics.extend(found)
-        if tree is None:
+        file = read_node_type(path, self.diagnostics)
+        if file is None:
             return None
-        wrong_kind = check_kind(tree, source, (NODE,))
-        if wrong_kind is not None:
-            self.diagnostics.append(wrong_kind)
-            return None
-        inherited = inherit(NodeTypeFile(path, source, tree))
+        inherited = inherit(file)
         self.diagnostics.extend(inherited.diagnostics)
         return inherited
 

@@ -21,6 +21,7 @@ from composer.language.tree_values import (
     plain_text,
     text,
     text_or_opaque,
+    value_or,
 )
 from composer.model import (
     Event,
@@ -131,12 +132,8 @@ def _sends(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Send, ...]
 def _log(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Template | None, LogLevel]:
     if not isinstance(tree, Mapping):
         return template(tree, diagnostics), LogLevel.INFO
-    level = text(tree.get("level"))
-    known = level is not None and level.value in {item.value for item in LogLevel}
-    return (
-        template(tree.get("message"), diagnostics),
-        LogLevel(level.value) if level is not None and known else LogLevel.INFO,
-    )
+    level = value_or(choice(tree.get("level"), LogLevel), LogLevel.INFO)
+    return template(tree.get("message"), diagnostics), level
 
 
 #: Default timeout of clients for the server and its response.
@@ -175,10 +172,8 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
 
 def _isolation(port: Mapping, node: Mapping) -> Isolation:
     """Return whether messages are copied: those of a class are, since it may use them again."""
-    written = choice(port.get("isolation"), Isolation)
-    if written is not None:
-        return written.value
-    return Isolation.SHARE if node.get("class") is None else Isolation.COPY
+    usual = Isolation.SHARE if node.get("class") is None else Isolation.COPY
+    return value_or(choice(port.get("isolation"), Isolation), usual)
 
 
 def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ...]:
@@ -253,13 +248,12 @@ def _feedback(entry: Entry | None, diagnostics: list[Diagnostic]) -> FeedbackSte
 def _timer(entry: Entry, diagnostics: list[Diagnostic]) -> Timer:
     span = entry.key.span
     tree = mapping(entry)
-    clock = choice(tree.get("clock"), TimerClock)
     return Timer(
         name=key(entry),
         period=_period(tree, span, diagnostics),
         span=span,
         reaction=reaction(tree, span, diagnostics),
-        clock=TimerClock.ROS if clock is None else clock.value,
+        clock=value_or(choice(tree.get("clock"), TimerClock), TimerClock.ROS),
         budget_ms=number(tree.get("budget_ms")),
         reentrant=flag(tree.get("reentrant"), default=False),
         always_on=flag(tree.get("always_on"), default=False),

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping as Map
 from dataclasses import field, replace
+from functools import partial
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.language.tree import Entry, Mapping, Scalar, Tree
-from composer.language.tree_values import entries, integer, is_opaque, key, number, text
+from composer.language.tree_values import choice, entries, integer, is_opaque, key, number, text
 from composer.model import ChannelKind, NamedQos, Qos, QosReference
 from composer.model.qos import (
     PRESETS,
@@ -141,15 +142,6 @@ def _overlaid(tree: Tree, base: Qos, span: Span) -> Qos:
 PolicyReader = Callable[[Tree], "Located[Any] | None"]
 
 
-def _one_of(values: type[History | Reliability | Durability | Liveliness]) -> PolicyReader:
-    def read(tree: Tree) -> Located[Any] | None:
-        found = text(tree)
-        known = {item.value: item for item in values}
-        return found.map(known.__getitem__) if found is not None and found.value in known else None
-
-    return read
-
-
 def _duration(tree: Tree) -> Located[Any] | None:
     if isinstance(tree, Scalar) and tree.value is None:
         return Located(None, tree.span)
@@ -157,12 +149,12 @@ def _duration(tree: Tree) -> Located[Any] | None:
 
 
 _POLICIES: Map[str, PolicyReader] = {
-    "history": _one_of(History),
+    "history": partial(choice, kind=History),
     "depth": integer,
-    "reliability": _one_of(Reliability),
-    "durability": _one_of(Durability),
+    "reliability": partial(choice, kind=Reliability),
+    "durability": partial(choice, kind=Durability),
     "deadline_ms": _duration,
     "lifespan_ms": _duration,
-    "liveliness": _one_of(Liveliness),
+    "liveliness": partial(choice, kind=Liveliness),
     "liveliness_lease_duration_ms": _duration,
 }

@@ -20,6 +20,7 @@ from composer.language.tree_values import (
     mapping,
     plain_text,
     text_or_opaque,
+    value_or,
 )
 from composer.model import (
     DEFAULT_SUPERVISION,
@@ -43,7 +44,6 @@ from composer.model.resolve.deployment import (
 from composer.model.resolve.node import (
     SystemContext,
     resolve_node,
-    state,
 )
 from composer.model.resolve.node_settings import (
     read_supervision,
@@ -98,8 +98,6 @@ def resolve_system(
     nodes = without_sections_of_others(
         [resolve_node(entry, context) for entry in entries(tree.get("nodes"))]
     )
-    autostart = state(lifecycle.get("autostart"))
-    delivery = choice(tree.get("delivery"), Delivery)
     system = System(
         name=_name(tree, "system"),
         source=source,
@@ -116,9 +114,9 @@ def resolve_system(
         processes=processes,
         hosts=read_hosts(tree.get("hosts")),
         discovery=read_discovery(tree.entry("discovery")),
-        autostart=autostart.value if autostart is not None else PrimaryState.ACTIVE,
+        autostart=value_or(choice(lifecycle.get("autostart"), PrimaryState), PrimaryState.ACTIVE),
         supervision=system_supervision,
-        delivery=delivery.value if delivery is not None else Delivery.AUTO,
+        delivery=value_or(choice(tree.get("delivery"), Delivery), Delivery.AUTO),
         use_sim_time=any(flag(entry.value, default=False) for entry in clock),
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
         unknown=_unknown_nodes(nodes, overrides),
@@ -183,14 +181,12 @@ def _unknown_nodes(nodes: tuple[Node, ...], overrides: Overrides) -> tuple[Unkno
 def _executor(entry: Entry) -> Executor:
     tree = mapping(entry)
     threads = integer(tree.get("threads"))
-    kind = choice(tree.get("kind"), ExecutorKind)
-    priority = integer(tree.get("priority"))
     return Executor(
         name=key(entry),
-        kind=kind.value if kind is not None else ExecutorKind.EVENTS,
+        kind=value_or(choice(tree.get("kind"), ExecutorKind), ExecutorKind.EVENTS),
         span=entry.key.span,
-        threads=threads.value if threads is not None else DEFAULT_THREADS,
+        threads=value_or(threads, DEFAULT_THREADS),
         threads_span=threads.span if threads is not None else None,
         cpus=integers(tree.get("cpus")),
-        priority=None if priority is None else priority.value,
+        priority=value_or(integer(tree.get("priority")), None),
     )
