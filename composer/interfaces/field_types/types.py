@@ -87,8 +87,8 @@ class PathProblem:
     """A path that cannot be resolved; ``index`` is the invalid part."""
 
     message: str
-    hint: str | None = None
     index: int = 0
+    hint: str | None = None
 
 
 def parameter_type(declared: str, choices: Iterable[Plain] = ()) -> ValueType:
@@ -202,14 +202,14 @@ def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | P
         return (
             found
             if found is not None
-            else PathProblem(f"'{name}' does not exist", suggestion(name, type_))
+            else PathProblem(f"'{name}' does not exist", hint=suggestion(name, type_))
         )
     if isinstance(type_, FieldType) and type_.is_array:
         return PathProblem(
-            f"{type_} has no field '{name}'", "it is a list: use an index, as in [0]"
+            f"{type_} has no field '{name}'", hint="it is a list: use an index, as in [0]"
         )
     if isinstance(type_, FieldType) and type_.is_primitive:
-        return PathProblem(f"{type_} has no field '{name}'", "it is a value, not a message")
+        return PathProblem(f"{type_} has no field '{name}'", hint="it is a value, not a message")
     message = fields_of(type_, interfaces)
     if message is None:  # an unknown type or message
         return ANYTHING
@@ -217,7 +217,7 @@ def _field(type_: ValueType, name: str, interfaces: Interfaces) -> ValueType | P
     if field is not None:
         return field.type
     hint = suggestion(name, message.field_names)
-    return PathProblem(f"{message.name} has no field '{name}'", hint)
+    return PathProblem(f"{message.name} has no field '{name}'", hint=hint)
 
 
 def _element(type_: ValueType, index: int) -> ValueType | PathProblem:
