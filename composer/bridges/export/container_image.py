@@ -7,6 +7,7 @@ import shlex
 from pathlib import PurePosixPath
 
 from composer.base.fast_dataclass import dataclass
+from composer.bridges.templates import filled
 from composer.project.copied_files import pattern_of
 
 CONTAINERFILE = PurePosixPath("Containerfile")
@@ -16,28 +17,6 @@ IGNORED_FILES = PurePosixPath("Containerfile.dockerignore")
 USER_ID = 1000
 PROJECT = "/project"
 WRITABLE = "/tmp"  # noqa: S108  (of the container)
-
-_TEXT = """\
-# Written by 'compose export' for the system {system}. Build it from the root of the project.
-# The ROS wheels from PyPI are for x86_64.
-FROM python:{python}-slim
-
-# Another version or an archive: --build-arg COMPOSER="ros2-composer[ros] @ https://..."
-ARG COMPOSER="{temporary}/{wheel}[ros]"
-COPY {copied}
-RUN pip install --no-cache-dir "$COMPOSER"
-
-WORKDIR {project}
-{requirements}COPY . .
-{interfaces}{unknown}# Errors in files fail here, not when the container starts.
-RUN compose validate {file}
-
-ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 ROS_LOG_DIR={writable}/log
-RUN useradd --create-home --uid {user} ros
-USER {user}
-STOPSIGNAL SIGINT
-CMD {command}
-"""
 _REQUIREMENTS = """\
 COPY requirements.txt .
 RUN pip install --no-cache-dir -r requirements.txt
@@ -87,7 +66,8 @@ def containerfile(contents: Contents, wheel: PurePosixPath) -> str:
 
     ``wheel`` is the wheel of the composer below the root of the project.
     """
-    return _TEXT.format(
+    return filled(
+        "Containerfile",
         system=contents.system,
         python=contents.python,
         wheel=wheel.name,
@@ -103,7 +83,7 @@ def containerfile(contents: Contents, wheel: PurePosixPath) -> str:
         else "",
         file=shlex.quote(str(contents.file)),
         writable=WRITABLE,
-        user=USER_ID,
+        user=str(USER_ID),
         command=json.dumps(contents.run),
     )
 

@@ -14,6 +14,7 @@ from composer.bridges.export.deployment import (
     ros_variables,
     services,
 )
+from composer.bridges.templates import filled
 from composer.model import Host, OnFailure, RestartBudget, System
 
 #: The folders of a sourced workspace.
@@ -32,22 +33,6 @@ _LIBRARIES, _OF_WHEELS = "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 _WATCHDOG_S = 30
 _RESTART_S = 2.0
 
-_SERVICE = """\
-# Written by 'compose export systemd' for the system {system}.
-{origin}[Unit]
-Description={description}
-{order}{network}{limit}
-[Service]
-{start}ExecStart={command}
-{place}{environment}{resources}# {compose} ends everything in order.
-KillMode=mixed
-KillSignal=SIGTERM
-TimeoutStopSec={stop_s}
-{restart}
-[Install]
-WantedBy={target}
-"""
-
 #: The service manager of a user does not know it.
 _NETWORK = "Wants=network-online.target\nAfter=network-online.target\n"
 
@@ -63,16 +48,6 @@ Type=notify
 """
 #: Exit codes of usage errors, of errors in files, and of what is missing on another computer.
 _FINAL, _FINAL_THERE = "2 78", "2 71 72 73 78"
-
-_TARGET = """\
-# Written by 'compose export systemd' for the system {system}.
-[Unit]
-Description={description}
-Wants={wants}
-{end}
-[Install]
-WantedBy={target}
-"""
 
 
 _END_OF_TARGET = """\
@@ -117,7 +92,8 @@ def units(
     here = [service for service in listed if service.host is None]
     found: dict[PurePosixPath, str] = {}
     if target is not None:
-        found[PurePosixPath(target)] = _TARGET.format(
+        found[PurePosixPath(target)] = filled(
+            "systemd/target",
             system=name,
             description=_description(system),
             wants=" ".join(_unit(service) for service in here),
@@ -132,7 +108,8 @@ def units(
             command, place = _here(service, path.resolve(), installation)
         else:
             command, place = _there(service, there, installation, user=user)
-        found[PurePosixPath(service.host or "", _unit(service))] = _SERVICE.format(
+        found[PurePosixPath(service.host or "", _unit(service))] = filled(
+            "systemd/service",
             system=name,
             origin="" if len(listed) == 1 else f"# {service.origin}\n",
             description=_description(system, service),
@@ -145,7 +122,7 @@ def units(
             place=place,
             environment=_environment(service.environment),
             resources=_resources(service),
-            stop_s=STOP_WITHIN_S,
+            stop_s=str(STOP_WITHIN_S),
             restart=_restart(system, service, _FINAL if there is None else _FINAL_THERE),
             target=boot if target is None or service.host is not None else target,
         )

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.resources import interfaces_folder
+from composer.bridges.templates import filled
 from composer.interfaces import DefinitionError, Message, parse_definition
 from composer.interfaces.definitions import parts
 from composer.interfaces.sources import Bundle
@@ -67,88 +68,30 @@ class InterfacePackage:
         return files
 
     def _cmake(self) -> str:
-        found = "\n".join(f"find_package({name} REQUIRED)" for name in self.dependencies)
-        listed = "\n".join(f'  "{path}"' for path in self.definitions)
-        depends = f"\n  DEPENDENCIES {' '.join(self.dependencies)}" if self.dependencies else ""
-        return f"""\
-cmake_minimum_required(VERSION 3.20)
-project({self.name})
-
-if(SKBUILD)  # pip, with the ros wheels from PyPI
-  include({_CMAKE_MODULE})
-  ros_wheels_use_prefix()
-endif()
-
-find_package(ament_cmake REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
-{found}
-
-rosidl_generate_interfaces(${{PROJECT_NAME}}
-{listed}{depends}
-)
-
-if(SKBUILD)
-  ros_wheels_repair_include_directories(${{PROJECT_NAME}})
-endif()
-
-ament_export_dependencies(rosidl_default_runtime)
-ament_package()
-"""
+        found = "".join(f"find_package({name} REQUIRED)\n" for name in self.dependencies)
+        listed = "".join(f'  "{path}"\n' for path in self.definitions)
+        depends = f"  DEPENDENCIES {' '.join(self.dependencies)}\n" if self.dependencies else ""
+        return filled(
+            "interfaces/CMakeLists.txt",
+            name=self.name,
+            wheels=_CMAKE_MODULE,
+            packages=found,
+            files=listed,
+            depends=depends,
+        )
 
     def _manifest(self) -> str:
-        depends = "\n".join(f"  <depend>{name}</depend>" for name in self.dependencies)
-        return f"""\
-<?xml version="1.0"?>
-<package format="3">
-  <name>{self.name}</name>
-  <version>0.1.0</version>
-  <description>The interfaces of {self.name}.</description>
-  <maintainer email="maintainer@example.invalid">maintainer</maintainer>
-  <license>see the source</license>
-
-  <buildtool_depend>ament_cmake</buildtool_depend>
-  <buildtool_depend>rosidl_default_generators</buildtool_depend>
-
-{depends}
-
-  <exec_depend>rosidl_default_runtime</exec_depend>
-
-  <member_of_group>rosidl_interface_packages</member_of_group>
-
-  <export>
-    <build_type>ament_cmake</build_type>
-  </export>
-</package>
-"""
+        depends = "".join(f"  <depend>{name}</depend>\n" for name in self.dependencies)
+        return filled("interfaces/generated_package.xml", name=self.name, depends=depends)
 
     def _pyproject(self, versions: Mapping[str, str]) -> str:
-        requires = "\n".join(f'  "{item}",' for item in self._build_requirements(versions))
-        return f"""\
-[build-system]
-build-backend = "scikit_build_core.build"
-requires = [
-{requires}
-]
-
-[project]
-name = "{self.name.replace("_", "-")}"
-version = "0.1.0"
-requires-python = ">=3.11"
-
-[tool.scikit-build]
-minimum-version = "0.10"
-experimental = true
-wheel.install-dir = "/data"
-wheel.packages = []
-wheel.exclude = [
-  "**/__pycache__/**",
-  "**/{self.name}-*.egg-info/**",
-  "**/site-packages/{self.name}/**/*.c",
-]
-
-[tool.scikit-build.cmake.define]
-BUILD_TESTING = "OFF"
-"""
+        requires = "".join(f'  "{item}",\n' for item in self._build_requirements(versions))
+        return filled(
+            "interfaces/pyproject.toml",
+            name=self.name,
+            project=self.name.replace("_", "-"),
+            requires=requires,
+        )
 
     def _build_requirements(self, versions: Mapping[str, str]) -> list[str]:
         """Return what the composer's own interfaces need, with the packages of our types."""
