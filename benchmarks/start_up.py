@@ -10,9 +10,9 @@ from __future__ import annotations
 from benchmarks.figures import Row
 from benchmarks.processes import ROOT, wall_time_s
 
-BASELINE = "importing yaml, jsonschema, typer"
+BASELINE = "importing yaml, typer"
 COMMANDS = {
-    BASELINE: ("-c", "import yaml, jsonschema, typer"),
+    BASELINE: ("-c", "import yaml, typer"),
     "compose --version": ("-m", "composer", "--version"),
     "compose validate systems nodes": ("-m", "composer", "validate", "systems", "nodes"),
     "compose graph systems/pipeline.yaml": ("-m", "composer", "graph", "systems/pipeline.yaml"),

@@ -9,7 +9,7 @@ import sys
 import venv
 from pathlib import Path
 
-import jsonschema
+import pathspec
 import pytest
 
 from tests.packaging.conftest import ROOT
@@ -85,4 +85,4 @@ def test_an_interface_package_is_built(installation: Installation, tmp_path: Pat
 
 def _site() -> str:
     """Return the folder with the dependencies of the composer."""
-    return str(Path(jsonschema.__file__).parents[1])
+    return str(Path(pathspec.__file__).parents[1])

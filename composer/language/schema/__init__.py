@@ -1,7 +1,7 @@
 """Check the structure of files with JSON Schema: keys and types of values.
 
-Editors use the same schemas (``schemas/``). Errors of jsonschema are reported with the location of
-the key or value, in terms of the language.
+Editors use the same schemas (``schemas/``). Errors are reported with the location of the key or
+value, in terms of the language.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from typing import Any
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.resources import schemas_folder
-from composer.language.schema.fast_check import Check, compile_check
+from composer.language.schema.explanations import explain_errors
+from composer.language.schema.locations import TreeIndex
+from composer.language.schema.validation import schema_errors
 from composer.language.tree import Mapping, plain
 
 __all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
@@ -34,15 +36,10 @@ def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
 
     The tree has its variables expanded. A load-time variable without value is valid anywhere.
     """
-    content = plain(tree)
-    if _compiled(kind)(content):
-        return []
-    # jsonschema takes a tenth of a second to import, and most files are valid.
-    from composer.language.schema.validation import explain  # noqa: PLC0415
-
-    return explain(content, tree, kind, schema(kind))
+    return explain_errors(schema_errors(plain(tree), schema(kind)), TreeIndex(tree))
 
 
+@cache
 def schema(name: str) -> dict[str, Any]:
     """Return the JSON Schema (draft-07) called ``name``, of SCHEMAS or REPORT. Raises KeyError."""
     if name not in (*SCHEMAS, REPORT):
@@ -50,8 +47,3 @@ def schema(name: str) -> dict[str, Any]:
     text = (schemas_folder() / f"{name}.schema.json").read_text(encoding="utf-8")
     content: dict[str, Any] = json.loads(text)
     return content
-
-
-@cache
-def _compiled(kind: str) -> Check:
-    return compile_check(schema(kind))

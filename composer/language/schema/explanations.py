@@ -1,10 +1,9 @@
-"""Explain errors of jsonschema in terms of the language, with their locations."""
+"""Explain errors of a schema in terms of the language, with their locations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any
 
 from composer.base.diagnostics import Diagnostic, Label, nearest, shown
 from composer.base.fast_dataclass import dataclass
@@ -13,12 +12,8 @@ from composer.language import rules
 from composer.language.document.limits import MAX_ERRORS, LimitedDiagnostics, TooManyErrors
 from composer.language.schema.hints import advice, expected, intended_key, type_hint, value_advice
 from composer.language.schema.locations import TreeIndex, TreeValue
+from composer.language.schema.validation import Path, SchemaError
 from composer.language.tree import Entry, describe
-
-if TYPE_CHECKING:
-    from jsonschema import ValidationError
-
-Path = tuple[str | int, ...]
 
 #: Keys that determine which other keys are valid, and the titles of schemas that have them.
 _DECIDING = frozenset({"type", "topic", "service", "action"})
@@ -50,14 +45,9 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True, slots=True)
-class _SchemaError:
-    """An error of jsonschema with its location."""
+class _LocatedError(SchemaError):
+    """An error with its location in the tree."""
 
-    path: Path
-    validator: str
-    required: Any  # the value of the keyword in the schema
-    instance: Any
-    schema: dict[str, Any]
     place: TreeValue
     index: TreeIndex
 
@@ -105,19 +95,19 @@ class _MisspelledKeys:
     missing: dict[Path, str]  # the one required key that is missing where one key is unknown
 
     @classmethod
-    def among(cls, errors: Sequence[_SchemaError]) -> _MisspelledKeys:
+    def among(cls, errors: Sequence[_LocatedError]) -> _MisspelledKeys:
         keys = set()
         deciding = set()
-        unknown = [item for item in errors if item.validator == "additionalProperties"]
+        unknown = [item for item in errors if item.keyword == "additionalProperties"]
         single = {item.path for item in unknown if len(item.unknown) == 1}
         missing = {
             item.path: names[0]
             for item in errors
-            if item.validator == "required" and item.path in single
+            if item.keyword == "required" and item.path in single
             if len(names := [name for name in item.required if name not in item.instance]) == 1
         }
         for error in errors:
-            if error.validator != "additionalProperties":
+            if error.keyword != "additionalProperties":
                 continue
             found = {_intended_key(error, name) for name in error.unknown} - {None}
             keys |= {(error.path, str(key)) for key in found}
@@ -125,16 +115,16 @@ class _MisspelledKeys:
                 deciding.add(error.path)
         return cls(keys, deciding, missing)
 
-    def covers(self, error: _SchemaError) -> bool:
+    def covers(self, error: _LocatedError) -> bool:
         """Return whether ``error`` may only follow from a misspelled key."""
-        if error.validator == "additionalProperties" and error.path in self.deciding:
+        if error.keyword == "additionalProperties" and error.path in self.deciding:
             return False
         return bool(self.deciding) and any(
             error.path[:length] in self.deciding for length in range(1, len(error.path) + 1)
         )
 
 
-def explain_errors(errors: Iterable[ValidationError], index: TreeIndex) -> list[Diagnostic]:
+def explain_errors(errors: Iterable[SchemaError], index: TreeIndex) -> list[Diagnostic]:
     """Return the diagnostics for ``errors``, without those that only follow from another."""
     located = [_located(error, index) for error in islice(errors, MAX_ERRORS + 1)]
     misspelled = _MisspelledKeys.among(located)
@@ -142,32 +132,30 @@ def explain_errors(errors: Iterable[ValidationError], index: TreeIndex) -> list[
     try:
         for error in located:
             if not misspelled.covers(error):
-                diagnostics += _EXPLAINERS[error.validator](error, misspelled)
+                diagnostics += _EXPLAINERS[error.keyword](error, misspelled)
     except TooManyErrors as stopped:
         return stopped.diagnostics
     return list(dict.fromkeys(diagnostics))
 
 
-def _located(error: ValidationError, index: TreeIndex) -> _SchemaError:
-    path = tuple(error.absolute_path)
-    schema = error.schema if isinstance(error.schema, dict) else {}
-    return _SchemaError(
-        path,
-        str(error.validator),
-        error.validator_value,
+def _located(error: SchemaError, index: TreeIndex) -> _LocatedError:
+    return _LocatedError(
+        error.path,
+        error.keyword,
+        error.required,
         error.instance,
-        schema,
-        index.find(path),
+        error.schema,
+        index.find(error.path),
         index,
     )
 
 
-def _intended_key(error: _SchemaError, name: str) -> str | None:
+def _intended_key(error: _LocatedError, name: str) -> str | None:
     key = intended_key(name, error.schema["properties"])
     return key if key is not None and key not in error.instance else None
 
 
-def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _unknown_keys(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     entries = error.index.entries(error.place.tree)
     if _has_other_ends(error):
         yield _other_ends(error, entries)
@@ -188,7 +176,7 @@ def _unknown_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
         yield Diagnostic(rules.UNKNOWN_KEY, message, span, hint=hint, subjects=subjects)
 
 
-def _has_other_ends(error: _SchemaError) -> bool:
+def _has_other_ends(error: _LocatedError) -> bool:
     """Return whether a connection only has ends of another form: a topic with a server."""
     title = error.schema.get("title", "")
     if title not in _ENDS:
@@ -200,7 +188,7 @@ def _has_other_ends(error: _SchemaError) -> bool:
     return is_meant and set(_ENDS[title]).isdisjoint(error.instance)
 
 
-def _other_ends(error: _SchemaError, entries: dict[str, Entry]) -> Diagnostic:
+def _other_ends(error: _LocatedError, entries: dict[str, Entry]) -> Diagnostic:
     """Report the key with the name of a connection that has the ends of another form."""
     title = error.schema["title"]
     kind = title.removesuffix(" connection")
@@ -215,7 +203,7 @@ def _other_ends(error: _SchemaError, entries: dict[str, Entry]) -> Diagnostic:
     return Diagnostic(rules.UNKNOWN_KEY, message, entries[kind].key.span, hint=hint)
 
 
-def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _missing_keys(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     if error.path in misspelled.missing:
         return
     for name in error.required:
@@ -226,7 +214,7 @@ def _missing_keys(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[
             yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
 
 
-def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _missing_choice(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
     names = [name for choice in error.required for name in choice["required"]]
     if _has_other_ends(error):
         return
@@ -237,7 +225,7 @@ def _missing_choice(error: _SchemaError, misspelled: _MisspelledKeys) -> Iterato
         yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
 
 
-def _excluding_keys(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _excluding_keys(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     entries = error.index.entries(error.place.tree)
     first, second = sorted(
         (entries[name].key for name in error.required["required"]),
@@ -249,7 +237,7 @@ def _excluding_keys(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnos
     yield Diagnostic(rules.KEYS_EXCLUDE_EACH_OTHER, message, second.span, (label,), hint)
 
 
-def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _wrong_type(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     required = expected(error.schema)
     found = describe(error.place.tree)
     message = f"expected {required}{error.subject}, found {found}"
@@ -257,16 +245,16 @@ def _wrong_type(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]
     yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
 
 
-def _unknown_word(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _unknown_word(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     return _no_word_of(error, error.required)
 
 
-def _no_word_or_variable(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _no_word_or_variable(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     """Explain a value of ``oneOf: [{enum: ...}, a variable]``."""
     return _no_word_of(error, [word for part in error.required for word in part.get("enum", ())])
 
 
-def _no_word_of(error: _SchemaError, words: list[str]) -> Iterator[Diagnostic]:
+def _no_word_of(error: _LocatedError, words: list[str]) -> Iterator[Diagnostic]:
     found = describe(error.place.tree)
     message = f"expected {_any_of(words)}{error.subject}, found {found}"
     close = nearest(error.instance, words) if isinstance(error.instance, str) else None
@@ -277,13 +265,13 @@ def _no_word_of(error: _SchemaError, words: list[str]) -> Iterator[Diagnostic]:
 _LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
 
 
-def _out_of_range(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
-    limit = f"{_LIMITS[error.validator]} {error.required}"
+def _out_of_range(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+    limit = f"{_LIMITS[error.keyword]} {error.required}"
     message = f"expected {limit}{error.subject}, found {shown(error.instance)}"
     yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
 
 
-def _empty_collection(error: _SchemaError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
+def _empty_collection(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     name = error.path[-1] if error.path else "this"
     least, found = error.required, len(error.instance)
     message, hint = f"'{shown(name)}' is empty", "add at least one"
@@ -299,7 +287,7 @@ def _any_of(names: Iterable[str]) -> str:
     return f"{', '.join(most)} or {last}" if most else last
 
 
-_EXPLAINERS: dict[str, Callable[[_SchemaError, _MisspelledKeys], Iterator[Diagnostic]]] = {
+_EXPLAINERS: dict[str, Callable[[_LocatedError, _MisspelledKeys], Iterator[Diagnostic]]] = {
     "additionalProperties": _unknown_keys,
     "required": _missing_keys,
     "anyOf": _missing_choice,

@@ -1,4 +1,4 @@
-"""Find values in a tree by the paths that jsonschema reports."""
+"""Find values in a tree by the paths of errors."""
 
 from __future__ import annotations
 
