@@ -18,7 +18,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from composer.base.characters import escape_line
 from composer.dashboard.context import Dashboard
 from composer.dashboard.feeds import Receiver
-from composer.dashboard.protocol.errors import BadRequestError, RequestError, internal_error
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, internal_error
 from composer.dashboard.protocol.outbox import Outbox, Update
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 

@@ -9,7 +9,7 @@ from typing import Any
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import RequestError
 from composer.graph.facts import node_facts, publishing_rates_hz
 from composer.model import Node, Parameter, PrimaryState, System
 

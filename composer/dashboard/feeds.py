@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.dashboard.protocol.errors import RequestError, from_ros, internal_error
-from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.messages import RequestError, from_ros, internal_error, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import RequestError
 from composer.interfaces import (
     FLOATS,
     INTEGER_RANGES,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.protocol.errors import RequestError
-from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.messages import RequestError, Values
 from composer.model import PortKind
 from composer.model.qos import PRESETS, Durability, QosProfile, incompatibilities
 

@@ -14,7 +14,7 @@ from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from composer.dashboard.feeds import Feeds
-from composer.dashboard.protocol.errors import RequestError, from_ros
+from composer.dashboard.protocol.messages import RequestError, from_ros
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline

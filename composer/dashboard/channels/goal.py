@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.protocol.errors import RequestError, from_ros
-from composer.dashboard.protocol.messages import Values, json_safe, to_json
+from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:

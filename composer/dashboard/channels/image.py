@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.observing.topic_reader import TopicReader
-from composer.dashboard.protocol.errors import BadRequestError, RequestError
-from composer.dashboard.protocol.messages import Values, to_json
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, to_json
 from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:

@@ -32,8 +32,7 @@ from composer.dashboard.foxglove.messages import Publications, Subscriptions
 from composer.dashboard.foxglove.requests import Parameters, call_service
 from composer.dashboard.foxglove.schemas import Schemas
 from composer.dashboard.foxglove.topics import ClockFeed
-from composer.dashboard.protocol.errors import BadRequestError, RequestError
-from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
 
 #: Messages of a topic that wait for a client.

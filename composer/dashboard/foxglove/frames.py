@@ -6,8 +6,12 @@ import struct
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.protocol.errors import BadRequestError
-from composer.dashboard.protocol.messages import Values, check_characters, parse_object
+from composer.dashboard.protocol.messages import (
+    BadRequestError,
+    Values,
+    check_characters,
+    parse_object,
+)
 
 #: The names of the protocol, the one that is preferred first.
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")

@@ -11,8 +11,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.dashboard.client import MAX_PENDING, POLICY_VIOLATION, Client
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.foxglove.frames import ERROR, WARNING, status
-from composer.dashboard.protocol.errors import RequestError, internal_error
-from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.messages import RequestError, internal_error, to_json
 from composer.dashboard.protocol.outbox import Outbox, Update
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from composer.dashboard.foxglove.catalog import Channel
 from composer.dashboard.foxglove.frames import WARNING, ClientMessage, number, status
 from composer.dashboard.foxglove.link import Link, Running
 from composer.dashboard.foxglove.topics import PublishedFeed, TopicFeed
-from composer.dashboard.protocol.errors import BadRequestError, RequestError
-from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values
 from composer.dashboard.protocol.outbox import Update
 
 #: Of one client.

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.feeds import Feed
-from composer.dashboard.protocol.errors import BadRequestError
-from composer.dashboard.protocol.messages import to_json
+from composer.dashboard.protocol.messages import BadRequestError, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
 from composer.model.qos import QosProfile
 

@@ -16,8 +16,7 @@ from composer.dashboard.foxglove.parameters import (
     read_setting,
     set_all,
 )
-from composer.dashboard.protocol.errors import BadRequestError, RequestError
-from composer.dashboard.protocol.messages import Values
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values
 from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.catalog import Channel
 from composer.dashboard.observing.large_messages import LARGE_TYPES
-from composer.dashboard.protocol.budget import Budget
-from composer.dashboard.protocol.errors import BadRequestError, RequestError, from_ros
-from composer.dashboard.protocol.messages import to_json
-from composer.dashboard.protocol.outbox import Delivery, Update
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, from_ros, to_json
+from composer.dashboard.protocol.outbox import Budget, Delivery, Update
 from composer.model.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:

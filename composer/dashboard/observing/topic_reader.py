@@ -14,7 +14,7 @@ from composer.dashboard.observing.large_messages import (
     ByteLimit,
     large_profile,
 )
-from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import RequestError
 from composer.model import PortKind
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from composer.dashboard.channels.nodes import COMMANDS
 from composer.dashboard.channels.topics import shown_qos
 from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.declared import required
-from composer.dashboard.protocol.errors import RequestError, from_ros
-from composer.dashboard.protocol.messages import Values, json_safe
+from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline

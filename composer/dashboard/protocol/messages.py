@@ -1,17 +1,34 @@
-"""Requests of browsers, and JSON text for them."""
+"""Requests of browsers, the errors that answer them, and JSON text for both."""
 
 from __future__ import annotations
 
 import json
+import logging
 import math
+import os
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from composer.base.characters import escape_line
 from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.protocol.errors import BadRequestError
 from composer.language.document.scalars import text_of_not_finite
 
+if TYPE_CHECKING:
+    from composer.client.session import RosError
+
+#: The codes of errors of :mod:`composer.client`, by the names of their classes: importing these
+#: imports ROS.
+_CODES = {
+    "NoResponseError": "no_response",
+    "NotFoundError": "not_found",
+    "UnknownParameterError": "not_found",
+    "InvalidValueError": "bad_request",
+    "InvalidNameError": "bad_request",
+    "ParameterRejectedError": "rejected",
+    "GoalRejectedError": "rejected",
+    "TransitionError": "rejected",
+}
 T = TypeVar("T")
 
 #: Integers beyond this are not exact in JavaScript, and are sent as text.
@@ -20,6 +37,44 @@ _TYPE_NAMES = {str: "a string", bool: "true or false", dict: "an object", list: 
 _MAX_ID = 64
 #: How JSON writes a character beyond 16 bits, with another one after it.
 _SURROGATE = "\\ud"
+
+
+class RequestError(Exception):
+    """A request of a browser fails; ``code`` is for its program, the text for its user."""
+
+    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code = code
+        self.hint = hint
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the error as it is sent."""
+        return {"code": self.code, "message": str(self), "hint": self.hint}
+
+
+def from_ros(error: RosError) -> RequestError:
+    """Return the same error for a browser."""
+    names = {kind.__name__ for kind in type(error).__mro__}
+    code = next((code for kind, code in _CODES.items() if kind in names), "failed")
+    return RequestError(code, str(error), error.hint)
+
+
+def internal_error(what: str, error: Exception) -> RequestError:
+    """Return the error for a defect of the dashboard, and log it.
+
+    That takes one line, as a message may cause it; with COMPOSE_DEBUG, the traceback follows.
+    """
+    trace = error if os.environ.get("COMPOSE_DEBUG") else None
+    text = escape_line(f"{error!r:.200}")
+    logging.getLogger(__name__).error("%s failed: %s", escape_line(what), text, exc_info=trace)
+    return RequestError("internal", f"an internal error of the dashboard: {text}")
+
+
+class BadRequestError(RequestError):
+    """The request is malformed."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__("bad_request", message, hint)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,25 +3,67 @@
 A browser that reads slowly gets the latest value of a state and skips those in between. Messages
 that it should see one by one wait in a short queue; the oldest are dropped and counted. Nothing
 here waits for a browser, so a browser never delays anything else.
+
+Everything that is kept for a connection is counted in bytes: updates and replies that wait to be
+sent, messages that wait to be published, requests that run, and the names and parameters of its
+subscriptions. So all of them together take at most ``MAX_CONNECTIONS * CONNECTION_BYTES``. In
+addition, each has a message that is being received (``MAX_MESSAGE``) and one that is being sent.
 """
 
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import field
 from enum import StrEnum
 
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.protocol.budget import Budget
-from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import RequestError
 
+#: Browsers and programs that are connected at the same time.
+MAX_CONNECTIONS = 32
+#: What is kept for one of them, in bytes.
+CONNECTION_BYTES = 16 * 1024 * 1024
+#: The largest message of a browser or program, in bytes.
+MAX_MESSAGE = 1024 * 1024
 #: Batches of messages that wait for each subscription.
 MAX_BATCHES = 8
 #: Bytes that wait for one subscription: of large messages only the latest are of use.
 MAX_QUEUED_BYTES = 2 * 1024 * 1024
 MAX_REPLIES = 256
+
+
+class Budget:
+    """The bytes that are kept for one connection. Thread-safe."""
+
+    def __init__(self, limit: int = CONNECTION_BYTES) -> None:
+        self._limit = limit
+        self._lock = threading.Lock()
+        self._used = 0
+
+    @property
+    def used(self) -> int:
+        """The number of bytes that are kept."""
+        return self._used
+
+    def has(self, size: int) -> bool:
+        """Return whether so many more bytes may be kept."""
+        return self._used + size <= self._limit
+
+    def take(self, size: int) -> None:
+        """Count bytes that are kept from now on. Raises RequestError if they are too many."""
+        with self._lock:
+            if not self.has(size):
+                limit = f"{self._limit // 1024**2} MB"
+                raise RequestError("too_many", f"{limit} are the limit for all that waits for you")
+            self._used += size
+
+    def give(self, size: int) -> None:
+        """Count bytes that are not kept any more."""
+        with self._lock:
+            self._used -= size
 
 
 class Delivery(StrEnum):

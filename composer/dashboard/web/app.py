@@ -24,10 +24,8 @@ from composer.dashboard.client import Client
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.frames import SUBPROTOCOLS
-from composer.dashboard.protocol.budget import MAX_CONNECTIONS
-from composer.dashboard.protocol.errors import RequestError
-from composer.dashboard.protocol.messages import Values
-from composer.dashboard.protocol.outbox import Update
+from composer.dashboard.protocol.messages import RequestError, Values
+from composer.dashboard.protocol.outbox import MAX_CONNECTIONS, Update
 from composer.dashboard.ros_side import LINGER_S
 from composer.dashboard.web.connection import Connection
 from composer.dashboard.web.page_modules import file_of_page, index_of, style_sheet

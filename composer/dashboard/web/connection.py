@@ -20,11 +20,13 @@ from composer.dashboard.client import MAX_PENDING, Client
 from composer.dashboard.context import Dashboard
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.operations import OPERATIONS
-from composer.dashboard.protocol.errors import BadRequestError, RequestError, internal_error
 from composer.dashboard.protocol.messages import (
+    BadRequestError,
     ClientRequest,
+    RequestError,
     Values,
     check_characters,
+    internal_error,
     parse_request,
     to_json,
 )

@@ -24,7 +24,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.exceptions import InvalidState
 
 from composer.dashboard.access import Refusal
-from composer.dashboard.protocol.budget import MAX_MESSAGE
+from composer.dashboard.protocol.outbox import MAX_MESSAGE
 from composer.dashboard.web.app import AccessCheck, refusal_page, security_headers
 from composer.runtime.process.signals import STOP_SIGNALS
 

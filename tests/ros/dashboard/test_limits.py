@@ -11,7 +11,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from composer.dashboard.protocol.budget import MAX_CONNECTIONS
+from composer.dashboard.protocol.outbox import MAX_CONNECTIONS
 from composer.dashboard.web.server import BACKLOG, MAX_OPEN
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import (

@@ -9,7 +9,7 @@ import pytest
 
 from composer.base.resources import interfaces_folder
 from composer.dashboard.forms import Forms
-from composer.dashboard.protocol.errors import RequestError
+from composer.dashboard.protocol.messages import RequestError
 from composer.interfaces import Interfaces
 
 

@@ -23,7 +23,7 @@ from composer.dashboard.foxglove.frames import (
 )
 from composer.dashboard.foxglove.parameters import Setting, parameter, read_setting
 from composer.dashboard.foxglove.schemas import Schemas
-from composer.dashboard.protocol.errors import BadRequestError
+from composer.dashboard.protocol.messages import BadRequestError
 from composer.interfaces import Interfaces
 
 BETWEEN = "=" * 80

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.dashboard.protocol.errors import BadRequestError
-from composer.dashboard.protocol.messages import Values, parse_request, to_json
+from composer.dashboard.protocol.messages import BadRequestError, Values, parse_request, to_json
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.dashboard.protocol.budget import CONNECTION_BYTES
-from composer.dashboard.protocol.outbox import MAX_BATCHES, Delivery, Outbox, Update
+from composer.dashboard.protocol.outbox import (
+    CONNECTION_BYTES,
+    MAX_BATCHES,
+    Delivery,
+    Outbox,
+    Update,
+)
 
 
 def next_message(outbox: Outbox) -> str | bytes:
