@@ -16,7 +16,7 @@ from composer.interfaces import Interfaces
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline
-    from composer.dashboard.ros_side import RosGraphSide
+    from composer.dashboard.observing.ros_graph import RosGraph
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Dashboard:
 
 
 #: Runs on a worker thread, and returns what the browser gets. Raises RequestError or RosError.
-Run = Callable[["RosGraphSide", "Deadline"], Any]
+Run = Callable[["RosGraph", "Deadline"], Any]
 #: What to run, and its time limit in seconds.
 Prepared = tuple[Run, float]
 

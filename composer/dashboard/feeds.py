@@ -7,6 +7,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from composer.dashboard.protocol.messages import RequestError, from_ros, interna
 from composer.dashboard.protocol.outbox import Delivery, Update
 
 if TYPE_CHECKING:
-    from composer.dashboard.ros_side import RosGraphSide
+    from composer.dashboard.observing.ros_graph import RosGraph
 
 #: A feed that fails is tried again after this time.
 _RETRY_S = 1.0
@@ -41,18 +42,18 @@ class Feed(ABC):
     period_s = 1.0
     #: Whether to poll whenever a system has reported, instead of after each period.
     follows_reports = False
-    #: Polls this feed at once, on any thread; set before :meth:`start`.
+    #: Polls this feed at once, on any thread. This and the next two are set before :meth:`start`.
     poll_soon: Callable[[], None]
+    ros: RosGraph
+    #: What to release when nothing receives the feed any more.
+    resources: ExitStack
 
-    def start(self, ros: RosGraphSide) -> None:  # noqa: B027 - optional
-        """Begin to observe; called once before the first poll. Raises RequestError."""
+    def start(self) -> None:  # noqa: B027 - optional
+        """Begin to observe; called once before the first poll. Raises RequestError, RosError."""
 
     @abstractmethod
     def poll(self) -> Iterable[Update]:
         """Return what is new. Raises RequestError, which is sent; the next poll follows."""
-
-    def close(self) -> None:  # noqa: B027 - optional
-        """Stop observing."""
 
 
 class RunningFeed:
@@ -137,7 +138,7 @@ class Feeds:
             self._is_open = False
             self._changed.notify()
 
-    def run(self, ros: RosGraphSide, is_needed: Callable[[], bool]) -> None:
+    def run(self, ros: RosGraph, is_needed: Callable[[], bool]) -> None:
         """Poll the feeds until ``is_needed()`` is false or :meth:`stop` is called."""
         try:
             while self._is_open and is_needed():
@@ -166,7 +167,7 @@ class Feeds:
             closing, self._closing = self._closing, []
             return closing, [item for item in self._running.values() if item.next_s <= now_s]
 
-    def _poll(self, running: RunningFeed, ros: RosGraphSide) -> None:
+    def _poll(self, running: RunningFeed, ros: RosGraph) -> None:
         from composer.client.session import RosError
 
         running.is_urgent = False
@@ -175,7 +176,11 @@ class Feeds:
         try:
             if not running.is_started:
                 running.due_s = running.polled_s
-                running.feed.start(ros)
+                running.feed.ros = ros
+                with ExitStack() as resources:
+                    running.feed.resources = resources
+                    running.feed.start()
+                    running.feed.resources = resources.pop_all()
                 running.is_started = True
             for update in running.feed.poll():
                 running.last_error = ""
@@ -223,7 +228,7 @@ class Feeds:
         running.is_started = False
         running.last = None
         try:
-            running.feed.close()
+            running.feed.resources.close()
         except Exception as error:
             internal_error(f"the end of the channel {running.key:.200}", error)
 

@@ -18,9 +18,8 @@ from composer.dashboard.protocol.messages import RequestError, from_ros
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline
-    from composer.client.shared_session import SharedSession
     from composer.dashboard.forms import Forms
-    from composer.dashboard.observing.observed import Observed
+    from composer.dashboard.observing.ros_graph import RosGraph
 
 T = TypeVar("T")
 
@@ -34,22 +33,6 @@ _JOINED_WITHIN_S = 20.0
 _IMPORTING = threading.Lock()
 
 
-class RosGraphSide:
-    """What feeds and operations use while the dashboard is in the ROS graph."""
-
-    def __init__(
-        self, session: SharedSession, observed: Observed, forms: Forms, work: Work
-    ) -> None:
-        self.session = session
-        self.observed = observed
-        self.forms = forms
-        self.work = work
-
-
-#: Runs a function on a worker thread; an exception is only logged.
-Work = Callable[[Callable[[], None]], None]
-
-
 class RosSide:
     """Joins the ROS graph for the first browser and leaves it after the last one."""
 
@@ -60,7 +43,7 @@ class RosSide:
         self._browsers = 0
         self._left_s = 0.0
         self._thread: threading.Thread | None = None
-        self._side: RosGraphSide | None = None
+        self._graph: RosGraph | None = None
         self._joined = threading.Event()
         self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="request")
         # Apart from requests, which may take all of their threads for minutes.
@@ -102,7 +85,7 @@ class RosSide:
         if thread is not None:
             thread.join(within_s)
 
-    async def call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
+    async def call(self, operation: Callable[[RosGraph, Deadline], T], timeout_s: float) -> T:
         """Return the result of an operation, which runs on a worker thread.
 
         Raises what it raises; RequestError if the ROS graph cannot be joined or too many requests
@@ -117,13 +100,13 @@ class RosSide:
         finally:
             self._requests -= 1
 
-    def _call(self, operation: Callable[[RosGraphSide, Deadline], T], timeout_s: float) -> T:
-        if not self._joined.wait(_JOINED_WITHIN_S) or self._side is None:
+    def _call(self, operation: Callable[[RosGraph, Deadline], T], timeout_s: float) -> T:
+        if not self._joined.wait(_JOINED_WITHIN_S) or self._graph is None:
             raise RequestError("failed", self.message or "the ROS graph cannot be joined")
         from composer.client.session import Deadline, RosError
 
         try:
-            return operation(self._side, Deadline(timeout_s))
+            return operation(self._graph, Deadline(timeout_s))
         except RosError as error:
             raise from_ros(error) from error
 
@@ -137,7 +120,7 @@ class RosSide:
             if self._is_open and (self._browsers or time.monotonic() < self._left_s + LINGER_S):
                 return True
             # From here on, the next browser may start another thread: this one says nothing more.
-            self._thread, self._side, self.state = None, None, "left"
+            self._thread, self._graph, self.state = None, None, "left"
             return False
 
     def _run(self) -> None:
@@ -148,7 +131,7 @@ class RosSide:
             logging.getLogger(__name__).exception("the dashboard is not in the ROS graph")
             with self._lock:
                 if self._thread is threading.current_thread():
-                    self._thread, self._side = None, None
+                    self._thread, self._graph = None, None
                     self.state, self.message = "failed", str(error)
                     self._joined.set()
         gc.collect()  # nodes are in reference cycles, and the next collection may be far off
@@ -156,17 +139,18 @@ class RosSide:
     def _run_feeds(self) -> None:
         """Join the ROS graph, and leave it when no browser is left."""
         with ExitStack() as stack:
-            side = self._join(stack)
+            graph = self._join(stack)
             with self._lock:
-                self._side = side
+                self._graph = graph
             self.state = "ready"
             self._joined.set()
-            self._feeds.run(side, self._is_needed)
+            self._feeds.run(graph, self._is_needed)
 
-    def _join(self, stack: ExitStack) -> RosGraphSide:
+    def _join(self, stack: ExitStack) -> RosGraph:
         _import()
         from composer.client.shared_session import SharedSession
-        from composer.dashboard.observing.observed import Observed, first_topology
+        from composer.dashboard.observing.ros_graph import RosGraph
+        from composer.dashboard.observing.topology import first_topology
         from composer.runtime.middleware.dds_xml import announce_less_often
         from composer.runtime.middleware.environment import prepare_environment
 
@@ -174,24 +158,22 @@ class RosSide:
         announce_less_often(os.environ)
         first = first_topology()
         session = stack.enter_context(SharedSession())
-        observed = stack.enter_context(
-            Observed(session, self._work, first, self._feeds.poll_reports)
+        return stack.enter_context(
+            RosGraph(session, self._forms, self._work, first, self._feeds.poll_reports)
         )
-        return RosGraphSide(session, observed, self._forms, self._work)
 
 
 def _import() -> None:
     """Import what joining takes, on one thread at a time: modules of rclpy import each other."""
     with _IMPORTING:
         import composer.client.shared_session
-        import composer.dashboard.observing.observed
-        import composer.dashboard.pictures  # for the first diagram
+        import composer.dashboard.observing.ros_graph
         import composer.runtime.middleware.dds_xml  # noqa: F401
 
 
 def _prepare() -> None:
     _import()
-    from composer.dashboard.observing.observed import first_topology
+    from composer.dashboard.observing.topology import first_topology
 
     first_topology()
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from composer.dashboard.foxglove.schemas import Schemas
+from composer.dashboard.foxglove.encoding import Schemas
 from composer.interfaces import Interfaces, Message
 from tests.programs import require_package
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared, required
 from composer.dashboard.feeds import Feed
-from composer.dashboard.observing.report_pairs import ReportPairs
+from composer.dashboard.observing.reports import ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
 from composer.runtime.metrics.message_rate import CountedRate
 
 if TYPE_CHECKING:
     from composer.client.systems.system_reports import NodeReport
+    from composer.dashboard.observing.diagrams import Diagram
     from composer.dashboard.observing.topology import Topology
-    from composer.dashboard.pictures import Diagram
-    from composer.dashboard.ros_side import RosGraphSide
-    from composer.plan.drift import ObservedEndpoint
 
 VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")
 #: The size of the page in pixels, unless a subscription says it.
@@ -41,26 +40,19 @@ class DiagramFeed(Feed):
     follows_reports = True  # to wake up together with the other feeds
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
-        """Read the parameters of the channel. Raises BadRequestError, RequestError."""
         self._view = values.choice("view", VIEWS, "nodes")
         source = "declared" if self._view in _DECLARED_ONLY else "live"
         self._is_live = values.choice("source", ("live", "declared"), source) == "live"
         self._is_live = self._is_live and self._view not in _DECLARED_ONLY
         self._declared = None if self._is_live else required(declared, f"the view {self._view}")
-        self._ros: RosGraphSide
         self._drawn: tuple[int, frozenset[str]] | None = None
         self._is_drawing = False
         self._finished: deque[Update | Exception] = deque()
 
-    def start(self, ros: RosGraphSide) -> None:
+    def start(self) -> None:
         """Subscribe to the reports of systems, which have the states of nodes."""
-        self._ros = ros
         self._drawn, self._is_drawing = None, False
-        ros.observed.reports.acquire()
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self._ros.observed.reports.release()
+        self.resources.enter_context(self.ros.reports.used())
 
     def poll(self) -> Iterator[Update]:
         """Yield what is drawn."""
@@ -69,24 +61,24 @@ class DiagramFeed(Feed):
             if isinstance(item, Exception):
                 raise item
             yield item
-        observed = self._ros.observed
-        self.period_s = _SOON_S if observed.is_new else 1.0
-        if self._is_drawing or (self._is_live and observed.waits_for_reports):
+        ros = self.ros
+        self.period_s = _SOON_S if ros.is_new else 1.0
+        if self._is_drawing or (self._is_live and ros.waits_for_reports):
             return
-        topology = observed.topology()
-        states = observed.states() if self._is_live else {}
+        topology = ros.topology()
+        states = ros.states() if self._is_live else {}
         #: Nodes with a state have one more line.
         wanted = (topology.revision if self._is_live else 0, frozenset(states))
         if wanted == self._drawn:
             return
         self._drawn = wanted
         self._is_drawing = True
-        self._ros.work(lambda: self._draw(topology, states))
+        ros.work(lambda: self._draw(topology, states))
 
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
         key = (self._drawn, self._view, self._is_live)
         try:
-            diagram = self._ros.observed.diagrams.of(key, lambda: self._laid_out(topology, states))
+            diagram = self.ros.diagrams.of(key, lambda: self._laid_out(topology, states))
             self._finished.extend(self._updates(diagram, topology.revision))
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
@@ -95,7 +87,7 @@ class DiagramFeed(Feed):
             self.poll_soon()
 
     def _laid_out(self, topology: Topology, states: Mapping[str, str | None]) -> Diagram:
-        from composer.dashboard.pictures import Diagram, declared_scene, live_scene
+        from composer.dashboard.observing.diagrams import Diagram, declared_scene, live_scene
         from composer.graph.views import View
 
         if self._declared is not None:
@@ -112,12 +104,10 @@ class PictureFeed(DiagramFeed):
     """The diagram on a page, again whenever the graph has changed."""
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
-        """Read the parameters of the channel. Raises BadRequestError, RequestError."""
         width = values.number("width", _WIDTH, _MIN_SIDE, _MAX_SIDE)
         height = values.number("height", _HEIGHT, _MIN_SIDE, _MAX_SIDE)
         self._page = (width, height)
         super().__init__(values, declared)
-        values.end()
 
     def _updates(self, diagram: Diagram, revision: int) -> Iterable[Update]:
         from composer.graph.layout import Size
@@ -133,42 +123,28 @@ class LiveFeed(Feed):
 
     follows_reports = True
 
-    def __init__(self, values: Values, declared: Declared | None) -> None:
-        """Read the parameters of the channel. Raises BadRequestError."""
-        del declared
-        values.end()
-        self._ros: RosGraphSide
+    def __init__(self, _: Values, __: Declared | None) -> None:
         self._pairs = ReportPairs(lambda report: report.at_s)
         self._measured: set[str] = set()
         self._rates: dict[str, CountedRate] = {}  # by the keys of edges
-        #: What the topics to measure depend on, and these topics with their endpoints.
+        #: What the topics to measure depend on.
         self._known: object = None
-        self._wanted: dict[str, list[ObservedEndpoint]] = {}
 
-    def start(self, ros: RosGraphSide) -> None:
+    def start(self) -> None:
         """Subscribe to the reports of systems."""
-        self._ros = ros
         self._known = None
-        ros.observed.reports.acquire()
-
-    def close(self) -> None:
-        """Stop measuring."""
-        for topic in self._measured:
-            self._ros.observed.meters.release(topic)
-        self._measured.clear()
-        self._ros.observed.reports.release()
+        self.resources.enter_context(self.ros.reports.used())
+        self.resources.callback(self._set_measured, set())
 
     def poll(self) -> Iterator[Update]:
         """Yield all states and rates."""
         from composer.client.systems.system_reports import of_whole_systems
 
-        observed = self._ros.observed
         # Sorted: what other processes of a system report of their nodes is newer, and comes later.
-        current = sorted(observed.reports.current().items())
+        current = sorted(self.ros.reports.current().items())
         reports = {name: report for name, report in current if report is not None}
-        nodes: dict[str, Any] = {
-            name: {"state": state} for name, state in observed.states().items()
-        }
+        states = self.ros.states().items()
+        nodes: dict[str, Any] = {name: {"state": state} for name, state in states}
         for system in of_whole_systems(reports).values():
             nodes |= {node.node: _state(node) for node in system.nodes}
         edges: dict[str, Any] = {}
@@ -201,16 +177,15 @@ class LiveFeed(Feed):
 
     def _measure(self, reported: set[str]) -> dict[str, Any]:
         """Measure the topics that no system reports; return their rates."""
-        meters = self._ros.observed.meters
-        wanted = self._unreported(reported)
-        for topic in self._measured - wanted.keys():
-            meters.release(topic)
-            self._measured.discard(topic)
-        for topic, ends in wanted.items():
-            if topic not in self._measured and meters.acquire(topic, ends):
-                self._measured.add(topic)
+        topology, systems = self.ros.topology(), set(self.ros.reports.current())
+        known = (topology.revision, systems, reported)
+        if known != self._known:
+            self._known = known
+            topics = _unreported(topology, systems, reported)
+            self._set_measured(set(islice(topics, _MAX_MEASURED)))
         if not self._measured:
             return {}
+        meters = self.ros.meters
         meters.poll()
         found = {topic: meters.figures(topic) for topic in sorted(self._measured)}
         return {
@@ -219,27 +194,21 @@ class LiveFeed(Feed):
             if figures is not None
         }
 
-    def _unreported(self, reported: set[str]) -> dict[str, list[ObservedEndpoint]]:
-        """Return the topics that no system reports, with their endpoints."""
-        topology = self._ros.observed.topology()
-        systems = set(self._ros.observed.reports.current())
-        known = (topology.revision, systems, reported)
-        if known == self._known:
-            return self._wanted
-        self._known = known
-        managers = {f"{system}/{_MANAGER}" for system in systems}
+    def _set_measured(self, topics: set[str]) -> None:
+        self.ros.meters.acquire(topics - self._measured)
+        self.ros.meters.release(self._measured - topics)
+        self._measured = topics
 
-        def is_reporting(end: tuple[str, ObservedEndpoint]) -> bool:
-            """Return whether this is for tools: managers report only while others listen."""
-            return end[1].is_for_tools or end[0] in managers
 
-        wanted = [
-            (topic, [end for _, end in ends])
-            for topic, ends in topology.of_topics.items()
-            if topic not in reported and not all(map(is_reporting, ends))
-        ]
-        self._wanted = dict(wanted[:_MAX_MEASURED])
-        return self._wanted
+def _unreported(topology: Topology, systems: set[str], reported: set[str]) -> Iterator[str]:
+    """Yield the topics that no system reports, and that are not for tools."""
+    managers = {f"{system}/{_MANAGER}" for system in systems}
+    for topic, ends in topology.of_topics.items():
+        # Managers report only while others listen.
+        if topic not in reported and not all(
+            end.is_for_tools or node in managers for node, end in ends
+        ):
+            yield topic
 
 
 def _state(node: NodeReport) -> dict[str, Any]:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.observing.processes import ProcessMonitor, total
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
+from composer.runtime.process.usage import ProcessUsage, process_usage
 
 if TYPE_CHECKING:
     from composer.client.systems.system_reports import NodeReport, SystemReport
-    from composer.dashboard.ros_side import RosGraphSide
 
 _PERIOD_S = 1.0
 #: While nodes are being discovered.
@@ -45,40 +44,32 @@ class NodesFeed(Feed):
 
     follows_reports = True
 
-    def __init__(self, values: Values, declared: Declared | None) -> None:
-        """Read the parameters of the channel. Raises BadRequestError."""
-        values.end()
+    def __init__(self, _: Values, declared: Declared | None) -> None:
         self._declared = declared
-        self._ros: RosGraphSide
         self._host = socket.gethostname()
         self._processes = ProcessMonitor()
         self._usage: dict[str, dict[str, Any] | None] = {}
         self._due_s = self._usage_due_s = 0.0
         self._last: Any = None
 
-    def start(self, ros: RosGraphSide) -> None:
+    def start(self) -> None:
         """Subscribe to the reports of systems."""
-        self._ros = ros
-        ros.observed.reports.acquire()
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self._ros.observed.reports.release()
+        self.resources.enter_context(self.ros.reports.used())
 
     def poll(self) -> Iterator[Update]:
         """Yield all nodes and systems if anything is new."""
         from composer.client.systems.system_reports import of_whole_systems
 
-        observed = self._ros.observed
-        self.period_s = _SOON_S if observed.is_new else _PERIOD_S
-        reports = of_whole_systems(observed.reports.current())
+        ros = self.ros
+        self.period_s = _SOON_S if ros.is_new else _PERIOD_S
+        reports = of_whole_systems(ros.reports.current())
         managed = {
             node.node: (name, node)
             for name, report in reports.items()
             if report is not None
             for node in report.nodes
         }
-        states = dict.fromkeys(observed.topology().visible, "") | observed.states()
+        states = dict.fromkeys(ros.topology().visible, "") | ros.states()
         held_down = [(node.held_down, node.condition) for _, node in managed.values()]
         activities = [(name, report and report.activity) for name, report in reports.items()]
         now_s = time.monotonic()
@@ -140,3 +131,46 @@ class NodesFeed(Feed):
 
     def _declared_at(self, node: str) -> str | None:
         return None if self._declared is None else self._declared.declared_at(node)
+
+
+def total(usages: Iterable[Mapping[str, Any] | None]) -> dict[str, Any] | None:
+    """Return the usage of several processes together, None if none of them runs."""
+    known = [usage for usage in usages if usage is not None]
+    if not known:
+        return None
+    percents = [usage["cpu_percent"] for usage in known]
+    return {
+        "cpu_percent": None if None in percents else round(sum(percents), 1),
+        "memory_mb": round(sum(usage["memory_mb"] for usage in known), 1),
+        "threads": sum(usage["threads"] for usage in known),
+        "up_s": max(usage["up_s"] for usage in known),
+        "processes": len(known),
+    }
+
+
+class ProcessMonitor:
+    """The use of the processors by processes, between two calls."""
+
+    def __init__(self) -> None:
+        self._before: dict[str, ProcessUsage] = {}
+
+    def usage(self, pid: str) -> dict[str, Any] | None:
+        """Return the usage of a process; None if there is no such process.
+
+        ``cpu_percent`` is the share of one processor since the last call, None at the first.
+        """
+        reading = process_usage(pid) if pid.isascii() and pid.isdigit() else None
+        if reading is None:
+            self._before.pop(pid, None)
+            return None
+        before, self._before[pid] = self._before.get(pid), reading
+        percent = None
+        if before is not None and reading.at_s > before.at_s:
+            used_s = max(0.0, reading.cpu_s - before.cpu_s)
+            percent = round(100.0 * used_s / (reading.at_s - before.at_s), 1)
+        return {
+            "cpu_percent": percent,
+            "memory_mb": round(reading.memory_mb, 1),
+            "threads": reading.threads,
+            "up_s": round(reading.up_s, 1),
+        }

@@ -16,13 +16,19 @@ from composer.model.qos import QosProfile
 
 if TYPE_CHECKING:
     from composer.client.shared_session import SampledTopic
-    from composer.dashboard.ros_side import RosGraphSide
+    from composer.dashboard.observing.ros_graph import RosGraph
 
 _EVENTS = "/parameter_events"
 _EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
-_EVENTS_PROFILE = QosProfile(depth=1000)
+#: Events that may wait.
+MAX_EVENTS = 1000
 _READ_PERIOD_S = 2.0
 _READ_WITHIN_S = 3.0
+
+
+def parameter_events(ros: RosGraph) -> SampledTopic:
+    """Subscribe to announcements of changes of parameters, of all nodes."""
+    return ros.session.sample(_EVENTS, _EVENTS_TYPE, QosProfile(depth=MAX_EVENTS))
 
 
 class ParametersFeed(Feed):
@@ -34,39 +40,30 @@ class ParametersFeed(Feed):
     period_s = 0.1
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
-        """Read the parameters of the channel. Raises BadRequestError."""
         self._node = values.text("node")
-        values.end()
         self._declared = {} if declared is None else declared.parameters.get(self._node, {})
-        self._ros: RosGraphSide
-        self._events: SampledTopic | None = None
+        self._events: SampledTopic
         self._lock = threading.Lock()
         self._due_s = 0.0
         self._is_reading = False
         self._found: str | RequestError | None = None
         self._last = ""
 
-    def start(self, ros: RosGraphSide) -> None:
+    def start(self) -> None:
         """Subscribe to announcements of changes."""
-        self._ros = ros
-        self._events = ros.session.sample(_EVENTS, _EVENTS_TYPE, _EVENTS_PROFILE)
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        if self._events is not None:
-            self._events.close()
+        self._events = parameter_events(self.ros)
+        self.resources.callback(self._events.close)
 
     def poll(self) -> Iterator[Update]:
         """Yield all parameters if any has changed."""
-        assert self._events is not None  # noqa: S101 - set by start
-        events = self._events.take(1000)
+        events = self._events.take(MAX_EVENTS)
         now_s = time.monotonic()
         if any(event.content.node == self._node for event in events):
             self._due_s = now_s
         if now_s >= self._due_s and not self._is_reading:
             self._due_s = now_s + _READ_PERIOD_S
             self._is_reading = True
-            self._ros.work(self._read)
+            self.ros.work(self._read)
         with self._lock:
             found, self._found = self._found, None
         if isinstance(found, RequestError):
@@ -81,7 +78,7 @@ class ParametersFeed(Feed):
 
         found: str | RequestError
         try:
-            client = ParameterClient(self._ros.session, Deadline(_READ_WITHIN_S), self._node)
+            client = ParameterClient(self.ros.session, Deadline(_READ_WITHIN_S), self._node)
             names = client.names()
             descriptions, values = client.describe(names), client.values(names)
             parameters = [self._parameter(asdict(item), values[item.name]) for item in descriptions]

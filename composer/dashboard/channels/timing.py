@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.observing.report_pairs import ReportPair, ReportPairs
+from composer.dashboard.observing.reports import ReportPair, ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
 
 if TYPE_CHECKING:
-    from composer.dashboard.ros_side import RosGraphSide
     from composer.runtime.metrics.figures import CallbackRates
 
 _MS = 1e3
@@ -22,25 +21,17 @@ _MS = 1e3
 class TimingFeed(Feed):
     """Timings once a second."""
 
-    def __init__(self, values: Values, declared: Declared | None) -> None:
-        """Read the parameters of the channel. Raises BadRequestError."""
-        values.end()
+    def __init__(self, _: Values, declared: Declared | None) -> None:
         self._declared = declared
-        self._ros: RosGraphSide
         self._pairs = ReportPairs(lambda report: report.callbacks_at_s)
 
-    def start(self, ros: RosGraphSide) -> None:
+    def start(self) -> None:
         """Subscribe to the timings."""
-        self._ros = ros
-        ros.observed.reports.acquire(callbacks=True)
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self._ros.observed.reports.release(callbacks=True)
+        self.resources.enter_context(self.ros.reports.used(callbacks=True))
 
     def poll(self) -> Iterator[Update]:
         """Yield the timings of all systems."""
-        reports = self._ros.observed.reports.current()
+        reports = self.ros.reports.current()
         with_timings = {
             name: report for name, report in reports.items() if report and report.callbacks_at_s
         }

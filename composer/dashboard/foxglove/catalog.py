@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.feeds import Feed
-from composer.dashboard.foxglove.frames import CDR, SCHEMA_ENCODING
-from composer.dashboard.foxglove.schemas import Schemas
+from composer.dashboard.foxglove.encoding import CDR, SCHEMA_ENCODING, Schemas
 from composer.dashboard.protocol.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:
     from composer.dashboard.observing.topology import Topology
-    from composer.dashboard.ros_side import RosGraphSide
 
 T = TypeVar("T")
 
@@ -139,19 +137,13 @@ class CatalogFeed(Feed):
 
     def __init__(self, catalog: Catalog) -> None:
         self._catalog = catalog
-        self._ros: RosGraphSide
-        self._revision = -1
-
-    def start(self, ros: RosGraphSide) -> None:
-        """Offer what is known."""
-        self._ros = ros
-        self._revision = -1
+        self._offered: Topology | None = None
 
     def poll(self) -> Iterator[Update]:
         """Yield an update if the ROS graph has changed."""
-        topology = self._ros.observed.topology()
-        if topology.revision != self._revision:
-            self._revision = topology.revision
+        topology = self.ros.topology()
+        if topology is not self._offered:
+            self._offered = topology
             self._catalog.update(topology)
             yield Update("")
 

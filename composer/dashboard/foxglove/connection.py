@@ -5,10 +5,11 @@ from __future__ import annotations
 import uuid
 from collections.abc import Callable
 from dataclasses import field
+from functools import partial
+from typing import TYPE_CHECKING
 
 from starlette.websockets import WebSocket
 
-from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.catalog import (
@@ -18,23 +19,30 @@ from composer.dashboard.foxglove.catalog import (
     changes,
     graph_update,
 )
-from composer.dashboard.foxglove.frames import (
+from composer.dashboard.foxglove.encoding import (
     CDR,
     WARNING,
     ClientMessage,
+    Schemas,
+    ServiceCall,
     message_data,
     parse_binary,
     parse_text,
+    service_response,
     time_frame,
 )
-from composer.dashboard.foxglove.link import Link, Running
-from composer.dashboard.foxglove.messages import Publications, Subscriptions
-from composer.dashboard.foxglove.requests import Parameters, call_service
-from composer.dashboard.foxglove.schemas import Schemas
-from composer.dashboard.foxglove.topics import ClockFeed
-from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values
+from composer.dashboard.foxglove.link import Link, error_text
+from composer.dashboard.foxglove.messages import ClockFeed, Publications, Subscriptions
+from composer.dashboard.foxglove.parameters import Parameters
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, unknown
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
+from composer.dashboard.web.client import Running
 
+if TYPE_CHECKING:
+    from composer.client.session import Deadline
+    from composer.dashboard.observing.ros_graph import RosGraph
+
+_CALL_S = 10.0
 #: Messages of a topic that wait for a client.
 _MAX_WAITING = 256
 #: The time, among the subscriptions, whose numbers are not negative.
@@ -86,7 +94,7 @@ class FoxgloveConnection(Link):
 
     def _begin(self) -> None:
         self._send_info()
-        self._catalog = self.start("catalog", CatalogFeed(self._server.catalog), self._on_catalog)
+        self._catalog = self.follow("catalog", CatalogFeed(self._server.catalog), self._on_catalog)
 
     def _end(self) -> None:
         for running in (self._catalog, self._clock):
@@ -105,20 +113,45 @@ class FoxgloveConnection(Link):
                 if isinstance(frame, ClientMessage):
                     self._publications.publish(frame)
                 else:
-                    call_service(self, frame, self._known.services)
+                    self._call_service(frame)
                 return True
             op, values = parse_text(message)
             operation = self._operations.get(op)
             if operation is None:
-                close = nearest(op, self._operations)
-                hint = f"did you mean '{close}'?" if close else None
-                raise BadRequestError(f"there is no operation '{op:.80}'", hint)
+                raise unknown("operation", op, self._operations)
             is_valid = True
             operation(values)
         except RequestError as error:
             self._log_refused(error)
-            self._refuse(error)
+            self.refuse(error)
         return is_valid
+
+    def _refuse(self, error: RequestError) -> None:
+        self.refuse(error)
+
+    def _call_service(self, call: ServiceCall) -> None:
+        """Call a service; the client gets the response, or why there is none."""
+
+        def fail(error: RequestError) -> None:
+            content = {"serviceId": call.service, "callId": call.call, "message": error_text(error)}
+            self.post({"op": "serviceCallFailure", **content})
+
+        def run(ros: RosGraph, deadline: Deadline) -> bytes:
+            from composer.client.messages.serialized import call_serialized
+
+            return call_serialized(ros.session, deadline, service.name, service.type, call.data)
+
+        try:
+            self.check_may_change("calling services")
+            found = self._known.services.get(call.service)
+            if found is None:
+                raise BadRequestError(f"there is no service {call.service}")
+            if call.encoding != CDR:
+                raise BadRequestError(f"the encoding must be {CDR}, not '{call.encoding:.20}'")
+            service = found
+            self.request(run, _CALL_S, lambda data: self.post(service_response(call, data)), fail)
+        except RequestError as error:
+            fail(error)
 
     def _send_info(self) -> None:
         """Say what is possible; sent again, with the same session, it only replaces that."""
@@ -137,10 +170,7 @@ class FoxgloveConnection(Link):
             }
         )
 
-    def _on_catalog(self, update: Update) -> None:
-        if update.is_error:
-            self.say_error(update)
-            return
+    def _on_catalog(self, _: Update) -> None:
         before, self._known = self._known, self._server.catalog.current
         self._offer_channels(before)
         if not self.is_read_only:
@@ -150,7 +180,8 @@ class FoxgloveConnection(Link):
         if self._known.has_clock and self._clock is None:
             self._send_info()
             self._outbox.open(_TIME, "", Delivery.LATEST)
-            self._clock = self.start("clock", ClockFeed(), self._on_time)
+            send = partial(self._outbox.put, _TIME)
+            self._clock = self.follow("clock", ClockFeed(), send)
 
     def _offer_channels(self, before: Contents) -> None:
         gone, new = changes(before.channels, self._known.channels)
@@ -171,12 +202,6 @@ class FoxgloveConnection(Link):
             self.post({"op": "unadvertiseServices", "serviceIds": gone})
         if new:
             self.post({"op": "advertiseServices", "services": [item.as_data() for item in new]})
-
-    def _on_time(self, update: Update) -> None:
-        if update.is_error:
-            self.say_error(update)
-        else:
-            self._outbox.put(_TIME, update)
 
     def _subscribe_graph(self, _: Values) -> None:
         if not self._has_graph:

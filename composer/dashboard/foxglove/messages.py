@@ -1,21 +1,174 @@
-"""The messages that a client subscribes to, and those that it publishes."""
+"""The messages that a client subscribes to, those that it publishes, and the simulated time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import TYPE_CHECKING
 
+from composer.dashboard.feeds import Feed
 from composer.dashboard.foxglove.catalog import Channel
-from composer.dashboard.foxglove.frames import WARNING, ClientMessage, number, status
-from composer.dashboard.foxglove.link import Link, Running
-from composer.dashboard.foxglove.topics import PublishedFeed, TopicFeed
-from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values
-from composer.dashboard.protocol.outbox import Update
+from composer.dashboard.foxglove.encoding import CDR, WARNING, ClientMessage, number, status
+from composer.dashboard.foxglove.link import Link
+from composer.dashboard.observing.topics import LARGE_TYPES
+from composer.dashboard.protocol.messages import (
+    BadRequestError,
+    RequestError,
+    Values,
+    from_ros,
+    to_json,
+)
+from composer.dashboard.protocol.outbox import Budget, Delivery, Update
+from composer.dashboard.web.client import Running
+from composer.model.qos import QosProfile, Reliability
+
+if TYPE_CHECKING:
+    from composer.client.messages.serialized import SerializedPublisher
+    from composer.client.shared_session import SampledTopic
+    from composer.dashboard.observing.topics import TopicReader
 
 #: Of one client.
 _MAX_SUBSCRIPTIONS = 1000
 _MAX_CHANNELS = 100
 _MAX_ITEMS = 10_000
+#: Messages of a client that wait to be published.
+_MAX_WAITING = 256
 _SKIPPED = "there are more bytes than the dashboard reads of one topic"
+_DEPTH = 200
+_POLL_S = 0.02
+_CLOCK_S = 0.05
+_CLOCK_PROFILE = QosProfile(depth=1, reliability=Reliability.BEST_EFFORT)
+
+
+class TopicFeed(Feed):
+    """The messages of a topic, as bytes.
+
+    Of large messages, a client gets the latest, and all clients share one subscription. Of others,
+    each has a subscription of its own, so that it gets the latched messages.
+    """
+
+    period_s = _POLL_S
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self.is_shared = channel.type in LARGE_TYPES
+        self.delivery = Delivery.LATEST if self.is_shared else Delivery.QUEUE
+        self._reader: TopicReader
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._reader = self.ros.reader(self._channel.topic, self._channel.type, _DEPTH)
+        self.resources.callback(self._reader.close)
+
+    def poll(self) -> Iterator[Update]:
+        """Yield the messages that have arrived."""
+        samples = self._reader.take(_DEPTH)
+        for sample, missed in zip(samples, self._reader.missed, strict=True):
+            yield Update(sample.content, dropped=missed, at_ns=sample.received_ns)
+
+
+class ClockFeed(Feed):
+    """The simulated time."""
+
+    period_s = _CLOCK_S
+
+    def __init__(self) -> None:
+        self._clock: SampledTopic
+
+    def start(self) -> None:
+        """Subscribe."""
+        self._clock = self.ros.session.sample("/clock", "rosgraph_msgs/msg/Clock", _CLOCK_PROFILE)
+        self.resources.callback(self._clock.close)
+
+    def poll(self) -> Iterator[Update]:
+        """Yield the latest time."""
+        for sample in self._clock.take(1):
+            stamp = sample.content.clock
+            yield Update(b"", at_ns=stamp.sec * 10**9 + stamp.nanosec)
+
+
+class PublishedFeed(Feed):
+    """The messages that a client publishes on one of its channels.
+
+    They are published in their order, on the thread of feeds; the updates are only errors.
+    """
+
+    is_shared = False
+
+    def __init__(self, topic: str, type_name: str, encoding: str, budget: Budget) -> None:
+        """Raise BadRequestError for an encoding other than CDR, and for a wrong type."""
+        if encoding != CDR:
+            raise BadRequestError(
+                f"the encoding of '{topic:.80}' must be {CDR}, not '{encoding:.20}'"
+            )
+        self.topic = topic
+        package, separator, name = type_name.partition("/")
+        if not package or not separator or not name:
+            raise BadRequestError(
+                f"'schemaName' must be a type such as std_msgs/msg/String, not '{type_name:.80}'"
+            )
+        # Some clients write package/Name.
+        self._type_name = type_name if "/" in name else f"{package}/msg/{name}"
+        self._budget = budget
+        self._waiting: deque[bytes] = deque()
+        self._publisher: SerializedPublisher
+        self._problem = ""  # why there is no publisher
+
+    @property
+    def size(self) -> int:
+        """The size of its names in bytes."""
+        return len(self.topic) + len(self._type_name)
+
+    def put(self, data: bytes) -> None:
+        """Add a message, on any thread. Raises RequestError if it cannot wait."""
+        if self._problem:
+            raise RequestError("failed", f"'{self.topic:.80}': {self._problem}")
+        if len(self._waiting) >= _MAX_WAITING:
+            raise RequestError("busy", f"'{self.topic:.80}': {_MAX_WAITING} messages wait already")
+        self._budget.take(len(data))
+        self._waiting.append(data)
+        self.poll_soon()
+
+    def forget(self) -> None:
+        """Discard what waits, on any thread."""
+        while self._take() is not None:
+            pass
+
+    def start(self) -> None:
+        """Create the publisher; what waits is lost if that is not possible."""
+        from composer.client.messages.serialized import SerializedPublisher
+        from composer.dashboard.channels.sending import suitable_profile
+
+        try:
+            profile = suitable_profile(self.ros, self.topic)
+            session = self.ros.session
+            self._publisher = SerializedPublisher(session, self.topic, self._type_name, profile)
+        except Exception as error:
+            self._problem = f"{error!s:.200}"
+            self.forget()
+            raise
+        self.resources.callback(self._publisher.close)
+        self._problem = ""
+
+    def poll(self) -> Iterator[Update]:
+        """Publish what waits; yield errors."""
+        from composer.client.session import RosError
+
+        while (data := self._take()) is not None:
+            try:
+                self._publisher.publish(data)
+            except RosError as error:
+                failed = from_ros(error)
+                message = to_json({**failed.as_data(), "message": f"'{self.topic}': {failed}"})
+                yield Update(message, is_error=True)
+
+    def _take(self) -> bytes | None:
+        try:
+            data = self._waiting.popleft()
+        except IndexError:
+            return None
+        self._budget.give(len(data))
+        return data
 
 
 class Subscriptions:
@@ -43,9 +196,11 @@ class Subscriptions:
                 raise RequestError("too_many", f"{_MAX_SUBSCRIPTIONS} subscriptions are the limit")
             feed = TopicFeed(channel)
             self._link.outbox.open(identifier, channel.topic, feed.delivery)
-            take = self._sender(identifier, channel.topic)
-            running = self._link.start(f"channel {channel.id}", feed, take)
-            self._running[identifier] = channel.id, running
+            send = self._sender(identifier, channel.topic)
+            self._running[identifier] = (
+                channel.id,
+                self._link.follow(f"channel {channel.id}", feed, send),
+            )
 
     def unsubscribe(self, values: Values) -> None:
         """Unsubscribe as a message requests. Raises RequestError."""
@@ -73,9 +228,6 @@ class Subscriptions:
 
         def send(update: Update) -> None:
             nonlocal skipped, reported
-            if update.is_error:
-                self._link.say_error(update)
-                return
             outbox.put(identifier, update)
             skipped += update.dropped
             if skipped > 2 * reported:
@@ -111,7 +263,7 @@ class Publications:
             budget = self._link.outbox.budget
             feed = PublishedFeed(topic, type_name, wanted.text("encoding"), budget)
             budget.take(feed.size)
-            running = self._link.start(f"publisher {identifier}", feed, self._link.say_error)
+            running = self._link.start("foxglove publisher", feed, self._link.say_error)
             self._running[identifier] = feed, running
 
     def unadvertise(self, values: Values) -> None:
@@ -124,9 +276,7 @@ class Publications:
     def publish(self, message: ClientMessage) -> None:
         """Publish a message. Raises RequestError."""
         self._link.check_may_change("publishing")
-        feed, running = self._find(message.channel)
-        feed.put(message.data)
-        self._link.poll_soon(running)
+        self._find(message.channel).put(message.data)
 
     def end(self) -> None:
         """Destroy all publishers."""
@@ -139,8 +289,7 @@ class Publications:
         feed.forget()
         self._link.outbox.budget.give(feed.size)
 
-    def _find(self, identifier: int) -> tuple[PublishedFeed, Running]:
-        found = self._running.get(identifier)
-        if found is None:
+    def _find(self, identifier: int) -> PublishedFeed:
+        if identifier not in self._running:
             raise BadRequestError(f"you have not advertised channel {identifier}")
-        return found
+        return self._running[identifier][0]

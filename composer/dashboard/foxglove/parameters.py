@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import base64
 import binascii
-from collections.abc import Iterable, Iterator, Mapping
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from composer.base.fast_dataclass import dataclass
+from composer.dashboard.channels.parameters import MAX_EVENTS, parameter_events
 from composer.dashboard.feeds import Feed
-from composer.dashboard.protocol.messages import BadRequestError, to_json
+from composer.dashboard.foxglove.encoding import ERROR
+from composer.dashboard.foxglove.link import Link, error_text
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update
-from composer.model.qos import QosProfile
+from composer.dashboard.web.client import Running
 
 if TYPE_CHECKING:
     from composer.client.parameters import ParameterClient
     from composer.client.session import Deadline
     from composer.client.shared_session import SampledTopic
-    from composer.dashboard.ros_side import RosGraphSide
+    from composer.dashboard.observing.ros_graph import RosGraph
 
-_EVENTS = "/parameter_events"
-_EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
-_EVENTS_PROFILE = QosProfile(depth=1000)
-_MAX_EVENTS = 1000
+_PARAMETERS_S = 5.0
+_MAX_ITEMS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,14 +37,95 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class _Answer:
     """Parameters as they are sent, and what went wrong."""
 
     parameters: list[dict[str, Any]]
     problems: list[str]
 
 
-class ParameterEvents(Feed):
+class Parameters:
+    """The parameters of all nodes, for one client."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._names: set[str] = set()
+        self._has_all = False
+        self._events: Running | None = None
+
+    def read(self, values: Values) -> None:
+        """Send the parameters that a message requests. Raises RequestError."""
+        names = values.texts("parameterNames", _MAX_ITEMS)
+        self._request(values.optional_text("id"), lambda ros, limit: _read_all(ros, limit, names))
+
+    def set(self, values: Values) -> None:
+        """Set parameters as a message requests. Raises RequestError."""
+        self._link.check_may_change("setting parameters")
+        settings = [read_setting(item) for item in values.items("parameters", _MAX_ITEMS)]
+        identifier = values.optional_text("id")
+        self._request(
+            identifier,
+            lambda ros, limit: _set_all(ros, limit, settings),
+            is_answered=identifier is not None,
+        )
+
+    def subscribe(self, values: Values) -> None:
+        """Send parameters whenever they change, all without names. Raises RequestError."""
+        names = values.texts("parameterNames", _MAX_ITEMS)
+        if len(self._names) + len(names) > _MAX_ITEMS:
+            raise RequestError("too_many", f"{_MAX_ITEMS} parameters are the limit")
+        new = set(names) - self._names
+        self._link.outbox.budget.take(_size(new))
+        self._names |= new
+        self._has_all |= not names
+        if self._events is None:
+            self._events = self._link.follow("parameters", _ParameterEvents(), self._on_change)
+
+    def unsubscribe(self, values: Values) -> None:
+        """Send parameters no longer, none at all without names. Raises RequestError."""
+        names = values.texts("parameterNames", _MAX_ITEMS)
+        gone = self._names & set(names) if names else self._names
+        self._link.outbox.budget.give(_size(gone))
+        self._names -= gone
+        self._has_all &= bool(names)
+        if not self._names and not self._has_all:
+            self.end()
+
+    def end(self) -> None:
+        """Receive changes no longer."""
+        if self._events is not None:
+            self._link.stop(self._events)
+            self._events = None
+
+    def _request(
+        self,
+        identifier: str | None,
+        run: Callable[[RosGraph, Deadline], _Answer],
+        *,
+        is_answered: bool = True,
+    ) -> None:
+        def done(answer: _Answer) -> None:
+            for problem in answer.problems:
+                self._link.say(ERROR, problem)
+            content = {"op": "parameterValues", "parameters": answer.parameters}
+            if is_answered:
+                self._link.post(content if identifier is None else content | {"id": identifier})
+
+        self._link.request(run, _PARAMETERS_S, done, self._link.refuse)
+
+    def _on_change(self, update: Update) -> None:
+        changed = [
+            item for item in json.loads(update.data) if self._has_all or item["name"] in self._names
+        ]
+        if changed:
+            self._link.post({"op": "parameterValues", "parameters": changed})
+
+
+def _size(names: Iterable[str]) -> int:
+    return sum(map(len, names))
+
+
+class _ParameterEvents(Feed):
     """The parameters that change, of all nodes."""
 
     period_s = 0.1
@@ -51,34 +134,24 @@ class ParameterEvents(Feed):
     def __init__(self) -> None:
         self._events: SampledTopic
 
-    def start(self, ros: RosGraphSide) -> None:
+    def start(self) -> None:
         """Subscribe to announcements of changes."""
-        self._events = ros.session.sample(_EVENTS, _EVENTS_TYPE, _EVENTS_PROFILE)
+        self._events = parameter_events(self.ros)
+        self.resources.callback(self._events.close)
 
     def poll(self) -> Iterator[Update]:
         """Yield the parameters that have changed."""
         from composer.runtime.ros.parameter_values import plain_value
 
-        found: dict[str, dict[str, Any]] = {}
-        for sample in self._events.take(_MAX_EVENTS):
+        changed: dict[str, Any] = {}
+        for sample in self._events.take(MAX_EVENTS):
             event = sample.content
             for item in (*event.new_parameters, *event.changed_parameters):
-                name = full_name(event.node, item.name)
-                found[name] = parameter(name, plain_value(item.value))
+                changed[_full_name(event.node, item.name)] = plain_value(item.value)
             for item in event.deleted_parameters:
-                name = full_name(event.node, item.name)
-                found[name] = parameter(name, None)
-        if found:
-            yield Update(to_json(list(found.values())))
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self._events.close()
-
-
-def full_name(node: str, name: str) -> str:
-    """Return the name of a parameter among those of all nodes."""
-    return f"{node}.{name}"
+                changed[_full_name(event.node, item.name)] = None
+        if changed:
+            yield Update(to_json([parameter(*item) for item in changed.items()]))
 
 
 def parameter(name: str, value: Any) -> dict[str, Any]:
@@ -103,7 +176,12 @@ def read_setting(item: Any) -> Setting:
     return Setting(node, name, _value(item))
 
 
-def read_all(ros: RosGraphSide, deadline: Deadline, names: Iterable[str]) -> Found:
+def _full_name(node: str, name: str) -> str:
+    """Return the name of a parameter among those of all nodes."""
+    return f"{node}.{name}"
+
+
+def _read_all(ros: RosGraph, deadline: Deadline, names: Iterable[str]) -> _Answer:
     """Return the parameters with these names, those of all nodes without any."""
     by_node: dict[str, list[str]] = {}
     for name in names:
@@ -114,7 +192,7 @@ def read_all(ros: RosGraphSide, deadline: Deadline, names: Iterable[str]) -> Fou
     return _for_each(by_node, ros, deadline, _read)
 
 
-def set_all(ros: RosGraphSide, deadline: Deadline, settings: Iterable[Setting]) -> Found:
+def _set_all(ros: RosGraph, deadline: Deadline, settings: Iterable[Setting]) -> _Answer:
     """Set parameters one by one, and return their values then."""
     by_node: dict[str, list[Setting]] = {}
     for setting in settings:
@@ -122,50 +200,48 @@ def set_all(ros: RosGraphSide, deadline: Deadline, settings: Iterable[Setting]) 
     return _for_each(by_node, ros, deadline, _set)
 
 
-def _read_everything(ros: RosGraphSide, deadline: Deadline) -> Found:
+def _read_everything(ros: RosGraph, deadline: Deadline) -> _Answer:
     from composer.client.snapshot import GraphObserver
 
     # Nodes that have just ended would be waited for.
     present = {name for name, _ in ros.session.graph.names("node")}
-    nodes = {name: ends for name, ends in ros.observed.known().nodes.items() if name in present}
+    nodes = {name: ends for name, ends in ros.known().nodes.items() if name in present}
     with GraphObserver(ros.session) as observer:
         found = observer.parameters(nodes, deadline)
     parameters = [
-        parameter(full_name(node, name), value)
+        parameter(_full_name(node, name), value)
         for node in sorted(found)
         for name, value in (found[node] or {}).items()
     ]
     silent = [node for node in sorted(found) if found[node] is None]
     problems = [f"no parameters of {', '.join(silent)}: no response"] if silent else []
-    return Found(parameters, problems)
+    return _Answer(parameters, problems)
 
 
-def _for_each(by_node: Mapping[str, Any], ros: RosGraphSide, deadline: Deadline, act: Any) -> Found:
+def _for_each(by_node: Mapping[str, Any], ros: RosGraph, deadline: Deadline, act: Any) -> _Answer:
     from composer.client.parameters import ParameterClient
     from composer.client.session import RosError
 
-    found = Found([], [])
+    answer = _Answer([], [])
     for node, items in by_node.items():
         try:
-            act(ParameterClient(ros.session, deadline, node), items, found)
+            act(ParameterClient(ros.session, deadline, node), items, answer)
         except RosError as error:
-            found.problems.append(_text(error))
-    return found
+            answer.problems.append(error_text(error))
+    return answer
 
 
-def _read(client: ParameterClient, names: list[str], found: Found) -> None:
-    known = client.names()
-    wanted = [name for name in names if name in known]
-    values = client.values(wanted) if wanted else {}
-    found.parameters.extend(
-        parameter(full_name(client.node, name), values[name]) for name in wanted
+def _read(client: ParameterClient, names: Iterable[str], answer: _Answer) -> None:
+    values = _values(client, names)
+    answer.parameters.extend(
+        parameter(_full_name(client.node, name), value) for name, value in values.items()
     )
-    found.problems.extend(
-        f"{client.node} has no parameter '{name:.80}'" for name in names if name not in known
+    answer.problems.extend(
+        f"{client.node} has no parameter '{name:.80}'" for name in names if name not in values
     )
 
 
-def _set(client: ParameterClient, settings: list[Setting], found: Found) -> None:
+def _set(client: ParameterClient, settings: list[Setting], answer: _Answer) -> None:
     from composer.client.session import RosError
 
     for setting in settings:
@@ -175,17 +251,19 @@ def _set(client: ParameterClient, settings: list[Setting], found: Found) -> None
             else:
                 client.set({setting.name: setting.value})
         except RosError as error:
-            found.problems.append(_text(error))
-    known = client.names()
+            answer.problems.append(error_text(error))
     names = dict.fromkeys(setting.name for setting in settings)
-    values = client.values([name for name in names if name in known])
-    found.parameters.extend(
-        parameter(full_name(client.node, name), values.get(name)) for name in names
+    values = _values(client, names)
+    answer.parameters.extend(
+        parameter(_full_name(client.node, name), values.get(name)) for name in names
     )
 
 
-def _text(error: Any) -> str:
-    return f"{error} ({error.hint})" if error.hint else str(error)
+def _values(client: ParameterClient, names: Iterable[str]) -> Mapping[str, Any]:
+    """Return the values of the parameters that the node has."""
+    known = client.names()
+    wanted = [name for name in names if name in known]
+    return client.values(wanted) if wanted else {}
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -38,10 +40,10 @@ SEVERITIES_BY_NAME = {level.value: number for level, number in SEVERITIES.items(
 
 @dataclass(frozen=True, slots=True)
 class LogLine:
-    """A line of the log. ``severity`` is that of rcl_interfaces/msg/Log: 10 is debug, 50 fatal."""
+    """A line of the log. ``level`` is one of SEVERITIES_BY_NAME."""
 
     at_s: float
-    severity: int
+    level: str
     node: str
     logger: str
     text: str
@@ -63,8 +65,9 @@ class LogLines:
         self._repeated: Counter[tuple[str, str]] = Counter()
         self._acquired_s = 0.0
 
-    def acquire(self) -> None:
-        """Subscribe for the first user, and read what was logged before."""
+    @contextmanager
+    def used(self) -> Iterator[None]:
+        """Collect lines in a ``with`` block; the first user subscribes, the last unsubscribes."""
         self._users += 1
         if self._sampled is None:
             self._sampled = self._session.sample(_TOPIC, _TYPE, _PROFILE)
@@ -72,15 +75,15 @@ class LogLines:
             self._count += len(self._lines)
             self._repeated = Counter(map(_identity, self._lines))
             self._acquired_s = time.time()
-
-    def release(self) -> None:
-        """Unsubscribe after the last user, and forget the lines."""
-        self._users -= 1
-        if not self._users:
-            self.close()
+        try:
+            yield
+        finally:
+            self._users -= 1
+            if not self._users:
+                self.close()
 
     def close(self) -> None:
-        """Unsubscribe."""
+        """Unsubscribe, and forget the lines."""
         if self._sampled is not None:
             self._sampled.close()
             self._sampled = None
@@ -133,7 +136,7 @@ def _lines_of_runs() -> list[LogLine]:
     return [
         LogLine(
             at_s=record.time_ns * 1e-9,
-            severity=SEVERITIES_BY_NAME.get(record.level, SEVERITIES_BY_NAME["info"]),
+            level=record.level if record.level in SEVERITIES_BY_NAME else "info",
             node=f"/{record.logger.replace('.', '/')}",
             logger=record.logger,
             text=record.message[:_MAX_LENGTH],
@@ -147,9 +150,12 @@ def _lines_of_runs() -> list[LogLine]:
 
 def _line(message: Any) -> LogLine:
     logger = str(message.name)[:_MAX_NAME]
+    level = next(
+        (name for name, least in SEVERITIES_BY_NAME.items() if message.level <= least), "fatal"
+    )
     return LogLine(
         at_s=message.stamp.sec + message.stamp.nanosec * 1e-9,
-        severity=int(message.level),
+        level=level,
         node=f"/{logger.replace('.', '/')}",
         logger=logger,
         text=message.msg[:_MAX_LENGTH],

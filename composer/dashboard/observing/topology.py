@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 
@@ -77,3 +78,21 @@ def is_manager(node: str, ends: Iterable[ObservedEndpoint]) -> bool:
     """Return whether a node with these endpoints is the manager of a running system."""
     own_service = (f"{node}/{_IS_ACTIVE}", _TRIGGER)
     return node.endswith(_MANAGER) and any((end.name, end.type) == own_service for end in ends)
+
+
+def first_topology() -> Topology | None:
+    """Return what systems on this computer know of the ROS graph, None if none is certain.
+
+    Ask before joining it: systems are not certain while they discover another process.
+    """
+    from composer.client.systems.local_endpoints import local_endpoints
+    from composer.runtime.ros_graph.graph import COMMAND_PREFIX
+
+    answer = local_endpoints()
+    if answer is None:
+        return None
+    found, names = answer
+    counts = Counter(
+        name for name in names if not name.rpartition("/")[2].startswith(COMMAND_PREFIX)
+    )
+    return Topology(1, {name: found[name] for name in sorted(found) if name in counts}, counts)

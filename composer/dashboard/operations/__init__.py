@@ -6,7 +6,7 @@ To add an operation, add a function to one of the modules, and its line in ``OPE
 from __future__ import annotations
 
 from composer.dashboard.context import Operation
-from composer.dashboard.operations import calls, nodes, types
+from composer.dashboard.operations import calls, nodes
 
 OPERATIONS: dict[str, Operation] = {
     "node": Operation(nodes.node),
@@ -15,10 +15,10 @@ OPERATIONS: dict[str, Operation] = {
     "transition": Operation(nodes.transition, changes=True),
     "restart": Operation(nodes.restart, changes=True),
     "command": Operation(nodes.command, changes=True),
-    "form": Operation(types.form),
-    "types": Operation(types.types),
-    "fields": Operation(types.fields),
-    "type_of": Operation(types.type_of),
+    "form": Operation(calls.form),
+    "types": Operation(calls.types),
+    "fields": Operation(calls.fields),
+    "type_of": Operation(calls.type_of),
     "call": Operation(calls.call, changes=True),
     "publish": Operation(calls.publish, changes=True),
     "set_parameter": Operation(calls.set_parameter, changes=True),

@@ -1,23 +1,26 @@
-"""Operations that call services, publish messages and set parameters."""
+"""Operations that call services, publish messages, set parameters, and describe interfaces."""
 
 from __future__ import annotations
 
 import time
 from typing import TYPE_CHECKING, Any
 
+from composer.dashboard.channels.sending import read_outgoing
 from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.protocol.messages import Values, json_safe
-from composer.dashboard.publishing import read_outgoing
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline
-    from composer.dashboard.ros_side import RosGraphSide
+    from composer.dashboard.observing.ros_graph import RosGraph
 
 _CHANGE_S = 5.0
 _MAX_TIMEOUT_S = 120.0
 #: How long to wait for known subscriptions to match a new publisher.
 _MATCHED_WITHIN_S = 2.0
 _MAX_ITEMS = 1000
+_KINDS = ("message", "service", "action")
+_CHANNELS = ("topic", "service", "action")
+_DESCRIBED_WITHIN_S = 5.0
 
 
 def call(values: Values, dashboard: Dashboard) -> Prepared:
@@ -27,7 +30,7 @@ def call(values: Values, dashboard: Dashboard) -> Prepared:
     request = values.mapping("request")
     timeout_s = values.number("timeout_s", 5.0, 0.1, _MAX_TIMEOUT_S)
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.calls import ServiceRequest, call_service
         from composer.client.graph_names import GraphNames
         from composer.client.messages.values import to_short_plain
@@ -51,7 +54,7 @@ def publish(values: Values, dashboard: Dashboard) -> Prepared:
     del dashboard
     outgoing = read_outgoing(values)
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.session import Deadline as Limit
 
         outgoing.open(ros)
@@ -73,10 +76,60 @@ def set_parameter(values: Values, dashboard: Dashboard) -> Prepared:
     del dashboard
     node, name, value = values.text("node"), values.text("name"), values.any("value")
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.parameters import ParameterClient
 
         client = ParameterClient(ros.session, deadline, node)
         return {"value": json_safe(client.set({name: value})[name])}
 
     return run, _CHANGE_S
+
+
+def form(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return the fields of each part of a type."""
+    del dashboard
+    type_name = values.text("type")
+    values.optional_text("kind")  # the type says it, too
+
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
+        del deadline
+        return {"type": type_name, "parts": ros.forms.form(type_name)}
+
+    return run, _DESCRIBED_WITHIN_S
+
+
+def types(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return names of types that contain a text."""
+    del dashboard
+    kind, prefix = values.choice("kind", _KINDS), values.text("prefix", "")
+
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
+        del deadline
+        return {"names": ros.forms.names(kind, prefix)}
+
+    return run, _DESCRIBED_WITHIN_S
+
+
+def fields(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return the paths of the fields of a message."""
+    del dashboard
+    type_name = values.text("type")
+
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
+        del deadline
+        return ros.forms.paths(type_name)
+
+    return run, _DESCRIBED_WITHIN_S
+
+
+def type_of(values: Values, dashboard: Dashboard) -> Prepared:
+    """Return the types of a topic, service or action."""
+    del dashboard
+    kind, name = values.choice("kind", _CHANNELS), values.text("name")
+
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
+        from composer.client.graph_names import GraphNames
+
+        return {"types": list(GraphNames(ros.session, deadline).types(kind, name))}
+
+    return run, _DESCRIBED_WITHIN_S

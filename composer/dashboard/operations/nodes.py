@@ -15,7 +15,7 @@ from composer.dashboard.protocol.messages import RequestError, Values, from_ros,
 if TYPE_CHECKING:
     from composer.client.session import Deadline
     from composer.client.systems.lifecycle_batch import NodeOutcome
-    from composer.dashboard.ros_side import RosGraphSide
+    from composer.dashboard.observing.ros_graph import RosGraph
 
 _TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _READ_S = 5.0
@@ -29,9 +29,9 @@ def node(values: Values, dashboard: Dashboard) -> Prepared:
     name = values.text("node")
     declared = dashboard.declared
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         del deadline
-        topology = ros.observed.known()
+        topology = ros.known()
         facts = None if declared is None else declared.facts(name)
         if name not in topology.nodes and facts is None:
             raise RequestError("not_found", f"there is no node '{name:.200}'")
@@ -61,7 +61,7 @@ def plan(values: Values, dashboard: Dashboard) -> Prepared:
     declared = required(dashboard.declared, "the plan")
     del values
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.plan import bring_up
 
         del ros, deadline
@@ -89,7 +89,7 @@ def drift(values: Values, dashboard: Dashboard) -> Prepared:
     declared = required(dashboard.declared, "the comparison")
     del values
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.snapshot import GraphObserver
         from composer.plan.drift import compare
 
@@ -123,7 +123,7 @@ def transition(values: Values, dashboard: Dashboard) -> Prepared:
     name, label = values.text("node"), values.choice("transition", _TRANSITIONS)
     dependents = values.flag("dependents")
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
@@ -141,7 +141,7 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
     del dashboard
     name = values.text("node")
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         message = _restart_by_manager(ros, deadline, name)
@@ -157,7 +157,7 @@ def restart(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _RESTART_S
 
 
-def _restart_by_manager(ros: RosGraphSide, deadline: Deadline, name: str) -> str | None:
+def _restart_by_manager(ros: RosGraph, deadline: Deadline, name: str) -> str | None:
     """Restart a node of a system; return the message of the manager, None if it has no manager."""
     from composer.client.name_matching import NotFoundError
     from composer.client.systems.managed_nodes import find_managed_nodes
@@ -181,7 +181,7 @@ def command(values: Values, dashboard: Dashboard) -> Prepared:
     del dashboard
     system, name = values.text("system"), values.choice("command", COMMANDS)
 
-    def run(ros: RosGraphSide, deadline: Deadline) -> dict[str, Any]:
+    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.systems.managers import Systems
 
         systems = Systems(ros.session, deadline)
@@ -199,11 +199,11 @@ def command(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _CHANGE_S
 
 
-def _completed(ros: RosGraphSide, outcomes: Iterable[NodeOutcome]) -> list[dict[str, Any]]:
+def _completed(ros: RosGraph, outcomes: Iterable[NodeOutcome]) -> list[dict[str, Any]]:
     """Return all changes. Raises RequestError for the first that failed, after the others."""
     found = list(outcomes)
     changes = [outcome.result for outcome in found if outcome.result is not None]
-    ros.observed.learn_states({change.node: change.after for change in changes})
+    ros.learn_states({change.node: change.after for change in changes})
     for outcome in found:
         if outcome.error is not None:
             raise from_ros(outcome.error)

@@ -6,7 +6,7 @@ import json
 import logging
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.base.characters import escape_line
@@ -75,6 +75,13 @@ class BadRequestError(RequestError):
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__("bad_request", message, hint)
+
+
+def unknown(what: str, name: str, choices: Iterable[str]) -> BadRequestError:
+    """Return the error for a name that is none of the choices."""
+    close = nearest(name, choices)
+    hint = f"did you mean '{close}'?" if close else None
+    return BadRequestError(f"there is no {what} '{name:.80}'", hint)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,13 +20,13 @@ from starlette.websockets import WebSocket
 
 from composer.dashboard.access import Refusal, Request
 from composer.dashboard.channels.graph import DiagramFeed
-from composer.dashboard.client import Client
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
-from composer.dashboard.foxglove.frames import SUBPROTOCOLS
+from composer.dashboard.foxglove.encoding import SUBPROTOCOLS
 from composer.dashboard.protocol.messages import RequestError, Values
 from composer.dashboard.protocol.outbox import MAX_CONNECTIONS, Update
 from composer.dashboard.ros_side import LINGER_S
+from composer.dashboard.web.client import Client
 from composer.dashboard.web.connection import Connection
 from composer.dashboard.web.page_modules import file_of_page, index_of, style_sheet
 

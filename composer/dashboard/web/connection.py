@@ -6,19 +6,16 @@ nothing else is affected.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
 
 from starlette.websockets import WebSocket
 
-from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.channels import CHANNELS
-from composer.dashboard.channels.goal import GoalFeed
-from composer.dashboard.client import MAX_PENDING, Client
+from composer.dashboard.channels.sending import GoalFeed
 from composer.dashboard.context import Dashboard
-from composer.dashboard.feeds import Feed, Receiver
+from composer.dashboard.feeds import Feed
 from composer.dashboard.operations import OPERATIONS
 from composer.dashboard.protocol.messages import (
     BadRequestError,
@@ -29,8 +26,10 @@ from composer.dashboard.protocol.messages import (
     internal_error,
     parse_request,
     to_json,
+    unknown,
 )
 from composer.dashboard.protocol.outbox import Outbox
+from composer.dashboard.web.client import Client, Running
 
 _MAX_SUBSCRIPTIONS = 64
 #: Operations of the connection itself.
@@ -40,8 +39,7 @@ _OWN = ("subscribe", "unsubscribe", "update", "cancel", "ping")
 @dataclass(slots=True)
 class _Subscription:
     channel: str
-    key: str
-    receiver: Receiver
+    running: Running
     feed: Feed
     size: int
 
@@ -66,7 +64,7 @@ class Connection(Client):
         try:
             request = parse_request(message)
             identifier = request.id
-            self._start(request)
+            self._answer(request)
         except RequestError as error:
             self._log_refused(error)
             self._refuse(error, identifier)
@@ -77,7 +75,7 @@ class Connection(Client):
     def _refuse(self, error: RequestError, identifier: int | str | None = None) -> None:
         self._outbox.reply(to_json({"id": identifier, "error": error.as_data()}))
 
-    def _start(self, request: ClientRequest) -> None:
+    def _answer(self, request: ClientRequest) -> None:
         """Answer a request at once, or start the task that does. Raises RequestError."""
         check_characters(request.text, {"op": request.op, **request.values})
         values = Values(request.values, f"'{request.op:.40}'")
@@ -87,31 +85,17 @@ class Connection(Client):
             return
         operation = OPERATIONS.get(request.op)
         if operation is None:
-            close = nearest(request.op, (*OPERATIONS, *_OWN))
-            hint = f"did you mean '{close}'?" if close else None
-            raise BadRequestError(f"there is no operation '{request.op:.80}'", hint)
+            raise unknown("operation", request.op, (*OPERATIONS, *_OWN))
         if operation.changes:
-            self._check_may_change(request.op)
-        if len(self._pending) >= MAX_PENDING:
-            raise RequestError("busy", f"{MAX_PENDING} of your requests are running already")
+            self.check_may_change(f"'{request.op}'")
         call, timeout_s = operation.prepare(values, self._dashboard)
         values.end()
-        run = partial(self._dashboard.ros.call, call, timeout_s)
-        self._spawn(partial(self._call, request, run), self._size)
-
-    def _check_may_change(self, what: str) -> None:
-        if self._dashboard.options.read_only:
-            raise RequestError("read_only", f"'{what}' is not possible: the dashboard is read-only")
-
-    async def _call(
-        self, request: ClientRequest, run: Callable[[], Coroutine[Any, Any, Any]]
-    ) -> None:
-        try:
-            self._reply(request, await run())
-        except RequestError as error:
-            self._refuse(error, request.id)
-        except Exception as error:  # the browser gets an answer in any case
-            self._refuse(internal_error(f"the request '{request.op}'", error), request.id)
+        self.request(
+            call,
+            timeout_s,
+            partial(self._reply, request),
+            partial(self._refuse, identifier=request.id),
+        )
 
     def _reply(self, request: ClientRequest, result: Any) -> None:
         self._outbox.reply(to_json({"id": request.id, "ok": result}))
@@ -150,7 +134,7 @@ class Connection(Client):
     def _on_cancel(self, values: Values) -> dict[str, Any]:
         number = self._number(values)
         values.end()
-        self._check_may_change("cancel")
+        self.check_may_change("'cancel'")
         feed = self._subscriptions[number].feed
         if not isinstance(feed, GoalFeed):
             raise BadRequestError(f"subscription {number} is not a goal")
@@ -167,24 +151,21 @@ class Connection(Client):
         """Return the feed of a channel with parameters. Raises RequestError."""
         feed_class = CHANNELS.get(channel)
         if feed_class is None:
-            close = nearest(channel, CHANNELS)
-            hint = f"did you mean '{close}'?" if close else None
-            raise BadRequestError(f"there is no channel '{channel:.80}'", hint)
-        feed = feed_class(Values(parameters, f"'params' of '{channel}'"), self._dashboard.declared)
+            raise unknown("channel", channel, CHANNELS)
+        values = Values(parameters, f"'params' of '{channel}'")
+        feed = feed_class(values, self._dashboard.declared)
+        values.end()
         if feed.changes:
-            self._check_may_change(channel)
+            self.check_may_change(f"'{channel}'")
         return feed
 
     def _attach(self, number: int, channel: str, parameters: Any, feed: Feed) -> _Subscription:
         """Send the updates of a feed, or of the same one that runs already, to the browser."""
         key = f"{channel} {to_json(parameters)}"
-        if not feed.is_shared:
-            key = f"{key} {id(self)} {number}"
         size = 2 * len(key)  # its parameters are kept as values and as text
         self._outbox.budget.take(size)
-        receive = self._receiver(lambda update: self._outbox.put(number, update))
-        self._dashboard.feeds.add(key, feed, receive)
-        return _Subscription(channel, key, receive, feed, size)
+        running = self.start(key, feed, lambda update: self._outbox.put(number, update))
+        return _Subscription(channel, running, feed, size)
 
     def _unsubscribe(self, number: int) -> None:
         subscription = self._subscriptions.pop(number)
@@ -192,5 +173,5 @@ class Connection(Client):
         self._leave(subscription)
 
     def _leave(self, subscription: _Subscription) -> None:
-        self._dashboard.feeds.remove(subscription.key, subscription.receiver)
+        self.stop(subscription.running)
         self._outbox.budget.give(subscription.size)

@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from composer.dashboard.foxglove.frames import SUBPROTOCOLS
+from composer.dashboard.foxglove.encoding import SUBPROTOCOLS
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import (
     PATIENCE_S,

@@ -12,7 +12,8 @@ import pytest
 from composer.dashboard import ros_side
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.forms import Forms
-from composer.dashboard.ros_side import RosGraphSide, RosSide
+from composer.dashboard.observing.ros_graph import RosGraph
+from composer.dashboard.ros_side import RosSide
 from composer.interfaces import Interfaces
 from tests.ros.support.in_process import PATIENCE_S, wait_until
 
@@ -25,7 +26,7 @@ class SlowToLeave(RosSide):
         self.leaving, self.may_leave = threading.Event(), threading.Event()
         self.threads: list[threading.Thread] = []
 
-    def _join(self, stack: ExitStack) -> RosGraphSide:
+    def _join(self, stack: ExitStack) -> RosGraph:
         side = super()._join(stack)
         if not self.threads:
             stack.callback(self.may_leave.wait, PATIENCE_S)

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.dashboard.foxglove.catalog import Contents, changes, graph_update
-from composer.dashboard.foxglove.frames import (
+from composer.dashboard.foxglove.encoding import (
     ClientMessage,
+    Schemas,
     ServiceCall,
     message_data,
     parse_binary,
@@ -22,7 +23,6 @@ from composer.dashboard.foxglove.frames import (
     time_frame,
 )
 from composer.dashboard.foxglove.parameters import Setting, parameter, read_setting
-from composer.dashboard.foxglove.schemas import Schemas
 from composer.dashboard.protocol.messages import BadRequestError
 from composer.interfaces import Interfaces
 

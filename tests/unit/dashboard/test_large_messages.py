@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.dashboard.observing.large_messages import (
+from composer.dashboard.observing.topics import (
     MAX_BYTES_PER_S,
     ByteLimit,
     large_profile,

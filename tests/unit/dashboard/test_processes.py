@@ -14,7 +14,7 @@ from composer.client.systems.system_reports import (
     of_whole_systems,
     system_report,
 )
-from composer.dashboard.observing.processes import ProcessMonitor, total
+from composer.dashboard.channels.nodes import ProcessMonitor, total
 from composer.dashboard.protocol.messages import to_json
 
 BUSY = "print(flush=True)\nwhile True: pass"

@@ -1,31 +1,27 @@
-"""What the feeds observe together: nodes and endpoints, states, reports of systems, and rates."""
+"""The ROS graph as feeds and operations see it: nodes and endpoints, states, reports and rates."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Mapping, Set
 from typing import TYPE_CHECKING, Self
 
 from composer.client.lifecycle import LifecycleClient
 from composer.client.session import Deadline
-from composer.client.systems.local_endpoints import local_endpoints
-from composer.client.systems.local_queries import local_report
-from composer.client.systems.managers import DISCOVERY_S, Systems
-from composer.client.systems.system_reports import SystemReport
+from composer.client.systems.managers import DISCOVERY_S
+from composer.dashboard.observing.diagrams import Diagrams
 from composer.dashboard.observing.log_lines import LogLines
-from composer.dashboard.observing.meters import TopicMeters
+from composer.dashboard.observing.reports import SystemReports
+from composer.dashboard.observing.topics import TopicMeters, TopicReader
 from composer.dashboard.observing.topology import Topology
-from composer.dashboard.pictures import Diagrams
 from composer.plan.drift import ObservedEndpoint
-from composer.runtime.process.instance_lock import LocalSystems
-from composer.runtime.ros_graph.graph import COMMAND_PREFIX, SETTLE_S
+from composer.runtime.ros_graph.graph import SETTLE_S
 from composer.runtime.ros_graph.node_endpoints import endpoints
 
 if TYPE_CHECKING:
     from composer.client.shared_session import SharedSession
-    from composer.dashboard.ros_side import Work
+    from composer.dashboard.forms import Forms
 
 _PERIOD_S = 1.0
 #: Nodes are discovered one after the other at first.
@@ -43,35 +39,42 @@ _SHARE = 0.03
 #: What no feed has looked at for this time is queried again.
 _CERTAIN_S = 10.0
 _STATES_PERIOD_S = 2.0
-_SYSTEMS_PERIOD_S = 3.0
-#: Managers report every second.
-_SILENT_S = 5.0
 _STATES_WITHIN_S = 2.0
 
 
-class Observed:
-    """Observes the ROS graph on request. Use it on the thread of feeds, in a ``with`` block."""
+#: Runs a function on a worker thread; an exception is only logged.
+Work = Callable[[Callable[[], None]], None]
+
+
+class RosGraph:
+    """What feeds and operations use while the dashboard is in the ROS graph.
+
+    Use it on the thread of feeds, in a ``with`` block; other threads may use ``session``,
+    ``forms``, ``work``, :meth:`known` and :meth:`learn_states`.
+
+    ``first`` is what a system on this computer knows: discovery takes a second or more.
+    ``on_report`` is called on another thread when a system has reported.
+    """
 
     def __init__(
         self,
         session: SharedSession,
+        forms: Forms,
         work: Work,
         first: Topology | None,
         on_report: Callable[[], None],
     ) -> None:
-        """``first`` is what a system on this computer knows: discovery takes a second or more.
-
-        ``on_report`` is called on another thread when a system has reported.
-        """
-        self._session = session
-        self._on_report = on_report
-        self.meters = TopicMeters(session)
+        self.session = session
+        self.forms = forms
+        self.work = work
+        self.meters = TopicMeters(session, self.topology)
         self.reports = SystemReports(session, on_report)
         self.log = LogLines(session)
+        self.diagrams = Diagrams()
+        self._on_report = on_report
         self._states = _States(session, work)
         self._discovery = _Discovery(session)
         self._topology = first or Topology(0, {}, {})
-        self.diagrams = Diagrams()
         self._names: object = None
         self._names_due_s = 0.0
         self._endpoints_due_s = 0.0
@@ -87,6 +90,10 @@ class Observed:
         self.log.close()
         self.reports.close()
 
+    def reader(self, topic: str, type_name: str | None, depth: int) -> TopicReader:
+        """Return a reader of a topic, which subscribes when it first takes messages."""
+        return TopicReader(self.session, self.topology, topic, type_name, depth)
+
     def topology(self) -> Topology:
         """Return the nodes and endpoints, at most about a second old.
 
@@ -101,11 +108,11 @@ class Observed:
             if self._topology.revision:
                 return self._topology
             self._discovery.wait(self._joined_s + _FIRST_WITHIN_S)
-        change = self._session.changes.number()
+        change = self.session.changes.number()
         if change == self._change:
             self._certain_s = now_s
             return self._topology
-        graph = self._session.graph
+        graph = self.session.graph
         names = (graph.nodes(), graph.topics(), graph.services())
         if names == self._names and now_s < self._endpoints_due_s:
             return self._topology
@@ -144,7 +151,7 @@ class Observed:
 
     def _query(self) -> tuple[dict[str, tuple[ObservedEndpoint, ...]], Counter[str]]:
         """Return the endpoints by node, and the number of nodes of each name."""
-        graph = self._session.graph
+        graph = self.session.graph
         found = dict(endpoints(graph))
         counts = Counter(name for name, _ in graph.names("node"))
         return {name: found[name] for name in sorted(found) if name in counts}, counts
@@ -167,23 +174,6 @@ class Observed:
         """Take over states that nodes have just reached, so that they are shown at once."""
         self._states.learn(states)
         self._on_report()
-
-
-def first_topology() -> Topology | None:
-    """Return what systems on this computer know of the ROS graph, None if none is certain.
-
-    Ask before joining it: systems are not certain while they discover another process.
-    """
-    answer = local_endpoints()
-    if answer is None:
-        return None
-    found, names = answer
-    counts = Counter(name for name in names if not _is_of_command(name))
-    return Topology(1, {name: found[name] for name in sorted(found) if name in counts}, counts)
-
-
-def _is_of_command(name: str) -> bool:
-    return name.rpartition("/")[2].startswith(COMMAND_PREFIX)
 
 
 class _Discovery:
@@ -213,86 +203,6 @@ class _Discovery:
         while not self.is_complete() and time.monotonic() < end_s:
             time.sleep(_FIRST_POLL_S)
         self.was_complete = True
-
-
-class SystemReports:
-    """The reports of running systems, while anything acquires them."""
-
-    def __init__(self, session: SharedSession, on_report: Callable[[], None]) -> None:
-        self._session = session
-        self._on_report = on_report
-        self._systems: Systems | None = None
-        self._local = LocalSystems()
-        self._discovered: tuple[str, ...] = ()
-        self._change = 0
-        self._users = 0
-        self._callback_users = 0
-        self._with_callbacks = False
-        self._due_s = 0.0
-        #: The last report of each system, and when it was seen first.
-        self._seen: dict[str, tuple[SystemReport | None, float]] = {}
-
-    def acquire(self, *, callbacks: bool = False) -> None:
-        """Subscribe to the reports, with timings of callbacks on request."""
-        self._users += 1
-        self._callback_users += callbacks
-
-    def release(self, *, callbacks: bool = False) -> None:
-        """Unsubscribe once every user has released them."""
-        self._users -= 1
-        self._callback_users -= callbacks
-        if not self._users:
-            self.close()
-
-    def current(self) -> dict[str, SystemReport | None]:
-        """Return the last report of each system, None for systems that do not report."""
-        if not self._users:
-            return {}
-        with_callbacks = self._callback_users > 0
-        if self._systems is None or with_callbacks is not self._with_callbacks:
-            self.close()
-            self._with_callbacks, self._due_s = with_callbacks, 0.0
-            self._systems = Systems(
-                self._session,
-                Deadline(math.inf),
-                callbacks=with_callbacks,
-                on_report=self._on_report,
-            )
-        systems = self._systems
-        now_s = time.monotonic()
-        if now_s >= self._due_s:
-            self._due_s = now_s + _SYSTEMS_PERIOD_S
-            local = self._local.current()
-            change = self._session.changes.number()
-            if change != self._change:
-                self._change, self._discovered = change, systems.discover()
-            known = {*self._discovered, *local}
-            systems.subscribe(known)
-            self._ask(local)
-            systems.forget([name for name in systems.current() if name not in known])
-        return {name: self._fresh(name, report) for name, report in systems.current().items()}
-
-    def _ask(self, local: Iterable[str]) -> None:
-        """Ask systems on this computer for their first report: a topic takes a second."""
-        for name in local:
-            if name not in self._seen:
-                report = local_report(name, _FIRST_WITHIN_S, callbacks=self._with_callbacks)
-                self._seen[name] = (report, time.monotonic())
-
-    def _fresh(self, name: str, report: SystemReport | None) -> SystemReport | None:
-        """Return the last report of a system, None if that is too old."""
-        now_s = time.monotonic()
-        last, seen_s = self._seen.get(name, (None, now_s))
-        if report is not None and report is not last:
-            self._seen[name] = (report, now_s)
-            return report
-        return last if now_s < seen_s + _SILENT_S else None
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        if self._systems is not None:
-            self._systems.close()
-            self._systems = None
 
 
 class _States:

@@ -16,17 +16,27 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from composer.base.characters import escape_line
-from composer.dashboard.context import Dashboard
-from composer.dashboard.feeds import Receiver
+from composer.base.fast_dataclass import dataclass
+from composer.dashboard.context import Dashboard, Run
+from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, internal_error
 from composer.dashboard.protocol.outbox import Outbox, Update
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 _LOG = logging.getLogger(__name__)
-MAX_PENDING = 16
+#: Requests of one program that run at the same time.
+_MAX_PENDING = 16
 #: A program that sends only malformed messages is disconnected.
 _MAX_MALFORMED = 20
 POLICY_VIOLATION, _GOING_AWAY = 1008, 1001
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """A feed that a program receives."""
+
+    key: str
+    receiver: Receiver
 
 
 class Client(ABC):
@@ -80,6 +90,50 @@ class Client(ABC):
     @abstractmethod
     def _end(self) -> None:
         """End all subscriptions."""
+
+    @property
+    def is_read_only(self) -> bool:
+        """Whether the program may change nothing."""
+        return self._dashboard.options.read_only
+
+    def check_may_change(self, what: str) -> None:
+        """Raise RequestError if the dashboard is read-only."""
+        if self.is_read_only:
+            raise RequestError("read_only", f"{what} is not possible: the dashboard is read-only")
+
+    def start(self, key: str, feed: Feed, take: Callable[[Update], None]) -> Running:
+        """Receive a feed, which programs share under this key if it can be shared."""
+        running = Running(key if feed.is_shared else f"{key} {id(feed)}", self._receiver(take))
+        self._dashboard.feeds.add(running.key, feed, running.receiver)
+        return running
+
+    def stop(self, running: Running) -> None:
+        """Receive a feed no longer."""
+        self._dashboard.feeds.remove(running.key, running.receiver)
+
+    def request(
+        self,
+        run: Run,
+        timeout_s: float,
+        done: Callable[[Any], None],
+        fail: Callable[[RequestError], None],
+    ) -> None:
+        """Run something on a worker thread; ``done`` or ``fail`` answer.
+
+        Raises RequestError if too many requests of this program run, or keep too many bytes.
+        """
+        if len(self._pending) >= _MAX_PENDING:
+            raise RequestError("busy", f"{_MAX_PENDING} of your requests are running already")
+
+        async def answer() -> None:
+            try:
+                done(await self._dashboard.ros.call(run, timeout_s))
+            except RequestError as error:
+                fail(error)
+            except Exception as error:  # the program gets an answer in any case
+                fail(internal_error("a request", error))
+
+        self._spawn(answer, self._size)
 
     async def _close(self, code: int, reason: str) -> None:
         if self._socket.application_state is WebSocketState.CONNECTED:
