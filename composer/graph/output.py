@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from importlib.util import find_spec
+from typing import Any
 
-from composer.graph.diagram import Graph
+from composer.base.characters import escape_json
+from composer.graph.diagram import Cluster, Edge, Graph, Vertex
 from composer.graph.diagram_options import Format
-from composer.graph.formats import dot, html, json, mermaid, svg
+from composer.graph.formats import dot, html, mermaid, svg
 from composer.graph.layout import arrange
 
 #: Pixels per layout unit for high-resolution screens, reduced for very large pictures.
@@ -34,7 +37,7 @@ def render(graphs: Sequence[Graph], form: Format, shown: int = 0) -> bytes:
         case Format.DOT:
             return dot.render(graph).encode()
         case Format.JSON:
-            return json.render(graph).encode()
+            return _json(graph).encode()
         case Format.SVG:
             return svg.render(graph, arrange(graph)).encode()
         case Format.HTML:
@@ -59,3 +62,49 @@ def _png(graph: Graph) -> bytes:
         sans_serif_family=_FALLBACK_FONT,
     )
     return bytes(drawn)
+
+
+def _json(graph: Graph) -> str:
+    """Return the graph as JSON. Scripts read it: only add to it."""
+    data = {
+        "title": graph.title,
+        "view": graph.view,
+        "clusters": [
+            {"key": cluster.key, "label": cluster.label, "parent": cluster.parent or None}
+            | _json_facts(cluster)
+            for cluster in graph.clusters
+        ],
+        "vertices": [
+            {
+                "key": vertex.key,
+                "kind": vertex.kind.value,
+                "label": vertex.lines,
+                "cluster": vertex.cluster or None,
+            }
+            | _json_facts(vertex)
+            for vertex in graph.vertices
+        ],
+        "edges": [
+            {
+                "key": edge.key,
+                "source": edge.source,
+                "target": edge.target,
+                "kind": edge.kind.value,
+                "label": edge.lines,
+            }
+            | _json_facts(edge)
+            for edge in graph.edges
+        ],
+    }
+    return escape_json(json.dumps(data, indent=2, ensure_ascii=False)) + "\n"
+
+
+def _json_facts(thing: Cluster | Vertex | Edge) -> dict[str, Any]:
+    """Return the details, the text of a problem, and how the part is marked."""
+    problem = thing.problem
+    marked = {} if problem is None else {"mark": problem.mark.value}
+    return {
+        "details": dict(thing.details),
+        "wrong": None if problem is None else problem.text,
+        **marked,
+    }

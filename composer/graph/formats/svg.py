@@ -9,7 +9,7 @@ from composer.base.characters import is_safe
 from composer.graph.diagram import EdgeKind, Graph, Mark, Problem, Vertex, VertexKind
 from composer.graph.formats.theme import STYLE
 from composer.graph.layout import Frame, Layout, Path, Point, Rectangle, Size
-from composer.graph.layout.measure import (
+from composer.graph.layout.geometry import (
     EDGE_LINE_HEIGHT,
     HEAD_HEIGHT,
     HEXAGON_SLANT,

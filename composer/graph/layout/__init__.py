@@ -9,8 +9,8 @@ never overlap. Positions are in pixels, and the layout is deterministic.
 
 from __future__ import annotations
 
+from composer.graph.layout.geometry import Frame, Layout, Path, Point, Rectangle, Size
 from composer.graph.layout.pages import arrange, arrange_for_pages
-from composer.graph.layout.result import Frame, Layout, Path, Point, Rectangle, Size
 
 __all__ = [
     "Frame",

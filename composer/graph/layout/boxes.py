@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.graph.diagram import Edge
-from composer.graph.layout.result import Point, Size
+from composer.graph.layout.geometry import Point, Size
 
 #: Space on a rank between boxes, and between bends of edges.
 BOX_GAP = 18.0

@@ -24,9 +24,8 @@ from composer.graph.layout.boxes import (
     SelfLoop,
     link,
 )
-from composer.graph.layout.measure import Sizes
-from composer.graph.layout.ranks import assign_ranks, break_cycles
-from composer.graph.layout.result import Size
+from composer.graph.layout.geometry import Size, Sizes
+from composer.graph.layout.ordering import assign_ranks, break_cycles
 
 
 @dataclass(slots=True)

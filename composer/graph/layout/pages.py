@@ -1,4 +1,7 @@
-"""Lay out whole graphs: connected components, and parts of large graphs, in rows on a page."""
+"""Lay out whole graphs: connected components, and parts of large graphs, in rows on a page.
+
+A connected graph is laid out in layers; the steps are listed in the package.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,26 @@ from functools import partial
 from itertools import accumulate, combinations
 
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex, natural_order
-from composer.graph.layout.layered import lay_out
-from composer.graph.layout.measure import measure
-from composer.graph.layout.result import Layout, Path, Point, Rectangle, Size
+from composer.graph.layout.boxes import Item
+from composer.graph.layout.build import Parts, build
+from composer.graph.layout.coordinates import (
+    Extent,
+    assign_coordinates,
+    extent_of,
+    rank_extents,
+)
+from composer.graph.layout.geometry import (
+    Frame,
+    Layout,
+    Path,
+    Point,
+    Rectangle,
+    Size,
+    Sizes,
+    measure,
+)
+from composer.graph.layout.ordering import order_boxes
+from composer.graph.layout.routing import Router
 
 #: The proportions of a screen.
 _SCREEN = Size(1.6, 1.0)
@@ -24,6 +44,49 @@ _CLEARLY = 1.25
 #: Pixels of the page around and between parts: names and titles that are enlarged exceed them.
 _LEFT_AND_RIGHT = 24.0
 _ABOVE = 20.0
+
+
+def lay_out(graph: Graph, sizes: Sizes) -> Layout:
+    """Return the layered layout of a connected graph, without a margin."""
+    parts = build(graph, sizes)
+    order_boxes(parts.root)
+    assign_coordinates(parts.root)
+    parts.root.shift(-parts.root.low)
+    ranks = rank_extents(parts.root)
+    router = Router(parts.axes, ranks, parts.root.boxes())
+    tails = [extent_of(box, ranks).end + box.tail for box in parts.boxes.values()]
+    end = max(extent_of(parts.root, ranks).end, *tails)
+    return Layout(
+        size=parts.axes.size(end, parts.root.high),
+        vertices=dict(_vertices(parts, sizes, ranks)),
+        frames=tuple(_frames(parts, ranks)),
+        paths=(*router.paths(parts.chains), *map(router.loop, parts.loops)),
+    )
+
+
+def _vertices(parts: Parts, sizes: Sizes, ranks: list[Extent]) -> Iterator[tuple[str, Rectangle]]:
+    for vertex in parts.graph.vertices:
+        if vertex.cluster not in sizes.blocks:
+            yield vertex.key, _place(parts, parts.boxes[vertex.key], ranks)
+            continue
+        block = _place(parts, parts.boxes[vertex.cluster], ranks)
+        yield vertex.key, block.row(sizes.rows[vertex.key], sizes.vertices[vertex.key].height)
+
+
+def _frames(parts: Parts, ranks: list[Extent]) -> Iterator[Frame]:
+    for cluster in parts.graph.clusters:
+        if cluster.block:
+            if cluster.key in parts.boxes:
+                yield Frame(cluster, _place(parts, parts.boxes[cluster.key], ranks))
+        elif parts.groups[cluster.key].children:
+            yield Frame(cluster, _place(parts, parts.groups[cluster.key], ranks))
+
+
+def _place(parts: Parts, item: Item, ranks: list[Extent]) -> Rectangle:
+    along = extent_of(item, ranks)
+    across = (item.low + item.high) / 2
+    center = parts.axes.point(along.middle, across)
+    return Rectangle(center, parts.axes.size(along.end - along.begin, item.high - item.low))
 
 
 def arrange(graph: Graph) -> Layout:

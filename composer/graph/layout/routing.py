@@ -9,7 +9,7 @@ from itertools import pairwise
 from composer.base.fast_dataclass import dataclass
 from composer.graph.layout.boxes import LOOP_BOW, LOOP_LABEL_GAP, Axes, Box, EdgeChain, SelfLoop
 from composer.graph.layout.coordinates import Extent, extent_of
-from composer.graph.layout.result import Path, Point
+from composer.graph.layout.geometry import Path, Point
 
 #: The part of a side that edges may use, without the corners.
 _USED_SIDE = 0.6

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from composer.graph.diagram import Cluster, Direction, Edge, EdgeKind, Graph, Vertex, VertexKind
 from composer.graph.layout import Rectangle, arrange
-from composer.graph.layout.measure import measure
+from composer.graph.layout.geometry import measure
 from tests.examples import examples
 
 

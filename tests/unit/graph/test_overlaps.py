@@ -12,7 +12,7 @@ import pytest
 
 from composer.graph.diagram import Graph
 from composer.graph.layout import Layout, Point, Rectangle, Size, arrange
-from composer.graph.layout.measure import label_size, measure
+from composer.graph.layout.geometry import label_size, measure
 from composer.graph.views import View
 from tests.unit.support.fleets import fleet_graph
 

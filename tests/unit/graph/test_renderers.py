@@ -25,7 +25,6 @@ from composer.graph.diagram import (
     VertexKind,
 )
 from composer.graph.formats import dot, mermaid, svg, theme
-from composer.graph.formats import json as graph_json
 from composer.graph.layout import arrange
 from composer.graph.output import Format, render
 from composer.graph.views import View, build_graph, scene_of
@@ -132,7 +131,7 @@ def test_svg_loads_nothing_from_elsewhere() -> None:
 
 
 def test_json_says_what_is_wrong_and_where() -> None:
-    data = json.loads(graph_json.render(evil_graph()))
+    data = json.loads(render([evil_graph()], Format.JSON))
     assert [vertex["wrong"] for vertex in data["vertices"]] == [None, EVIL]
     assert data["edges"][0] == {
         "key": "edge",

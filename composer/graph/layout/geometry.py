@@ -1,13 +1,13 @@
-"""Measure texts, and the sizes of everything in a diagram."""
+"""Positions and sizes: the result of a layout, and how much room texts need."""
 
 from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from composer.base.fast_dataclass import dataclass
 from composer.graph.diagram import Cluster, Edge, Graph, Vertex, VertexKind
-from composer.graph.layout.result import Size
 
 FONT_SIZE = 12.0
 SMALL = 10.0
@@ -18,10 +18,106 @@ ROW_HEIGHT = 20.0
 HEAD_HEIGHT = 24.0
 ROW_INDENT = 10.0
 HEXAGON_SLANT = 12.0
-_PADDING = Size(14.0, 8.0)
+_PADDING, _PADDING_ABOVE = 14.0, 8.0
 _ROW_GAP = 16.0
 #: Shapes whose ends are not straight.
 _SLANTED = (VertexKind.SERVICE, VertexKind.TOPIC, VertexKind.FRAME)
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point; x to the right, y down."""
+
+    x: float
+    y: float
+
+    def moved(self, by: Point) -> Point:
+        """Return the point moved by an offset."""
+        return Point(self.x + by.x, self.y + by.y)
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """The size of a rectangle."""
+
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """A rectangle with its center and size."""
+
+    center: Point
+    size: Size
+
+    @property
+    def left(self) -> float:
+        """The x of its left side."""
+        return self.center.x - self.size.width / 2
+
+    @property
+    def top(self) -> float:
+        """The y of its upper side."""
+        return self.center.y - self.size.height / 2
+
+    def row(self, below_middle: float, height: float) -> Rectangle:
+        """Return a row of full width, at an offset below the middle."""
+        center = Point(self.center.x, self.center.y + below_middle)
+        return Rectangle(center, Size(self.size.width, height))
+
+    def moved(self, by: Point) -> Rectangle:
+        """Return the rectangle moved by an offset."""
+        return Rectangle(self.center.moved(by), self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A cluster and its rectangle."""
+
+    cluster: Cluster
+    place: Rectangle
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """An edge as cubic Bézier curves: a start, then three points for each curve.
+
+    It begins at the edge's source. ``label`` is the center of the label, if it has one.
+    ``is_between_parts`` says that the line may cross boxes.
+    """
+
+    edge: Edge
+    points: tuple[Point, ...]
+    label: Point | None
+    is_between_parts: bool = False
+
+    def moved(self, by: Point) -> Path:
+        """Return the path moved by an offset."""
+        return replace(
+            self,
+            points=tuple(point.moved(by) for point in self.points),
+            label=None if self.label is None else self.label.moved(by),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The positions of everything, from (0, 0) to ``size``; vertices by key."""
+
+    size: Size
+    vertices: dict[str, Rectangle]
+    frames: tuple[Frame, ...]  # outer ones first
+    paths: tuple[Path, ...]
+
+    def moved(self, by: Point) -> Layout:
+        """Return the layout moved by an offset, and enlarged by it."""
+        return Layout(
+            size=Size(self.size.width + by.x, self.size.height + by.y),
+            vertices={key: place.moved(by) for key, place in self.vertices.items()},
+            frames=tuple(Frame(frame.cluster, frame.place.moved(by)) for frame in self.frames),
+            paths=tuple(path.moved(by) for path in self.paths),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +181,8 @@ def _vertex_size(vertex: Vertex) -> Size:
     width = max([text_width(first, FONT_SIZE), *(text_width(line, SMALL) for line in others)])
     slant = HEXAGON_SLANT if vertex.kind in _SLANTED else 0.0
     return Size(
-        round(width + 2 * (_PADDING.width + slant / 2)),
-        len(vertex.lines) * LINE_HEIGHT + 2 * _PADDING.height,
+        round(width + 2 * (_PADDING + slant / 2)),
+        len(vertex.lines) * LINE_HEIGHT + 2 * _PADDING_ABOVE,
     )
 
 
@@ -99,7 +195,7 @@ def _row_size(vertex: Vertex) -> Size:
 
 
 def _block_size(cluster: Cluster, ports: list[Vertex]) -> Size:
-    head = text_width(cluster.label, FONT_SIZE) + 2 * _PADDING.width
+    head = text_width(cluster.label, FONT_SIZE) + 2 * _PADDING
     widest = max(_row_size(port).width for port in ports)
     return Size(round(max(head, widest)), HEAD_HEIGHT + len(ports) * ROW_HEIGHT)
 
