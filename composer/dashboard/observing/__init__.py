@@ -1,1 +1,1 @@
-"""What channels observe: the ROS graph, reports of systems, topics, the log and processes."""
+"""What channels observe: the ROS graph, topics, the log, reports of systems, and diagrams of them."""

@@ -15,9 +15,9 @@ from composer.dashboard.observing.topology import Topology
 from composer.dashboard.protocol.messages import RequestError
 from composer.model import PortKind
 from composer.model.qos import Durability, QosProfile, Reliability
+from composer.runtime.metrics.message_rate import MessageRate
 
 if TYPE_CHECKING:
-    from composer.runtime.metrics.message_rate import MessageRate
     from composer.client.shared_session import Sample, SampledTopic, SharedSession
     from composer.plan.drift import ObservedEndpoint
 
@@ -33,10 +33,6 @@ _BURST_S = 0.3
 _LARGE_DEPTH = 5
 #: Messages of a measured topic that may wait, and that are taken at once.
 _MEASURED_DEPTH, _MAX_MEASURED = 100, 200
-#: A rate is that of the messages of the last seconds.
-_WINDOW_S = 3.0
-#: A topic is silent after this many times the length of the window.
-_SILENT_PERIODS = 3
 
 
 def large_profile(profile: QosProfile) -> QosProfile:
@@ -197,7 +193,7 @@ class TopicFigures:
 @dataclass(slots=True)
 class _Meter:
     reader: TopicReader
-    rate: MessageRate
+    rate: MessageRate = field(default_factory=MessageRate)
     users: int = 0
     messages: int = 0
     lost: int = 0
@@ -219,13 +215,11 @@ class TopicMeters:
 
     def acquire(self, topics: Iterable[str]) -> None:
         """Measure topics, as soon as they have a publisher and a single, installed type."""
-        from composer.runtime.metrics.message_rate import MessageRate
-
         for topic in topics:
             if topic not in self._meters:
                 reader = TopicReader(self._session, self._topology, topic, None, _MEASURED_DEPTH)
                 reader.latched = False
-                self._meters[topic] = _Meter(reader, MessageRate())
+                self._meters[topic] = _Meter(reader)
             self._meters[topic].users += 1
 
     def release(self, topics: Iterable[str]) -> None:
@@ -275,12 +269,9 @@ def _measure(meter: _Meter, topology: Topology) -> None:
 
 def _figures(meter: _Meter, now_s: float) -> TopicFigures:
     rate = meter.rate
-    rate.forget_before(now_s - _WINDOW_S)
-    mean_bytes = rate.mean_bytes
+    rate_hz, mean_bytes = rate.current_hz(now_s), rate.mean_bytes
     if mean_bytes is None:
         return TopicFigures()
-    is_silent = now_s - rate.last_s > max(_WINDOW_S, _SILENT_PERIODS * rate.span_s)
-    rate_hz = 0.0 if is_silent else rate.hertz
     return TopicFigures(
         rate_hz=rate_hz,
         bytes_per_s=None if rate_hz is None else rate_hz * mean_bytes,
