@@ -1,1 +1,1 @@
-"""What channels observe: the ROS graph, topics, the log, reports of systems, and diagrams of them."""
+"""What channels observe: the ROS graph, topics, the log, reports of systems, and diagrams."""
