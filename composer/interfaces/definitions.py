@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TypeAlias
 
@@ -120,6 +120,23 @@ class Action:
 
 
 Interface: TypeAlias = "Message | Service | Action"
+
+
+#: The suffixes of the names of an interface's messages, by the folder of its definition.
+PARTS: Mapping[str, tuple[str, ...]] = {
+    "msg": ("",),
+    "srv": ("_Request", "_Response"),
+    "action": ("_Goal", "_Result", "_Feedback"),
+}
+
+
+def interface_of(name: str, part: Callable[[str], Message]) -> Interface:
+    """Return the interface ``name``; ``part`` returns the message with a suffix of PARTS."""
+    folder = name.split("/")[1]
+    messages = [part(suffix) for suffix in PARTS[folder]]
+    if folder == "srv":
+        return Service(name, *messages)
+    return Action(name, *messages) if folder == "action" else messages[0]
 
 
 def parts(interface: Interface) -> dict[str, Message]:

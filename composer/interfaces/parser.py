@@ -14,15 +14,15 @@ from composer.base.diagnostics import nearest, shown
 from composer.interfaces.definitions import (
     FLOATS,
     INTEGER_RANGES,
+    PARTS,
     PRIMITIVES,
     TEXTS,
-    Action,
     Field,
     FieldType,
     Interface,
     Message,
     MessageConstant,
-    Service,
+    interface_of,
 )
 from composer.language.tree import Plain, ScalarValue
 
@@ -94,38 +94,13 @@ def parse_definition(name: str, text: str) -> Interface:
     if names is None:
         raise ValueError(f"'{shown(name)}' is not the name of an interface")
     package, folder, _ = names
-    parts = _parts(text)
-    expected = {"msg": 1, "srv": 2, "action": 3}[folder]
-    if len(parts) != expected:
-        starts = _separators(text)
-        similar = _similar(text) if len(parts) < expected else None
-        if similar is not None:
-            number, line_text = similar
-            raise DefinitionError(f"'{shown(line_text)}' where '{SEPARATOR}' is expected", number)
-        surplus = starts[expected - 1] if len(parts) > expected else len(text.splitlines())
-        line = surplus or 1
-        message = (
-            f"a .{folder} file has {expected - 1} lines with '{SEPARATOR}', not {len(parts) - 1}"
-        )
-        raise DefinitionError(message, line)
-    match parts:
-        case [lines]:
-            return _message(name, package, lines)
-        case [request, response]:
-            return Service(
-                name,
-                _message(f"{name}_Request", package, request),
-                _message(f"{name}_Response", package, response),
-            )
-        case [goal, result, feedback]:
-            return Action(
-                name,
-                _message(f"{name}_Goal", package, goal),
-                _message(f"{name}_Result", package, result),
-                _message(f"{name}_Feedback", package, feedback),
-            )
-        case _:
-            raise AssertionError(folder)
+    contents = _contents(text)
+    parts = _parts(contents)
+    suffixes = PARTS[folder]
+    if len(parts) != len(suffixes):
+        raise _wrong_count(contents, folder, len(text.splitlines()) or 1)
+    lines = dict(zip(suffixes, parts, strict=True))
+    return interface_of(name, lambda suffix: _message(f"{name}{suffix}", package, lines[suffix]))
 
 
 def parse_line(content: str, name: str) -> Field | MessageConstant | None:
@@ -139,35 +114,41 @@ def parse_line(content: str, name: str) -> Field | MessageConstant | None:
 def without_comments(text: str) -> str:
     """Return the definition without comments and empty lines."""
     return ("\n" + SEPARATOR + "\n").join(
-        "\n".join(" ".join(line.split(None, 1)) for _, line in lines) for lines in _parts(text)
+        "\n".join(" ".join(line.split(None, 1)) for _, line in lines)
+        for lines in _parts(_contents(text))
     )
 
 
-def _parts(text: str) -> list[_Lines]:
-    """Return the numbered lines of definitions between the separators."""
+def _contents(text: str) -> _Lines:
+    """Return the numbered lines without comments and empty lines."""
+    lines = enumerate(text.splitlines(), start=1)
+    stripped = ((at, line.partition("#")[0].replace("\t", " ").strip()) for at, line in lines)
+    return [(at, content) for at, content in stripped if content]
+
+
+def _parts(contents: _Lines) -> list[_Lines]:
+    """Return the lines of definitions between the separators."""
     parts: list[_Lines] = [[]]
-    for number, line in enumerate(text.splitlines(), start=1):
-        content = line.partition("#")[0].replace("\t", " ").strip()
+    for number, content in contents:
         if content == SEPARATOR:
             parts.append([])
-        elif content:
+        else:
             parts[-1].append((number, content))
     return parts
 
 
-def _separators(text: str) -> list[int]:
-    """Return the numbers of the lines with separators."""
-    lines = enumerate(text.splitlines(), start=1)
-    return [number for number, line in lines if line.partition("#")[0].strip() == SEPARATOR]
-
-
-def _similar(text: str) -> tuple[int, str] | None:
-    """Return the first line that was probably meant as a separator, with its number."""
-    for number, line in enumerate(text.splitlines(), start=1):
-        content = line.partition("#")[0].strip()
-        if content and content != SEPARATOR and not content.strip(_DASHES):
-            return number, content
-    return None
+def _wrong_count(contents: _Lines, folder: str, last_line: int) -> DefinitionError:
+    """Return the error for a definition with too many or too few separators."""
+    starts = [number for number, content in contents if content == SEPARATOR]
+    expected = len(PARTS[folder]) - 1
+    if len(starts) < expected:
+        for number, content in contents:
+            if content != SEPARATOR and not content.strip(_DASHES):
+                message = f"'{shown(content)}' where '{SEPARATOR}' is expected"
+                return DefinitionError(message, number)
+    line = starts[expected] if len(starts) > expected else last_line
+    message = f"a .{folder} file has {expected} lines with '{SEPARATOR}', not {len(starts)}"
+    return DefinitionError(message, line)
 
 
 def _message(name: str, package: str, lines: _Lines) -> Message:

@@ -11,14 +11,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from composer.interfaces.definitions import (
-    Action,
-    Field,
-    FieldType,
-    Interface,
-    Message,
-    Service,
-)
+from composer.interfaces.definitions import Field, FieldType, Interface, Message, interface_of
 from composer.language.tree import Plain
 
 #: type_description_interfaces/msg/FieldType, numbers 1 to 22; arrays add 48, 96 or 144 to them.
@@ -69,16 +62,9 @@ def read_description(name: str, text: str) -> Interface:
 
 def _interface(name: str, described: Mapping[str, list[Any]]) -> Interface:
     def part(suffix: str) -> Message:
-        full_name = name + suffix
-        return Message(full_name, tuple(_fields(described[full_name])))
+        return Message(name + suffix, tuple(_fields(described[name + suffix])))
 
-    match name.split("/")[1]:
-        case "srv":
-            return Service(name, part("_Request"), part("_Response"))
-        case "action":
-            return Action(name, part("_Goal"), part("_Result"), part("_Feedback"))
-        case _:
-            return part("")
+    return interface_of(name, part)
 
 
 def _fields(described: list[Any]) -> list[Field]:

@@ -25,6 +25,10 @@ from composer.language.expressions import (
 from composer.language.tree import ScalarValue, Tree
 
 _FORMAT = re.compile(r"[<>^]?[-+ ]?#?0?\d{0,2},?(\.\d{1,2})?[bdeEfFgGoxX%s]?", re.ASCII)
+_QUOTED = r"""'[^']*'?|"[^"]*"?"""
+#: ``{{``, ``}}``, an expression up to the first ``}`` outside quotes, a lone brace, other text.
+_PIECE = re.compile(rf"\{{\{{|\}}\}}|\{{(?:[^}}'\"]+|{_QUOTED})*\}}?|\}}|[^{{}}]+")
+_SOURCE = re.compile(rf"(?:[^:'\"]+|{_QUOTED})*")
 #: More of one template are not reported.
 _MAX_PROBLEMS = 100
 #: Expressions in one text, and the texts between them.
@@ -167,7 +171,8 @@ def _compile(value: Tree, problems: list[TemplateProblem]) -> Template:
 
 def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem]) -> Template:
     parts: list[str | Formatted] = []
-    for offset, piece in _pieces(text):
+    for match in _PIECE.finditer(text):
+        offset, piece = match.start(), match[0]
         if len(problems) >= _MAX_PROBLEMS:
             break
         if len(parts) > _MAX_PARTS:
@@ -194,39 +199,6 @@ def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem
             return Constant("".join(str(part) for part in parts), scalar.span)
 
 
-def _pieces(text: str) -> Iterator[tuple[int, str]]:
-    """Yield offset and text of the pieces: plain text, ``{{``, ``}}``, ``{...}``, a lone brace."""
-    offset = 0
-    while offset < len(text):
-        end = _piece_end(text, offset)
-        yield offset, text[offset:end]
-        offset = end
-
-
-def _piece_end(text: str, start: int) -> int:
-    if text.startswith(("{{", "}}"), start):
-        return start + 2
-    if text[start] == "{":
-        return _closing_brace(text, start) + 1
-    if text[start] == "}":
-        return start + 1
-    return next((at for at in range(start, len(text)) if text[at] in "{}"), len(text))
-
-
-def _closing_brace(text: str, start: int) -> int:
-    """Return the index of the brace that closes the one at ``start``, or the end of the text."""
-    quote = ""
-    for at in range(start + 1, len(text)):
-        character = text[at]
-        if quote:
-            quote = "" if character == quote else quote
-        elif character in "'\"":
-            quote = character
-        elif character == "}":
-            return at
-    return len(text)
-
-
 def _compile_braces(
     scalar: tree.Scalar, offset: int, piece: str, problems: list[TemplateProblem]
 ) -> list[str | Formatted]:
@@ -235,7 +207,10 @@ def _compile_braces(
         problems.append(TemplateProblem("'{' is not closed", span, "write '{{' for a brace"))
         return []
     inside = piece[1:-1]
-    source, layout = _split_format(inside)
+    # The format follows the first colon outside quotes.
+    matched = _SOURCE.match(inside)
+    source = matched[0] if matched is not None else ""
+    layout = inside[len(source) + 1 :] if len(source) < len(inside) else None
     source_offset = offset + 1 + len(source) - len(source.lstrip())
     source = source.strip()
     if layout is not None and not (layout and _FORMAT.fullmatch(layout)):
@@ -249,16 +224,3 @@ def _compile_braces(
         problems.append(TemplateProblem(error.message, span, error.hint))
         return []
     return [Formatted(expression, layout or "", scalar.part(source_offset, len(source)))]
-
-
-def _split_format(inside: str) -> tuple[str, str | None]:
-    """Split at the first colon outside quotes into the expression and the format."""
-    quote = ""
-    for at, character in enumerate(inside):
-        if quote:
-            quote = "" if character == quote else quote
-        elif character in "'\"":
-            quote = character
-        elif character == ":":
-            return inside[:at], inside[at + 1 :]
-    return inside, None

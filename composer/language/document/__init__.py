@@ -19,8 +19,8 @@ import yaml
 from composer.base.diagnostics import Diagnostic, nearest, shown
 from composer.base.regular_files import FileTooLargeError, NotRegularError, read_regular
 from composer.base.source import SourceFile, Span, shown_path
-from composer.language.document.builder import Stopped, TreeBuilder, parse_events
-from composer.language.document.limits import MAX_BYTES, TooManyErrors
+from composer.language.document.builder import TreeBuilder, parse_events
+from composer.language.document.limits import MAX_BYTES, Stopped
 from composer.language.document.parameter_files import ParameterFileBuilder
 from composer.language.document.scalars import check_text, resolve_plain
 from composer.language.rules import KEY_WITHOUT_VALUE, TOO_LARGE, UNREADABLE_FILE, YAML_SYNTAX
@@ -121,7 +121,7 @@ def _build(
         with closing(parse_events(source.text if text is None else text)) as stream:
             for event in stream:
                 builder.handle(event)
-    except (Stopped, TooManyErrors) as stopped:
+    except Stopped as stopped:
         return [*builder.diagnostics, stopped.diagnostic]
     except (yaml.YAMLError, ValueError) as error:
         from composer.language.document.syntax_errors import explain  # noqa: PLC0415 - only for invalid files
@@ -158,24 +158,23 @@ _ENTRIES_FOR_HINT = 1000
 _WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
 
-class _NotRead(Exception):
-    """A file cannot be read; the message and the hint of the diagnostic."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
-
-
 def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]:
     """Return the content of a regular file of at most MAX_BYTES, or a diagnostic."""
-    start = Span(source, 1, 1)
+
+    def unread(message: str, hint: str | None = None) -> tuple[bytes, list[Diagnostic]]:
+        return b"", [Diagnostic(UNREADABLE_FILE, message, Span(source, 1, 1), hint=hint)]
+
     try:
-        data = _read(path)
-    except _NotRead as problem:
-        return b"", [Diagnostic(UNREADABLE_FILE, str(problem), start, hint=problem.hint)]
-    if data is None:
+        return read_regular(path, MAX_BYTES), []
+    except FileTooLargeError:
         return b"", [too_large(source)]
-    return data, []
+    except FileNotFoundError:
+        return unread("there is no such file", similar_file(path, str(path), ""))
+    except NotRegularError as error:
+        return unread(error.strerror or str(error))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        return unread(f"this file cannot be read: {reason or error}")
 
 
 def too_large(source: SourceFile) -> Diagnostic:
@@ -207,21 +206,6 @@ def _not_utf8(data: bytes, offset: int, span: Span) -> Diagnostic:
     else:
         message = f"the byte 0x{data[offset]:02x} is not UTF-8"
     return Diagnostic(UNREADABLE_FILE, message, span, hint="save the file as UTF-8")
-
-
-def _read(path: Path) -> bytes | None:
-    """Return the content, or None if it is too large. Raises _NotRead."""
-    try:
-        return read_regular(path, MAX_BYTES)
-    except FileTooLargeError:
-        return None
-    except FileNotFoundError:
-        raise _NotRead("there is no such file", similar_file(path, str(path), "")) from None
-    except NotRegularError as error:
-        raise _NotRead(error.strerror or str(error)) from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else None
-        raise _NotRead(f"this file cannot be read: {reason or error}") from None
 
 
 def similar_file(path: Path, name: str, *suffixes: str) -> str | None:

@@ -17,7 +17,7 @@ from composer.base.diagnostics import Diagnostic, Label, Rule, line_subject, sho
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language import rules
-from composer.language.document.limits import MAX_DEPTH, MAX_VALUES, LimitedDiagnostics
+from composer.language.document.limits import MAX_DEPTH, MAX_VALUES, LimitedDiagnostics, Stopped
 from composer.language.document.scalars import NumberRefused, check_value, resolve_plain
 from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe
 
@@ -68,11 +68,6 @@ def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool
     return Span(source, row + 1, start + 1, length if length > 0 else 1), verbatim, offset
 
 
-def collection_span(start: Span, first: Span, is_flow: bool) -> Span:
-    """Return the span of a map or list: its bracket or, in block style, its first item."""
-    return start if is_flow else first
-
-
 def parse_events(text: str) -> Generator[yaml.Event, None, None]:
     """Yield the events of ``text``. Raises yaml.YAMLError; PyYAML's own parser also ValueError."""
     loader = _LOADER(text)
@@ -81,14 +76,6 @@ def parse_events(text: str) -> Generator[yaml.Event, None, None]:
             yield event
     finally:
         loader.dispose()
-
-
-class Stopped(Exception):
-    """Parsing cannot continue; ``diagnostic`` says why."""
-
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        super().__init__(diagnostic.message)
-        self.diagnostic = diagnostic
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,9 +110,9 @@ class _Open:
             return self.text_in_braces
         if self.is_map:
             first = self.entries[0].key.span if self.entries else self.start
-            return Mapping(tuple(self.entries), collection_span(self.start, first, self.is_flow))
+            return Mapping(tuple(self.entries), self.start if self.is_flow else first)
         first = self.items[0].span if self.items else self.start
-        return Sequence(tuple(self.items), collection_span(self.start, first, self.is_flow))
+        return Sequence(tuple(self.items), self.start if self.is_flow else first)
 
 
 class TreeBuilder:

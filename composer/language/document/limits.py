@@ -50,12 +50,19 @@ MIN_INTEGER = -(2**63)
 MAX_INTEGER = 2**64 - 1
 
 
-class TooManyErrors(Exception):
+class Stopped(Exception):
+    """A stage cannot continue with a file; ``diagnostic`` says why."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+class TooManyErrors(Stopped):
     """A stage has found more than MAX_ERRORS errors: the ``first`` ones, and what says so."""
 
     def __init__(self, first: list[Diagnostic], diagnostic: Diagnostic) -> None:
-        super().__init__(diagnostic.message)
-        self.diagnostic = diagnostic
+        super().__init__(diagnostic)
         self.diagnostics = [*first, diagnostic]
 
 

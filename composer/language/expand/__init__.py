@@ -12,10 +12,10 @@ from collections.abc import Mapping as Map
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, shown
 from composer.language import rules
-from composer.language.document.limits import TooManyErrors
+from composer.language.document.limits import Stopped, TooManyErrors
 from composer.language.expand.copies import COPYING
 from composer.language.expand.scope import Scope, dependency_order, measure, read_scope
-from composer.language.expand.substitution import Substitution, TooLarge, references
+from composer.language.expand.substitution import Substitution, references
 from composer.language.schema import kind_of
 from composer.language.tree import Entry, Mapping, Scalar
 
@@ -41,11 +41,11 @@ def expand(tree: Mapping, given: Map[str, Entry]) -> tuple[Mapping, list[Diagnos
     try:
         diagnostics += _evaluate(substitution, given)
         expanded = _expand_sections(substitution, tree)
-    except TooLarge as stopped:
-        found = [*unknown.values(), *diagnostics, *substitution.diagnostics]
-        return tree, [*found, stopped.diagnostic]
     except TooManyErrors as stopped:
         return tree, stopped.diagnostics
+    except Stopped as stopped:
+        found = [*unknown.values(), *diagnostics, *substitution.diagnostics]
+        return tree, [*found, stopped.diagnostic]
     # What the file uses and does not declare is reported there.
     arguments = [item for name, item in unknown.items() if name not in substitution.unknown]
     found = [*arguments, *diagnostics, *substitution.diagnostics]

@@ -118,9 +118,13 @@ def measure(tree: Tree) -> Sized:
         case Scalar():
             return Sized(tree, 1, 0)
         case Sequence():
-            parts = [measure(item) for item in tree.items]
+            return sized(tree, [measure(item) for item in tree.items])
         case Mapping():
-            parts = [measure(entry.value) for entry in tree]
+            return sized(tree, [measure(entry.value) for entry in tree])
+
+
+def sized(tree: Sequence | Mapping, parts: list[Sized]) -> Sized:
+    """Return a map or list of ``parts`` with its size; keys count as values."""
     keys = len(parts) if isinstance(tree, Mapping) else 0
     values = 1 + keys + sum(part.values for part in parts)
     return Sized(tree, values, 1 + max((part.height for part in parts), default=0))

@@ -15,8 +15,9 @@ from composer.language.document.limits import (
     MAX_DEPTH,
     MAX_VALUES,
     LimitedDiagnostics,
+    Stopped,
 )
-from composer.language.expand.scope import Scope, Sized
+from composer.language.expand.scope import Scope, Sized, sized
 from composer.language.rules import DUPLICATE_KEY, TOO_LARGE
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
 
@@ -75,14 +76,6 @@ def references(tree: Tree) -> Iterator[str]:
                 yield from references(entry.value)
 
 
-class TooLarge(Exception):
-    """The expanded file exceeds a limit; ``diagnostic`` says where."""
-
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        super().__init__(diagnostic.message)
-        self.diagnostic = diagnostic
-
-
 @dataclass(slots=True)
 class Growth:
     """The size of an expanded file."""
@@ -108,20 +101,20 @@ class Substitution:
     def evaluate(self, tree: Tree, depth: int = 0) -> Sized:
         """Return ``tree``, nested in ``depth`` maps and lists, with its variables replaced.
 
-        Values keep the location where they were written. Raises TooLarge.
+        Values keep the location where they were written. Raises Stopped.
         """
         self.growth.values = 0
         return self.add(tree, depth)
 
     def grow(self, values: int, tree: Tree) -> None:
-        """Count values that are inserted at ``tree``. Raises TooLarge."""
+        """Count values that are inserted at ``tree``. Raises Stopped."""
         self.growth.values += values
         if self.growth.values > MAX_VALUES:
             message = f"with its variables expanded, this file has more than {MAX_VALUES:,} values"
             raise self._too_large(tree, message)
 
     def grow_copies(self, copies: int, tree: Tree) -> None:
-        """Count the copies that ``tree`` makes. Raises TooLarge."""
+        """Count the copies that ``tree`` makes. Raises Stopped."""
         self.growth.copies += copies
         if self.growth.copies > MAX_COPIES:
             message = f"with this, the file makes more than {MAX_COPIES:,} copies"
@@ -142,7 +135,7 @@ class Substitution:
         parts = [self.add(item, depth + 1) for item in tree.items]
         if any(part.tree is not item for part, item in zip(parts, tree.items, strict=True)):
             tree = Sequence(tuple(part.tree for part in parts), tree.span)
-        return _sized(tree, parts, keys=0)
+        return sized(tree, parts)
 
     def _mapping(self, tree: Mapping, depth: int) -> Sized:
         self.grow(1 + len(tree.entries), tree)
@@ -153,10 +146,10 @@ class Substitution:
             self._check_keys(tree, keys)
             entries = tuple(Entry(key, part.tree) for key, part, _ in made)
             tree = Mapping(entries, tree.span)
-        return _sized(tree, parts, keys=len(parts))
+        return sized(tree, parts)
 
     def key(self, key: Scalar) -> Scalar:
-        """Return a key with its variables replaced, at its location. Raises TooLarge."""
+        """Return a key with its variables replaced, at its location. Raises Stopped."""
         if not isinstance(key.value, str) or not has_reference(key.value):
             return key
         name = self.add(key, _KEY_DEPTH).tree
@@ -244,8 +237,8 @@ class Substitution:
 
     def _too_large(
         self, tree: Tree, message: str, hint: str = "use shorter values, or fewer variables"
-    ) -> TooLarge:
-        return TooLarge(Diagnostic(TOO_LARGE, message, tree.span, hint=hint))
+    ) -> Stopped:
+        return Stopped(Diagnostic(TOO_LARGE, message, tree.span, hint=hint))
 
     def _report(
         self,
@@ -257,8 +250,3 @@ class Substitution:
     ) -> None:
         span = scalar.part(reference.start, len(reference.written))
         self.diagnostics.append(Diagnostic(rule, message, span, hint=hint))
-
-
-def _sized(tree: Tree, parts: list[Sized], keys: int) -> Sized:
-    values = 1 + keys + sum(part.values for part in parts)
-    return Sized(tree, values, 1 + max((part.height for part in parts), default=0))

@@ -12,13 +12,14 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
+from composer.language.document.limits import Stopped
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
 from composer.language.tree import Mapping
 from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
 from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit, read_node_type
-from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits, LimitExceeded
+from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits
 from composer.project import Project
 
 __all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit", "read_node_type"]
@@ -55,7 +56,7 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
         merged = resolver.merge(SystemFile(folder / Path(source.path).name, source, tree), {})
-    except LimitExceeded as stopped:
+    except Stopped as stopped:
         return AssembledSystem(None, [stopped.diagnostic])
     is_partial = (
         resolver.is_partial

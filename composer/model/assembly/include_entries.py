@@ -79,7 +79,7 @@ class IncludeReader:
     def read(self, name: Located[str], folder: Path, includer: SourceFile) -> SystemFile | None:
         """Return the file ``name`` in ``folder``; None if it cannot be included.
 
-        The reason is reported where it is included. Raises LimitExceeded.
+        The reason is reported where it is included. Raises Stopped.
         """
         path = self._path_of(name, folder)
         if path is None:

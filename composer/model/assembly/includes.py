@@ -17,7 +17,7 @@ from composer.language.schema.kinds import SYSTEM, with_intended_sections
 from composer.language.tree import Entry, Mapping, Tree
 from composer.language.tree_values import items
 from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
-from composer.model.assembly.limits import IncludeLimits, LimitExceeded
+from composer.model.assembly.limits import IncludeLimits, exceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
 from composer.model.assembly.namespacing import add_namespace
 from composer.model.assembly.references import expand_wildcards
@@ -50,7 +50,7 @@ class IncludeResolver:
     def merge(self, file: SystemFile, arguments: dict[str, Entry]) -> Mapping:
         """Return ``file`` with ``arguments`` for its variables, merged with its includes.
 
-        Raises LimitExceeded.
+        Raises Stopped.
         """
         self.folders[file.source.path] = file.path.parent
         tree, misspelled = with_intended_sections(file.tree, SYSTEM)
@@ -93,7 +93,7 @@ class IncludeResolver:
         span = include.file.span
         if len(self._stack) > MAX_INCLUDE_DEPTH:
             message = f"files include each other more than {MAX_INCLUDE_DEPTH} deep"
-            raise LimitExceeded(message, span, "include the file directly")
+            raise exceeded(message, span, "include the file directly")
         self.included.setdefault(file.source.path, {}).setdefault(str(span), span)
         tree = self.merge(file, include.arguments)
         if include.overrides is not None:

@@ -10,13 +10,13 @@ from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile
 from composer.language.document import read_document
-from composer.language.document.limits import MAX_INCLUDE_DEPTH
+from composer.language.document.limits import MAX_INCLUDE_DEPTH, Stopped
 from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE
 from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
 from composer.language.tree import Mapping
 from composer.language.tree_values import text
-from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, LimitExceeded
+from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, exceeded
 from composer.model.assembly.merging import merge_maps
 from composer.project import Project
 from composer.project.node_types import NodeTypes
@@ -79,7 +79,7 @@ def inherit(file: NodeTypeFile) -> Inherited:
             if base is None:
                 return Inherited(None, diagnostics, tuple(files))
             files.append(_with_intended_sections(base, diagnostics))
-    except LimitExceeded as stopped:
+    except Stopped as stopped:
         return Inherited(None, [stopped.diagnostic], tuple(files))
     tree = files[-1].tree
     for child in reversed(files[:-1]):
@@ -113,7 +113,7 @@ def _base(
         return None
     if len(files) > MAX_INCLUDE_DEPTH:
         message = f"node types extend each other more than {MAX_INCLUDE_DEPTH} deep"
-        raise LimitExceeded(message, name.span, "extend the base type directly")
+        raise exceeded(message, name.span, "extend the base type directly")
     file = read_node_type(path, diagnostics)
     if file is not None:
         limits.count("characters", len(file.source.text), name.span)

@@ -13,6 +13,7 @@ from composer.language.document.limits import (
     MAX_INCLUDED_VALUES,
     MAX_INCLUDES,
     MAX_MATCHES,
+    Stopped,
 )
 from composer.language.rules import TOO_LARGE
 
@@ -21,12 +22,9 @@ UNKNOWN_OVERRIDE = error("RC293", "unknown-override")
 UNKNOWN_BASE = error("RC295", "unknown-base")
 
 
-class LimitExceeded(Exception):
-    """A system exceeds a limit; ``diagnostic`` says where."""
-
-    def __init__(self, message: str, span: Span, hint: str) -> None:
-        super().__init__(message)
-        self.diagnostic = Diagnostic(TOO_LARGE, message, span, hint=hint)
+def exceeded(message: str, span: Span, hint: str) -> Stopped:
+    """Return what ends the assembly of a system that exceeds a limit."""
+    return Stopped(Diagnostic(TOO_LARGE, message, span, hint=hint))
 
 
 class _Limit(NamedTuple):
@@ -74,8 +72,8 @@ class IncludeLimits:
         self._counts: Counter[str] = Counter()
 
     def count(self, what: str, number: int, span: Span) -> None:
-        """Add to a count. Raises LimitExceeded beyond its limit."""
+        """Add to a count. Raises Stopped beyond its limit."""
         self._counts[what] += number
         limit = _LIMITS[what]
         if self._counts[what] > limit.maximum:
-            raise LimitExceeded(f"with this, {limit.problem}", span, limit.hint)
+            raise exceeded(f"with this, {limit.problem}", span, limit.hint)

@@ -42,7 +42,7 @@ def with_prefix(name: Scalar, prefix: str) -> Scalar:
 
 
 def expand_wildcards(tree: Mapping, limits: IncludeLimits) -> Mapping:
-    """Return a system with the names of nodes in place of patterns. Raises LimitExceeded.
+    """Return a system with the names of nodes in place of patterns. Raises Stopped.
 
     Chains have no patterns: their ports have an order.
     """
