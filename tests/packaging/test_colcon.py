@@ -70,7 +70,7 @@ def test_an_interface_package_is_built(installation: Installation, tmp_path: Pat
     project = tmp_path / "my_robot"
     run(compose, "new", "interfaces", "my_msgs", folder=project, variables=without_ros())
     target = project / "generated"
-    command = (sys.executable, "-P", "-m", "composer", "interfaces", "build", "my_msgs")
+    command = (sys.executable, "-P", "-m", "composer", "interface", "build", "my_msgs")
     run(*command, "--generate", target, folder=project, variables=with_this_ros())
     wheels = tmp_path / "wheels"
     pip = (sys.executable, "-m", "pip", "wheel", "-qq", "--no-deps", "--wheel-dir", wheels)

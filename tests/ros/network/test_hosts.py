@@ -125,8 +125,8 @@ def test_a_host_whose_every_command_is_hostile(tmp_path: Path) -> None:
         for is_endless in (False, True):
             if is_endless:
                 program.with_name("endless").touch()
-            for command in (("up", "--hosts"), ("doctor", "--hosts"), ("sync",)):
-                done = system.compose(command[0], str(system.path), *command[1:])
+            for command in (("hosts", "run"), ("hosts", "sync"), ("doctor", "--hosts")):
+                done = system.compose(*command, str(system.path))
                 output = done.stdout + done.stderr
                 assert done.returncode == 1, output
                 assert output.replace("\n", "").isprintable(), output
