@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from composer.cli.support.options import examples
-from composer.cli.support.output.terminal import write
+from composer.cli.support.terminal import write
 
 #: The commands under the headings of the help. The module of that name in composer.cli.commands has
 #: ``<name>_app`` with subcommands, or a function with the name of the command and its epilog,
@@ -33,6 +33,7 @@ COMMANDS = {
 }
 _ALL = tuple(name for names in COMMANDS.values() for name in names)
 _OTHER_MODULES = {
+    "down": "system_commands",
     "import": "import_nodes",
     "node": "nodes",
     "service": "calls",

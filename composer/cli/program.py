@@ -11,7 +11,7 @@ from pathlib import Path
 
 from composer.base.characters import escape_line
 from composer.cli.support.errors import FAILED, CommandError
-from composer.cli.support.output.terminal import TolerantStream, drop
+from composer.cli.support.terminal import TolerantStream, drop
 
 INTERNAL = 3
 INTERRUPTED = 128 + signal.SIGINT

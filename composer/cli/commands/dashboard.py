@@ -16,7 +16,6 @@ from composer.cli.support.dashboard_process import (
 )
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import Autostart, AutostartTo, Namespace, Settings, examples
-from composer.cli.support.output.terminal import say, write
 from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
@@ -27,6 +26,7 @@ from composer.cli.support.system_arguments import (
     project_systems,
     runnable_system,
 )
+from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
     from composer.dashboard.declared import Declared

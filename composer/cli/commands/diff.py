@@ -19,10 +19,10 @@ from composer.cli.support.options import (
     examples,
     finite,
 )
-from composer.cli.support.output.results import as_json
-from composer.cli.support.output.terminal import lines, say, write
+from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.snapshot import GraphObserver

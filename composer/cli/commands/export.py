@@ -16,9 +16,9 @@ from composer.cli.commands.export_stubs import add_stubs_command
 from composer.cli.support.errors import CommandError
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
-from composer.cli.support.output.results import as_json
-from composer.cli.support.output.terminal import write, write_raw
+from composer.cli.support.results import as_json
 from composer.cli.support.system_arguments import SystemName
+from composer.cli.support.terminal import write, write_raw
 
 if TYPE_CHECKING:
     from composer.bridges.export.deployment import Service

@@ -13,8 +13,8 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.hosts import files_to_copy, write_staying
 from composer.cli.support.new_files import write_and_say
 from composer.cli.support.options import examples
-from composer.cli.support.output.terminal import lines, write, write_raw
 from composer.cli.support.system_arguments import RunnableSystem, SystemName, runnable_system
+from composer.cli.support.terminal import lines, write, write_raw
 
 if TYPE_CHECKING:
     from composer.bridges.export.container_image import Contents

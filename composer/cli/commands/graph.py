@@ -12,8 +12,8 @@ import typer
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
-from composer.cli.support.output.terminal import say, write_bytes
 from composer.cli.support.system_arguments import complete_system, load_system, system_file
+from composer.cli.support.terminal import say, write_bytes
 from composer.graph.diagram_options import FORMATS_BY_SUFFIX, Format, View
 
 if TYPE_CHECKING:

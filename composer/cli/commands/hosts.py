@@ -32,10 +32,10 @@ from composer.cli.support.options import (
     examples,
     given_options,
 )
-from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.process import compose_command
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
+from composer.cli.support.terminal import lines, say, write
 from composer.model.names import PROGRAM_LOGGER
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import NewFile, Timeout, command_group, examples
-from composer.cli.support.output.terminal import lines, say
 from composer.cli.support.ros import require_launch, require_ros, ros_session
+from composer.cli.support.terminal import lines, say
 from composer.model.names import node_name_problem
 
 if TYPE_CHECKING:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,11 +14,13 @@ import typer
 from composer.cli.support.completion import complete_interface_package, complete_type
 from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.options import Json, command_group, examples
-from composer.cli.support.output.results import as_json
-from composer.cli.support.output.terminal import lines, say_raw, use_color, write
+from composer.cli.support.results import as_json
+from composer.cli.support.terminal import lines, say, say_raw, use_color, write
 
 if TYPE_CHECKING:
     from composer.interfaces import Interface, Interfaces, Message
+
+_WHEEL_PREFIX = "ros-"
 
 interface_app = command_group(
     """Show interface types, and build interface packages.
@@ -129,7 +134,6 @@ def build(
     Building needs ROS 2 from PyPI. With a sourced ROS 2, and for packages with types of another one
     that is not on PyPI, such as nav2_msgs, build the generated package with colcon.
     """
-    from composer.cli.support.interface_builds import complete_package, install_package
     from composer.project import Project
 
     project = Project.at(Path.cwd())
@@ -231,3 +235,93 @@ def _as_data(message: Message) -> dict[str, Any]:
             for item in message.constants
         ],
     }
+
+
+def wheel_versions() -> dict[str, str]:
+    """Return the versions of the ROS packages that pip has installed, by their ROS names."""
+    from importlib.metadata import distributions
+
+    found = {}
+    for item in distributions():
+        name = item.metadata["Name"] or ""
+        if name.startswith(_WHEEL_PREFIX):
+            found[name.removeprefix(_WHEEL_PREFIX).replace("-", "_")] = item.version
+    return found
+
+
+def complete_package(name: str, folder: Path | None, target: Path, *, for_pip: bool = True) -> None:
+    """Write the complete package to ``target``, which is replaced as a whole. Raises CommandError.
+
+    Without a folder, it is a package of ROS whose definitions come with the composer. Unless it has
+    to be built with pip, what pip needs may be left out.
+    """
+    from composer.bridges.scaffolding import interface_package as package_files
+
+    try:
+        package = (
+            package_files.bundled_package(name)
+            if folder is None
+            else package_files.read_package(name, folder)
+        )
+        try:
+            files = package.files(wheel_versions())
+        except package_files.NotForPip as error:
+            if for_pip:
+                hint = f"build it with colcon: compose interface build {name} --generate FOLDER"
+                raise CommandError(str(error), hint=hint) from error
+            files = package.files(None)
+        _replace_folder(target, files)
+    except package_files.InvalidPackage as error:
+        raise CommandError(str(error)) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise CommandError(f"cannot complete package '{name}': {error}") from error
+
+
+def _replace_folder(target: Path, files: Mapping[str, str]) -> None:
+    """Write files to a folder, which is as before if that fails. Raises OSError."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as temporary:
+        new, old = Path(temporary, "new"), Path(temporary, "old")
+        new.mkdir()
+        for path, text in files.items():
+            file = new / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        if target.exists():
+            target.rename(old)
+        try:
+            new.rename(target)
+        except OSError:
+            if old.exists():
+                old.rename(target)
+            raise
+
+
+def install_package(name: str, folder: Path) -> None:
+    """Build a complete package with pip, and install it for this Python. Raises CommandError."""
+    if "rclpy" not in wheel_versions():
+        raise CommandError(
+            "pip can build interfaces only where ROS 2 is installed from PyPI",
+            hint=f"colcon build --base-paths {folder}",
+        )
+    say(f"building {name}, which takes up to a minute")
+    done = subprocess.run(  # noqa: S603 - this very Python
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--no-deps",
+            "--force-reinstall",
+            folder,
+        ],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if done.returncode != 0:
+        say(done.stdout + done.stderr)
+        raise CommandError(f"package '{name}' was not built", hint="see the output of pip above")

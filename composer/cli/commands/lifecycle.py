@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.commands.lifecycle_systems import add_system_commands
 from composer.cli.commands.nodes import NodeName
+from composer.cli.commands.system_commands import add_system_commands
 from composer.cli.support.completion import complete_node, complete_running_system
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, command_group, examples
-from composer.cli.support.output.results import as_json, say_none_found
-from composer.cli.support.output.terminal import columns, lines, say, write
+from composer.cli.support.results import as_json, say_none_found
 from composer.cli.support.ros import require_ros, ros_session
+from composer.cli.support.terminal import columns, lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.systems.lifecycle_batch import LifecycleBatch

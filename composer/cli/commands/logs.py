@@ -15,8 +15,8 @@ import typer
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import Json, LogSeverity, examples
-from composer.cli.support.output.terminal import columns, say, use_color, write, write_raw
 from composer.cli.support.system_arguments import running_system_name
+from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
 if TYPE_CHECKING:
     from composer.client.run_log import Record, Run, Selection, SystemLog
@@ -191,7 +191,7 @@ def _local(run: Run) -> str:
 
 def _listed(runs: list[Run], *, json: bool) -> str:
     if json:
-        from composer.cli.support.output.results import as_json
+        from composer.cli.support.results import as_json
 
         content = [
             {
@@ -231,12 +231,12 @@ def _records(
 
 def _print(record: Record, *, json: bool) -> None:
     if json:
-        from composer.cli.support.output.results import as_json
+        from composer.cli.support.results import as_json
 
         write(as_json(record.content()))
         return
-    from composer.cli.support.output.line_format import Line, LineFormat, file_format
-    from composer.cli.support.output.progress import continued
+    from composer.cli.support.line_format import Line, LineFormat, file_format
+    from composer.cli.support.progress import continued
 
     line = Line(record.level.upper(), record.logger, continued(record.message), record.time_ns)
     text = LineFormat(file_format()).render(line)

@@ -13,7 +13,7 @@ import typer
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.new_files import write_files
 from composer.cli.support.options import command_group, examples
-from composer.cli.support.output.terminal import lines, say, write
+from composer.cli.support.terminal import lines, say, write
 
 new_app = command_group(
     """Create a project, or files in it.

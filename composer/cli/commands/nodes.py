@@ -17,9 +17,9 @@ from composer.cli.support.options import (
     command_group,
     examples,
 )
-from composer.cli.support.output.results import as_json, say_none_found
-from composer.cli.support.output.terminal import columns, lines, write
+from composer.cli.support.results import as_json, say_none_found
 from composer.cli.support.ros import graph_names, require_ros, ros_session
+from composer.cli.support.terminal import columns, lines, write
 
 NodeName = Annotated[
     str,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.cli.commands.export_stubs import update_typings
 from composer.cli.support.dashboard_process import require_dashboard
 from composer.cli.support.errors import CONFIG, CommandError, UsageError
 from composer.cli.support.options import (
@@ -30,7 +31,6 @@ from composer.cli.support.options import (
     finite,
     given_options,
 )
-from composer.cli.support.output.terminal import say, write
 from composer.cli.support.ros import (
     announce_discovery,
     require_interfaces,
@@ -38,7 +38,7 @@ from composer.cli.support.ros import (
     require_ros,
 )
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
-from composer.cli.support.typings import update_typings
+from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
     from composer.model import Process, System
@@ -173,7 +173,7 @@ def run(
     """
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
-    from composer.cli.support.output.c_streams import C_STREAMS
+    from composer.cli.support.c_streams import C_STREAMS
 
     C_STREAMS.redirect()  # before libraries of ROS are loaded
     warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
@@ -276,11 +276,11 @@ def _run(
 ) -> Outcome:
     """Run the system, with its plans up and down, and a dashboard if its arguments are given."""
     gc.disable()  # until the host has its nodes
+    from composer.cli.support.console import queued_output
     from composer.cli.support.dashboard_process import shown_address
-    from composer.cli.support.output.console import queued_output
-    from composer.cli.support.output.line_format import console_format
-    from composer.cli.support.output.progress import Progress, severity_of, summary
+    from composer.cli.support.line_format import console_format
     from composer.cli.support.process import end_now
+    from composer.cli.support.progress import Progress, severity_of, summary
     from composer.cli.support.run_logging import run_log
     from composer.model.names import join
     from composer.runtime.host import Host

@@ -16,13 +16,13 @@ import typer
 from composer.base.characters import escape_lines
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
-from composer.cli.support.output.results import as_json
-from composer.cli.support.output.terminal import write, write_raw
+from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
+from composer.cli.support.terminal import write, write_raw
 
 if TYPE_CHECKING:
-    from composer.cli.support.output.callback_tables import SortKey
+    from composer.cli.support.callback_tables import SortKey
     from composer.client.session import Session
     from composer.client.systems.managers import Systems
     from composer.client.systems.system_reports import SystemReport
@@ -71,7 +71,7 @@ def top(
     since the start: 'late' is how late a timer is called (99th percentile), 'over' counts calls
     that took longer than their budget_ms, and 'dropped' counts messages dropped from full queues.
     """
-    from composer.cli.support.output.callback_tables import SortKey
+    from composer.cli.support.callback_tables import SortKey
 
     if sort not in list(SortKey):
         raise UsageError(f"cannot sort by '{sort}'", hint=f"expected {_SORT_KEYS}")
@@ -132,13 +132,13 @@ class _Follower:
 
     def table(self, key: SortKey, max_lines: int | None) -> str:
         """Return a table of at most ``max_lines`` lines."""
-        from composer.cli.support.output.callback_tables import sorted_rates, top_table
+        from composer.cli.support.callback_tables import sorted_rates, top_table
 
         return top_table(self._now, sorted_rates(self._before, self._now, key), max_lines)
 
     def json(self, key: SortKey) -> str:
         """Return the same as one line of JSON."""
-        from composer.cli.support.output.callback_tables import sorted_rates, top_data
+        from composer.cli.support.callback_tables import sorted_rates, top_data
 
         return as_json(top_data(self._now, sorted_rates(self._before, self._now, key)))
 

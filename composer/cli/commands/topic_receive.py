@@ -13,9 +13,9 @@ import typer
 from composer.cli.support.completion import complete_topic
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, finite
-from composer.cli.support.output.results import as_json, as_yaml, truncated
-from composer.cli.support.output.terminal import say, write
+from composer.cli.support.results import as_json, as_yaml, truncated
 from composer.cli.support.ros import ros_session
+from composer.cli.support.terminal import say, write
 from composer.model.qos import PRESETS, Durability, QosProfile, Reliability
 
 if TYPE_CHECKING:

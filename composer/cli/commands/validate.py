@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.base.fast_dataclass import dataclass
+from composer.cli.commands.export_stubs import update_typings
 from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import examples
-from composer.cli.support.output.terminal import columns, say, use_color, write, write_raw
 from composer.cli.support.system_arguments import (
     example_systems,
     nearest_path,
     path_exists,
     project_systems,
 )
-from composer.cli.support.typings import update_typings
+from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
 if TYPE_CHECKING:
     from composer.base.diagnostics import Diagnostic

@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.output.terminal import say
 from composer.cli.support.process import compose_command, is_in_background
+from composer.cli.support.terminal import say
 
 #: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
 _VARIABLE = "COMPOSE_DASHBOARD_FD"

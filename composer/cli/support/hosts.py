@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from composer.cli.support.errors import CONFIG, FAILED, CommandError
-from composer.cli.support.output.terminal import lines, say, write
 from composer.cli.support.system_arguments import runnable_system
+from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.hosts.deployment import RemoteProcess

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.output.terminal import say, write_raw
+from composer.cli.support.terminal import say, write_raw
 
 
 def write_output(text: str, output: Path | None, *, replace: bool | None = None) -> None:

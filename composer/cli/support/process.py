@@ -14,9 +14,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
+from composer.cli.support.c_streams import crash_fd
 from composer.cli.support.errors import CommandError
-from composer.cli.support.output.c_streams import crash_fd
-from composer.cli.support.output.line_format import CONSOLE_FORMAT_VARIABLE, file_format
+from composer.cli.support.line_format import CONSOLE_FORMAT_VARIABLE, file_format
 
 #: Holds the file descriptor on which a background process reports that the system is up.
 READY_VARIABLE = "COMPOSE_READY_FD"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.cli.support.errors import CONFIG, CommandError
-from composer.cli.support.output.terminal import keep_stdout_for_data, say
+from composer.cli.support.terminal import keep_stdout_for_data, say
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline, Session

@@ -7,9 +7,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from composer.cli.support.output.console import OutputQueue
-from composer.cli.support.output.progress import logger_and_text, severity_of
-from composer.cli.support.output.terminal import say
+from composer.cli.support.console import OutputQueue
+from composer.cli.support.progress import logger_and_text, severity_of
+from composer.cli.support.terminal import say
 from composer.client.run_log import Record, RotatingFile, RunFolder
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.middleware.environment import log_folder

@@ -12,7 +12,7 @@ import typer
 
 from composer.cli.support.completion import complete_running_system
 from composer.cli.support.errors import FAILED, CommandError, UsageError
-from composer.cli.support.output.terminal import say, say_raw, use_color
+from composer.cli.support.terminal import say, say_raw, use_color
 
 if TYPE_CHECKING:
     from composer.loading import LoadResult

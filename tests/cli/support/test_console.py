@@ -12,7 +12,7 @@ import threading
 import time
 from pathlib import Path
 
-from composer.cli.support.output.console import FileDescriptor, OutputQueue
+from composer.cli.support.console import FileDescriptor, OutputQueue
 
 LIMIT_S = 20.0
 
@@ -132,7 +132,7 @@ def test_lines_that_a_full_disk_refuses_are_counted() -> None:
 #: ``fprintf`` holds the GIL, as rclpy does when rcl logs.
 PROGRAM = """
 import ctypes, os, subprocess, sys
-from composer.cli.support.output.console import queued_output
+from composer.cli.support.console import queued_output
 libc = ctypes.PyDLL(None)
 stderr = ctypes.c_void_p.in_dll(libc, "stderr")
 with queued_output():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.support import interface_builds
+from composer.cli.commands import interface
 from tests.cli.compose import compose
 
 
@@ -14,7 +14,7 @@ def test_packages_for_colcon_need_no_wheels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(interface_builds, "wheel_versions", dict)
+    monkeypatch.setattr(interface, "wheel_versions", dict)
     assert compose("new", "interfaces", "my_msgs").code == 0
     status = tmp_path / "interfaces" / "my_msgs" / "msg" / "Status.msg"
     status.write_text("geometry_msgs/Pose pose\n")

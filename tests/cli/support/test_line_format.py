@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.cli.support.output.line_format import Line, LineFormat, console_format, file_format
-from composer.cli.support.output.progress import Progress
+from composer.cli.support.line_format import Line, LineFormat, console_format, file_format
+from composer.cli.support.progress import Progress
 from composer.model import LogLevel
 from composer.runtime.supervision.events import BroughtUp, Logged
 

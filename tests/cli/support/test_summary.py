@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.cli.support.output.progress import summary
+from composer.cli.support.progress import summary
 from composer.runtime.supervision.events import NodeSummary, Outcome
 
 

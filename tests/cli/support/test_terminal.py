@@ -10,7 +10,7 @@ import pytest
 
 NOISY = """
 import os
-from composer.cli.support.output.terminal import keep_stdout_for_data, say, write
+from composer.cli.support.terminal import keep_stdout_for_data, say, write
 keep_stdout_for_data()
 keep_stdout_for_data()
 write("data")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.support.output.console import OutputQueue
+from composer.cli.support.console import OutputQueue
 from composer.client.run_log import (
     Record,
     RotatingFile,

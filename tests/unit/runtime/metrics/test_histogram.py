@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from composer.cli.support.output.callback_tables import (
+from composer.cli.support.callback_tables import (
     SortKey,
     sorted_rates,
     summary_table,

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from typing import TextIO
 
 from composer.base.characters import escape_lines
-from composer.cli.support.output.callback_tables import summary_table
-from composer.cli.support.output.line_format import Line, LineFormat
-from composer.cli.support.output.terminal import columns, lines, use_color
+from composer.cli.support.callback_tables import summary_table
+from composer.cli.support.line_format import Line, LineFormat
 from composer.cli.support.process import report_ready, take_ready_descriptor
+from composer.cli.support.terminal import columns, lines, use_color
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.supervision.events import (
     BroughtUp,

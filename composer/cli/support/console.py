@@ -16,8 +16,8 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Protocol, TextIO
 
-from composer.cli.support.output.c_streams import C_STREAMS
-from composer.cli.support.output.terminal import WrappedStream
+from composer.cli.support.c_streams import C_STREAMS
+from composer.cli.support.terminal import WrappedStream
 
 #: Text that may wait; beyond that, the oldest is dropped.
 _MAX_WAITING_CHARACTERS = 1_048_576

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from composer.base.characters import escape_json, is_safe
-from composer.cli.support.output.terminal import say
+from composer.cli.support.terminal import say
 
 
 def as_yaml(value: Any) -> str:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from composer.cli.support.output.terminal import columns, lines
+from composer.cli.support.terminal import columns, lines
 from composer.runtime.metrics.figures import CallbackFigures, CallbackRates, rates
 
 if TYPE_CHECKING:
