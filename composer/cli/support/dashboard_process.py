@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import select
 import signal
 import subprocess
 import threading
@@ -13,7 +12,7 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.process import compose_command, is_in_background
+from composer.cli.support.process import ReportingProcess, is_in_background
 from composer.cli.support.terminal import say
 
 #: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
@@ -36,44 +35,6 @@ def require_dashboard(command: str) -> None:
         )
 
 
-class DashboardProcess:
-    """A dashboard in a process of its own. Start it on the main thread."""
-
-    def __init__(self, arguments: Sequence[str]) -> None:
-        """Start ``compose dashboard`` with ``arguments``."""
-        self._reading, writing = os.pipe()
-        try:
-            self._process = subprocess.Popen(  # noqa: S603 - this very program
-                [*compose_command(), "dashboard", *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                env={**os.environ, _VARIABLE: str(writing)},
-                pass_fds=(writing,),
-                start_new_session=True,  # Ctrl-C ends the system first, and that the dashboard
-            )
-        finally:
-            os.close(writing)
-
-    def url(self, within_s: float) -> str | None:
-        """Return the address with the token; None if the dashboard has not started in time.
-
-        Call it once. It returns as soon as the dashboard ends.
-        """
-        with os.fdopen(self._reading, "rb") as pipe:
-            ready, _, _ = select.select([pipe], [], [], within_s)
-            data = os.read(pipe.fileno(), 4096) if ready else b""
-        return data.decode("ascii", "replace").strip() or None
-
-    def stop(self) -> None:
-        """End the dashboard."""
-        self._process.terminate()
-        try:
-            self._process.wait(_ENDS_WITHIN_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-
-
 def foxglove_line(url: str) -> str:
     """Return the line with the address for Foxglove, given that of the page."""
     address = url.replace("http://", "ws://", 1).replace("/?", "/foxglove?", 1)
@@ -92,12 +53,12 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
     Yield a function that returns the lines with the address, for a process in the background: its
     output is a file that others may read, so the address is not printed there.
     """
-    process = DashboardProcess(arguments)
+    dashboard = ReportingProcess(("dashboard", *arguments), _VARIABLE, subprocess.DEVNULL)
     found: list[str] = []
 
     def announce() -> None:
-        url = process.url(_READY_WITHIN_S)
-        if url is not None:
+        url = dashboard.report(_READY_WITHIN_S)
+        if url:
             found.append(url)
         if not in_background and not is_ending.is_set():
             say(address_lines(url) if url else "dashboard: it has not started, see above")
@@ -114,7 +75,12 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
         yield address
     finally:
         is_ending.set()
-        process.stop()
+        dashboard.process.terminate()
+        try:
+            dashboard.process.wait(_ENDS_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            dashboard.process.kill()
+            dashboard.process.wait()
         thread.join(_ENDS_WITHIN_S)
 
 

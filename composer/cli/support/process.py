@@ -9,9 +9,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import BinaryIO, NoReturn
 
 from composer.cli.support.c_streams import crash_fd
@@ -35,6 +36,48 @@ def compose_command() -> tuple[str, ...]:
     return (sys.executable, "-P", "-m", "composer")
 
 
+class ReportingProcess:
+    """A command of this program in a process of its own, which reports to this one, once."""
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        variable: str,
+        output: BinaryIO | int,
+        errors: BinaryIO | None = None,
+        environment: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        """Start ``compose`` with ``words``; ``variable`` tells it the descriptor for its report."""
+        self._reading, writing = os.pipe()
+        try:
+            self.process = subprocess.Popen(  # noqa: S603 - this very program
+                [*compose_command(), *words],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=errors,
+                env={**os.environ, **environment, variable: str(writing)},
+                pass_fds=(writing,),
+                start_new_session=True,  # Ctrl-C and the end of the terminal do not end it
+            )
+        finally:
+            os.close(writing)
+
+    def report(self, within_s: float) -> str | None:
+        """Return the report; empty if the process has ended without one, None if it is late.
+
+        Call it once.
+        """
+        end_s = time.monotonic() + within_s
+        received = b""
+        with os.fdopen(self._reading, "rb") as pipe:
+            while select.select([pipe], [], [], max(0.0, end_s - time.monotonic()))[0]:
+                data = os.read(pipe.fileno(), _READ_BYTES)
+                if not data:
+                    return received.decode(errors="replace").strip()
+                received += data
+        return None
+
+
 def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> str:
     """Start ``compose run`` with ``arguments``; return its report once the system is up.
 
@@ -44,31 +87,16 @@ def run_in_background(system: str, arguments: Sequence[str], limit_s: float) -> 
     raised as well.
     """
     log = _log_path(system)
-    output = _new_file(log)
-    reading, writing = os.pipe()
-    with os.fdopen(reading, "rb") as pipe, output:
-        try:
-            process = subprocess.Popen(  # noqa: S603 - this very program
-                [*compose_command(), "run", *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                env={
-                    **os.environ,
-                    READY_VARIABLE: str(writing),
-                    CONSOLE_FORMAT_VARIABLE: file_format(),
-                },
-                pass_fds=(writing,),
-                start_new_session=True,  # survive Ctrl-C and the end of the terminal
-            )
-        finally:
-            os.close(writing)
-        try:
-            report = _read_within(pipe.fileno(), limit_s)
-        except KeyboardInterrupt:
-            process.terminate()
-            process.wait()
-            raise
+    with _new_file(log) as output:
+        words, environment = ("run", *arguments), {CONSOLE_FORMAT_VARIABLE: file_format()}
+        child = ReportingProcess(words, READY_VARIABLE, output, output, environment)
+    process = child.process
+    try:
+        report = child.report(limit_s)
+    except KeyboardInterrupt:
+        process.terminate()
+        process.wait()
+        raise
     if report is None:
         os.killpg(process.pid, signal.SIGKILL)  # its own time limits did not work
         process.wait()
@@ -126,18 +154,6 @@ def end_now(exit_code: int) -> NoReturn:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(exit_code)
-
-
-def _read_within(pipe: int, limit_s: float) -> str | None:
-    """Return what is written to a pipe until it is closed; None after ``limit_s`` seconds."""
-    end_s = time.monotonic() + limit_s
-    received = b""
-    while select.select([pipe], [], [], max(0.0, end_s - time.monotonic()))[0]:
-        data = os.read(pipe, _READ_BYTES)
-        if not data:
-            return received.decode()
-        received += data
-    return None
 
 
 def _start_error(message: str, log: Path) -> CommandError:

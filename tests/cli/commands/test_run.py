@@ -20,15 +20,8 @@ def test_a_dry_run_prints_the_plan_with_its_causes() -> None:
 
 
 def test_options_change_the_plan() -> None:
-    done = compose(
-        "run",
-        PIPELINE,
-        "--dry-run",
-        "--autostart",
-        "inactive",
-        "--namespace",
-        "/robot1",
-    )
+    options = ("--autostart", "inactive", "--namespace", "/robot1")
+    done = compose("run", PIPELINE, "--dry-run", *options)
     assert "activate" not in done.out
     assert "#1 configure /robot1/perception/sensor_simulator: " in done.out
     assert compose("run", PIPELINE, "--dry-run", "--autostart", "unconfigured").out == ""
@@ -55,23 +48,12 @@ def test_parameter_overrides_are_validated() -> None:
 
 
 def test_paths_that_are_not_files_are_reported(tmp_path: Path) -> None:
+    assert compose("run", str(tmp_path)).code == 2
     os.mkfifo(tmp_path / "pipe.yaml")
     assert "expected a file, found a pipe" in compose("run", str(tmp_path / "pipe.yaml")).err
     done = compose("run", "a" * 5000)
     assert (done.code, done.out) == (78, "")
     assert "this file cannot be read: File name too long" in done.err
-
-
-def test_a_node_type_is_rejected(tmp_path: Path) -> None:
-    path = tmp_path / "relay.yaml"
-    path.write_text("node: relay\n")
-    done = compose("run", str(path), "--dry-run")
-    assert done.code == 78
-    assert "is a node type, not a system" in done.err
-
-
-def test_a_folder_is_a_usage_error(tmp_path: Path) -> None:
-    assert compose("run", str(tmp_path)).code == 2
 
 
 def test_one_process_alone_starts_no_other(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Log lines have the format of RCUTILS_CONSOLE_OUTPUT_FORMAT."""
+"""What a run prints: log lines in RCUTILS_CONSOLE_OUTPUT_FORMAT, and a summary."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import pytest
 
 from composer.cli.support.line_format import Line, LineFormat, console_format, file_format
-from composer.cli.support.progress import Progress
+from composer.cli.support.progress import Progress, summary
 from composer.model import LogLevel
-from composer.runtime.supervision.events import BroughtUp, Logged
+from composer.runtime.supervision.events import BroughtUp, Logged, NodeSummary, Outcome
 
 LINE = Line("WARN", "robot.planner", "no {name} yet", 1_700_000_000_012_345_678)
 
@@ -70,3 +70,13 @@ def test_log_files_have_the_date_and_time(monkeypatch: pytest.MonkeyPatch) -> No
     assert LineFormat(file_format()).render(LINE) == (
         "[2023-11-14 22:13:20.012] [WARN] [robot.planner] no {name} yet"
     )
+
+
+def test_counts_of_nodes_outside_the_process_are_not_known() -> None:
+    nodes = [
+        NodeSummary(name, "finalized", received, 0, 0, 0, 0, 0, in_process)
+        for name, received, in_process in (("/planner", 30, True), ("/lidar", 0, False))
+    ]
+    shown = summary(Outcome(0, "--for elapsed", 2.0, tuple(nodes))).splitlines()
+    assert shown[2].split() == ["/planner", "finalized", "30", "0", "0", "0", "0"]
+    assert shown[3].split() == ["/lidar", "finalized", "-", "-", "-", "-", "-"]

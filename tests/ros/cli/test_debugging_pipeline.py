@@ -12,7 +12,6 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-import yaml
 from std_msgs.msg import String
 
 from composer.client.graph_names import GraphNames
@@ -32,7 +31,6 @@ from tests.ros.support.commands import (
     compose,
     hand_written,
     listed,
-    repeated_until,
     running,
 )
 from tests.ros.support.in_process import Peer, wait_until
@@ -150,73 +148,9 @@ def test_a_killed_process_is_not_listed(session: Session) -> None:
     assert "/lab/forgetful" not in dict(local_names("node", PATIENCE_S) or ())
 
 
-#: Part of the output of each command; they only read, so they can run in parallel.
-OUTPUTS = {
-    ("node", "list"): "/planning/planner\n",
-    ("node", "info", "planner"): "  Subscribers:\n    /sensor_data:  nav_msgs/msg/Odometry\n",
-    ("topic", "list", "-t"): "/sensor_data  ",
-    ("topic", "echo", "/sensor_data", "--once", "--field", "header.frame_id"): "odom\n---\n",
-    ("topic", "echo", "/sensor_data", "--once", "--field", "pose.covariance[0]"): "0.0\n---\n",
-    ("topic", "list", "--all"): "/navigate/_action/feedback\n",
-    ("topic", "info", "-v", "/sensor_data"): "  type hash: RIHS01_",
-    ("topic", "hz", "/sensor_data", "--count", "20"): "average rate: ",
-    ("service", "list"): "/plan_trajectory\n",
-    ("action", "list"): "/navigate\n",
-    ("action", "info", "/navigate"): "Action servers: 1\n  /control/motor_controller\n",
-    ("param", "list", "planner"): "max_velocity\n",
-    ("param", "get", "planner", "max_velocity"): "1.0\n",
-    ("param", "describe", "planner", "max_velocity"): "maximum:      5.0",
-    ("param", "dump", "planner"): "/planning/planner:\n  ros__parameters:\n",
-}
-
-
-def test_commands_that_read() -> None:
-    with ThreadPoolExecutor(4) as pool:
-        texts = pool.map(retried_output, OUTPUTS)
-    for (arguments, expected), text in zip(OUTPUTS.items(), texts, strict=True):
-        assert expected in text, arguments
-
-
-def retried_output(arguments: tuple[str, ...]) -> str:
-    """Return the output; retry, because discovery may take longer on a busy machine."""
-    return listed((OUTPUTS[arguments],), *arguments, "--timeout", "20")
-
-
-def test_a_goal_is_reached() -> None:
-    goal = ("action", "send-goal", "/navigate", "{target: {x: 0.3}, max_velocity: 2.0}")
-    text = listed(("succeeded",), *goal, "--feedback", "--json")
-    printed = [json.loads(line) for line in text.splitlines()]
-    assert printed[-1]["status"] == "succeeded"
-    assert all(0.0 <= item["feedback"]["progress_percent"] <= 100.0 for item in printed[:-1])
-
-
-def test_a_parameter_is_set_and_a_message_published() -> None:
-    command = ("param", "set", "motor_controller", "max_velocity", "0.5")
-    assert listed(("0.5",), *command) == "/control/motor_controller max_velocity: 0.5\n"
-    once = ("topic", "pub", "--once", "--json", "/motor_commands", "geometry_msgs/msg/Twist")
-    published = listed(("linear",), *once, "{linear: {x: 0.1}}")
-    assert json.loads(published)["linear"]["x"] == 0.1
-
-
 def test_doctor_reports_no_problems() -> None:
     compatible = "all endpoints are compatible: "
     found = json.loads(listed((compatible,), "doctor", "--json"))
     assert [item for item in found if item["level"] in ("warning", "error")] == []
     (graph,) = (item["message"] for item in found if item["area"] == "graph")
     assert graph.startswith(compatible)
-
-
-def test_topic_info() -> None:
-    # A command of another test may still be there.
-    text = repeated_until(
-        lambda text: len(json.loads(text)["subscriptions"]) == 2,
-        *("topic", "info", "-v", "/sensor_data", "--json"),
-    )
-    found = json.loads(text)
-    assert [item["node"] for item in found["publishers"]] == ["/perception/sensor_simulator"]
-    assert [item["qos"]["reliability"] for item in found["subscriptions"]] == ["best_effort"] * 2
-
-
-def test_a_response_is_printed_as_yaml() -> None:
-    call = ("service", "call", "/plan_trajectory", "{max_velocity: 0.5}")
-    assert "success" in yaml.safe_load(listed(("success",), *call))
