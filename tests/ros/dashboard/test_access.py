@@ -66,7 +66,6 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address(server: Dashboard) ->
     [
         ({}, 200, ""),
         ({"Cookie": ""}, 401, "open the address with the token"),
-        ({"Cookie": "compose_dashboard=guess"}, 401, "open the address with the token"),
         ({"Host": "attacker.example"}, 421, "this server is not"),
         ({"Origin": "http://attacker.example"}, 403, "are not allowed"),
         ({"Sec_Fetch_Site": "cross-site"}, 403, "are not allowed"),
@@ -139,7 +138,6 @@ def test_other_methods_are_refused(server: Dashboard, method: str) -> None:
     [
         ({}, None, 403),
         ({"Cookie": "compose_dashboard=guess"}, "own", 401),
-        ({}, "http://attacker.example", 403),
         ({}, "http://127.0.0.1:1", 403),
     ],
 )
