@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.feeds import Feed
@@ -16,8 +16,6 @@ from composer.model import PortKind
 if TYPE_CHECKING:
     from composer.dashboard.observing.topology import Topology
 
-T = TypeVar("T")
-
 _CLOCK = ("/clock", "rosgraph_msgs/msg/Clock")
 _PERIOD_S = 0.2
 
@@ -26,53 +24,21 @@ Users = Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
-    """A topic with one of its types."""
-
-    id: int
-    topic: str
-    type: str
-    schema: str
-
-    def as_data(self) -> dict[str, Any]:
-        """Return the channel as it is sent."""
-        return {
-            "id": self.id,
-            "topic": self.topic,
-            "encoding": CDR,
-            "schemaName": self.type,
-            "schemaEncoding": SCHEMA_ENCODING,
-            "schema": self.schema,
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class OfferedService:
-    """A service with the schemas of its request and response."""
+class Offer:
+    """A topic with one of its types, or a service; ``data`` is what describes it to clients."""
 
     id: int
     name: str
     type: str
-    request: str
-    response: str
+    data: Mapping[str, Any]
 
     def as_data(self) -> dict[str, Any]:
-        """Return the service as it is sent."""
-        return {
-            "id": self.id,
-            "name": self.name,
-            "type": self.type,
-            "request": self._part("Request", self.request),
-            "response": self._part("Response", self.response),
-        }
+        """Return the offer as it is sent."""
+        return {"id": self.id, **self.data}
 
-    def _part(self, name: str, schema: str) -> dict[str, str]:
-        return {
-            "encoding": CDR,
-            "schemaName": f"{self.type}_{name}",
-            "schemaEncoding": SCHEMA_ENCODING,
-            "schema": schema,
-        }
+
+#: What is offered, by its number.
+Offers = Mapping[int, Offer]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +48,8 @@ class Contents:
     ``unknown`` has the types that are not installed, with a name of each.
     """
 
-    channels: Mapping[int, Channel] = field(default_factory=dict)
-    services: Mapping[int, OfferedService] = field(default_factory=dict)
+    channels: Offers = field(default_factory=dict)
+    services: Offers = field(default_factory=dict)
     publishers: Users = field(default_factory=dict)
     subscribers: Users = field(default_factory=dict)
     providers: Users = field(default_factory=dict)
@@ -102,18 +68,18 @@ class Catalog:
     def update(self, topology: Topology) -> None:
         """Offer what is in the ROS graph."""
         before = self.current
-        channels = {(item.topic, item.type): item for item in before.channels.values()}
-        services = {(item.name, item.type): item for item in before.services.values()}
-        topics, servers = _topics(topology), _servers(topology)
         unknown: dict[str, str] = {}
-        offered = [channels.get(key) or self._channel(*key) for key in topics]
-        unknown |= {key[1]: key[0] for key, item in zip(topics, offered, strict=True) if not item}
-        served = [services.get(key) or self._service(*key) for key in servers]
-        unknown |= {key[1]: key[0] for key, item in zip(servers, served, strict=True) if not item}
+        topics = {(name, end.type) for name, ends in topology.of_topics.items() for _, end in ends}
+        servers = {
+            (end.name, end.type)
+            for node in topology.visible
+            for end in topology.nodes[node]
+            if end.kind is PortKind.SERVICE
+        }
         publishers = _users(topology, PortKind.PUBLISHER)
         self.current = Contents(
-            channels={item.id: item for item in offered if item is not None},
-            services={item.id: item for item in served if item is not None},
+            channels=self._offers(before.channels, topics, self._channel, unknown),
+            services=self._offers(before.services, servers, self._service, unknown),
             publishers=publishers,
             subscribers=_users(topology, PortKind.SUBSCRIPTION),
             providers=_users(topology, PortKind.SERVICE),
@@ -121,13 +87,47 @@ class Catalog:
             has_clock=_CLOCK in topics and _CLOCK[0] in publishers,
         )
 
-    def _channel(self, topic: str, type_name: str) -> Channel | None:
-        schema = self._schemas.message(type_name)
-        return None if schema is None else Channel(next(self._numbers), topic, type_name, schema)
+    def _offers(
+        self,
+        before: Offers,
+        keys: Iterable[tuple[str, str]],
+        describe: Callable[[str, str], Mapping[str, Any] | None],
+        unknown: dict[str, str],
+    ) -> Offers:
+        """Return what is offered of these names and types; add the others to ``unknown``."""
+        known = {(item.name, item.type): item for item in before.values()}
+        offers: dict[int, Offer] = {}
+        for name, type_name in sorted(keys):
+            offer = known.get((name, type_name))
+            if offer is None:
+                data = describe(name, type_name)
+                if data is None:
+                    unknown[type_name] = name
+                    continue
+                offer = Offer(next(self._numbers), name, type_name, data)
+            offers[offer.id] = offer
+        return offers
 
-    def _service(self, name: str, type_name: str) -> OfferedService | None:
-        found = self._schemas.service(type_name)
-        return found and OfferedService(next(self._numbers), name, type_name, *found)
+    def _channel(self, topic: str, type_name: str) -> Mapping[str, Any] | None:
+        schema = self._schemas.message(type_name)
+        return None if schema is None else {"topic": topic, **_encoded(type_name, schema)}
+
+    def _service(self, name: str, type_name: str) -> Mapping[str, Any] | None:
+        schemas = self._schemas.service(type_name)
+        if schemas is None:
+            return None
+        parts = zip(("Request", "Response"), schemas, strict=True)
+        described = {key.lower(): _encoded(f"{type_name}_{key}", schema) for key, schema in parts}
+        return {"name": name, "type": type_name, **described}
+
+
+def _encoded(name: str, schema: str) -> dict[str, str]:
+    return {
+        "encoding": CDR,
+        "schemaName": name,
+        "schemaEncoding": SCHEMA_ENCODING,
+        "schema": schema,
+    }
 
 
 class CatalogFeed(Feed):
@@ -148,7 +148,7 @@ class CatalogFeed(Feed):
             yield Update("")
 
 
-def changes(before: Mapping[int, T], now: Mapping[int, T]) -> tuple[list[int], list[T]]:
+def changes(before: Offers, now: Offers) -> tuple[list[int], list[Offer]]:
     """Return the numbers of what is gone, and what is new."""
     gone = [number for number in before if number not in now]
     return gone, [item for number, item in now.items() if number not in before]
@@ -179,22 +179,6 @@ def _changed(before: Users, now: Users, names: Any, key: str) -> list[dict[str, 
         for name in sorted(names)
         if before.get(name, ()) != now.get(name, ())
     ]
-
-
-def _topics(topology: Topology) -> list[tuple[str, str]]:
-    ends = topology.of_topics.items()
-    return sorted({(topic, end.type) for topic, found in ends for _, end in found})
-
-
-def _servers(topology: Topology) -> list[tuple[str, str]]:
-    return sorted(
-        {
-            (end.name, end.type)
-            for node in topology.visible
-            for end in topology.nodes[node]
-            if end.kind is PortKind.SERVICE
-        }
-    )
 
 
 def _users(topology: Topology, kind: PortKind) -> Users:

@@ -6,7 +6,7 @@ import uuid
 from collections.abc import Callable
 from dataclasses import field
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket
 
@@ -186,10 +186,8 @@ class FoxgloveConnection(Link):
     def _offer_channels(self, before: Contents) -> None:
         gone, new = changes(before.channels, self._known.channels)
         self._subscriptions.end(gone)
-        if gone:
-            self.post({"op": "unadvertise", "channelIds": gone})
-        if new:
-            self.post({"op": "advertise", "channels": [item.as_data() for item in new]})
+        self._post_some("unadvertise", "channelIds", gone)
+        self._post_some("advertise", "channels", [item.as_data() for item in new])
         self._unknown &= self._known.unknown.keys()
         for type_name, user in self._known.unknown.items():
             if type_name not in self._unknown:
@@ -198,10 +196,12 @@ class FoxgloveConnection(Link):
 
     def _offer_services(self, before: Contents) -> None:
         gone, new = changes(before.services, self._known.services)
-        if gone:
-            self.post({"op": "unadvertiseServices", "serviceIds": gone})
-        if new:
-            self.post({"op": "advertiseServices", "services": [item.as_data() for item in new]})
+        self._post_some("unadvertiseServices", "serviceIds", gone)
+        self._post_some("advertiseServices", "services", [item.as_data() for item in new])
+
+    def _post_some(self, op: str, key: str, items: list[Any]) -> None:
+        if items:
+            self.post({"op": op, key: items})
 
     def _subscribe_graph(self, _: Values) -> None:
         if not self._has_graph:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
 from composer.dashboard.feeds import Feed
-from composer.dashboard.foxglove.catalog import Channel
+from composer.dashboard.foxglove.catalog import Offer, Offers
 from composer.dashboard.foxglove.encoding import CDR, WARNING, ClientMessage, number, status
 from composer.dashboard.foxglove.link import Link
 from composer.dashboard.observing.topics import LARGE_TYPES
@@ -49,7 +49,7 @@ class TopicFeed(Feed):
 
     period_s = _POLL_S
 
-    def __init__(self, channel: Channel) -> None:
+    def __init__(self, channel: Offer) -> None:
         self._channel = channel
         self.is_shared = channel.type in LARGE_TYPES
         self.delivery = Delivery.LATEST if self.is_shared else Delivery.QUEUE
@@ -57,7 +57,7 @@ class TopicFeed(Feed):
 
     def start(self) -> None:
         """Begin to read."""
-        self._reader = self.ros.reader(self._channel.topic, self._channel.type, _DEPTH)
+        self._reader = self.ros.reader(self._channel.name, self._channel.type, _DEPTH)
         self.resources.callback(self._reader.close)
 
     def poll(self) -> Iterator[Update]:
@@ -179,7 +179,7 @@ class Subscriptions:
         self._running: dict[int, tuple[int, Running]] = {}
         self._slow: set[int] = set()
 
-    def subscribe(self, values: Values, channels: Mapping[int, Channel]) -> None:
+    def subscribe(self, values: Values, channels: Offers) -> None:
         """Subscribe as a message requests. Raises RequestError."""
         for item in values.items("subscriptions", _MAX_ITEMS):
             wanted = Values(item, "a subscription")
@@ -191,12 +191,12 @@ class Subscriptions:
             if identifier in self._running:
                 raise BadRequestError(f"the subscription {identifier} exists already")
             if any(known == channel.id for known, _ in self._running.values()):
-                raise BadRequestError(f"you have subscribed to '{channel.topic}' already")
+                raise BadRequestError(f"you have subscribed to '{channel.name}' already")
             if len(self._running) >= _MAX_SUBSCRIPTIONS:
                 raise RequestError("too_many", f"{_MAX_SUBSCRIPTIONS} subscriptions are the limit")
             feed = TopicFeed(channel)
-            self._link.outbox.open(identifier, channel.topic, feed.delivery)
-            send = self._sender(identifier, channel.topic)
+            self._link.outbox.open(identifier, channel.name, feed.delivery)
+            send = self._sender(identifier, channel.name)
             self._running[identifier] = (
                 channel.id,
                 self._link.follow(f"channel {channel.id}", feed, send),

@@ -23,9 +23,8 @@ _CHANNELS = ("topic", "service", "action")
 _DESCRIBED_WITHIN_S = 5.0
 
 
-def call(values: Values, dashboard: Dashboard) -> Prepared:
+def call(values: Values, _: Dashboard) -> Prepared:
     """Call a service."""
-    del dashboard
     name, given_type = values.text("service"), values.optional_text("type")
     request = values.mapping("request")
     timeout_s = values.number("timeout_s", 5.0, 0.1, _MAX_TIMEOUT_S)
@@ -49,9 +48,8 @@ def call(values: Values, dashboard: Dashboard) -> Prepared:
     return run, timeout_s
 
 
-def publish(values: Values, dashboard: Dashboard) -> Prepared:
+def publish(values: Values, _: Dashboard) -> Prepared:
     """Publish one message, and wait until reliable subscriptions have it."""
-    del dashboard
     outgoing = read_outgoing(values)
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
@@ -71,9 +69,8 @@ def publish(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _CHANGE_S
 
 
-def set_parameter(values: Values, dashboard: Dashboard) -> Prepared:
+def set_parameter(values: Values, _: Dashboard) -> Prepared:
     """Set a parameter of a node."""
-    del dashboard
     node, name, value = values.text("node"), values.text("name"), values.any("value")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
@@ -85,46 +82,39 @@ def set_parameter(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _CHANGE_S
 
 
-def form(values: Values, dashboard: Dashboard) -> Prepared:
+def form(values: Values, _: Dashboard) -> Prepared:
     """Return the fields of each part of a type."""
-    del dashboard
     type_name = values.text("type")
     values.optional_text("kind")  # the type says it, too
 
-    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        del deadline
+    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
         return {"type": type_name, "parts": ros.forms.form(type_name)}
 
     return run, _DESCRIBED_WITHIN_S
 
 
-def types(values: Values, dashboard: Dashboard) -> Prepared:
+def types(values: Values, _: Dashboard) -> Prepared:
     """Return names of types that contain a text."""
-    del dashboard
     kind, prefix = values.choice("kind", _KINDS), values.text("prefix", "")
 
-    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        del deadline
+    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
         return {"names": ros.forms.names(kind, prefix)}
 
     return run, _DESCRIBED_WITHIN_S
 
 
-def fields(values: Values, dashboard: Dashboard) -> Prepared:
+def fields(values: Values, _: Dashboard) -> Prepared:
     """Return the paths of the fields of a message."""
-    del dashboard
     type_name = values.text("type")
 
-    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        del deadline
+    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
         return ros.forms.paths(type_name)
 
     return run, _DESCRIBED_WITHIN_S
 
 
-def type_of(values: Values, dashboard: Dashboard) -> Prepared:
+def type_of(values: Values, _: Dashboard) -> Prepared:
     """Return the types of a topic, service or action."""
-    del dashboard
     kind, name = values.choice("kind", _CHANNELS), values.text("name")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:

@@ -29,8 +29,7 @@ def node(values: Values, dashboard: Dashboard) -> Prepared:
     name = values.text("node")
     declared = dashboard.declared
 
-    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        del deadline
+    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
         topology = ros.known()
         facts = None if declared is None else declared.facts(name)
         if name not in topology.nodes and facts is None:
@@ -56,10 +55,9 @@ def node(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _READ_S
 
 
-def plan(values: Values, dashboard: Dashboard) -> Prepared:
+def plan(_: Values, dashboard: Dashboard) -> Prepared:
     """Return the steps of the bring-up with their causes."""
     declared = required(dashboard.declared, "the plan")
-    del values
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.plan import bring_up
@@ -84,10 +82,9 @@ def plan(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _READ_S
 
 
-def drift(values: Values, dashboard: Dashboard) -> Prepared:
+def drift(_: Values, dashboard: Dashboard) -> Prepared:
     """Return the differences between the declared system and the ROS graph."""
     declared = required(dashboard.declared, "the comparison")
-    del values
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.snapshot import GraphObserver
@@ -117,9 +114,8 @@ def drift(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _CHANGE_S
 
 
-def transition(values: Values, dashboard: Dashboard) -> Prepared:
+def transition(values: Values, _: Dashboard) -> Prepared:
     """Request a transition of a node, on request together with its dependents."""
-    del dashboard
     name, label = values.text("node"), values.choice("transition", _TRANSITIONS)
     dependents = values.flag("dependents")
 
@@ -136,9 +132,8 @@ def transition(values: Values, dashboard: Dashboard) -> Prepared:
     return run, _CHANGE_S
 
 
-def restart(values: Values, dashboard: Dashboard) -> Prepared:
+def restart(values: Values, _: Dashboard) -> Prepared:
     """Restart a node: by the manager of its system, or else by its transitions."""
-    del dashboard
     name = values.text("node")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
@@ -176,9 +171,8 @@ def _restart_by_manager(ros: RosGraph, deadline: Deadline, name: str) -> str | N
     return message
 
 
-def command(values: Values, dashboard: Dashboard) -> Prepared:
+def command(values: Values, _: Dashboard) -> Prepared:
     """Send a command to the manager of a system."""
-    del dashboard
     system, name = values.text("system"), values.choice("command", COMMANDS)
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
