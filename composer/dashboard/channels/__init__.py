@@ -11,10 +11,9 @@ from collections.abc import Callable
 from composer.dashboard.channels.graph import LiveFeed, PictureFeed
 from composer.dashboard.channels.log import LogFeed
 from composer.dashboard.channels.messages import EchoFeed, ImageFeed, PlotFeed
-from composer.dashboard.channels.nodes import NodesFeed
+from composer.dashboard.channels.nodes import NodesFeed, TimingFeed
 from composer.dashboard.channels.parameters import ParametersFeed
 from composer.dashboard.channels.sending import GoalFeed, PublishingFeed
-from composer.dashboard.channels.timing import TimingFeed
 from composer.dashboard.channels.topics import ServicesFeed, TopicsFeed
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed

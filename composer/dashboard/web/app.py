@@ -1,13 +1,17 @@
-"""The routes of the dashboard, behind one check of every request."""
+"""The routes of the dashboard, behind one check of every request, and the files of the page."""
 
 from __future__ import annotations
 
 import asyncio
 import html
 import mimetypes
+import re
 from collections.abc import Awaitable, Callable, MutableMapping
-from functools import partial
+from functools import cache, partial
 from http import HTTPStatus
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from posixpath import dirname, join, normpath
 from typing import Any
 from urllib.parse import quote
 
@@ -28,7 +32,6 @@ from composer.dashboard.protocol.outbox import MAX_CONNECTIONS, Update
 from composer.dashboard.ros_side import LINGER_S
 from composer.dashboard.web.client import Client
 from composer.dashboard.web.connection import Connection
-from composer.dashboard.web.page_modules import file_of_page, index_of, style_sheet
 
 Scope = MutableMapping[str, Any]
 AsgiReceive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -46,6 +49,20 @@ _WITHOUT_FOXGLOVE = Refusal(404, "the dashboard was started with --no-foxglove")
 _NO_SUBPROTOCOL = Refusal(
     400, f"the WebSocket must have the subprotocol {' or '.join(SUBPROTOCOLS)}"
 )
+PAGE = files("composer.dashboard") / "page"
+#: Scripts and styles that the page shares with the pages of ``compose graph``.
+GRAPH_FILES = files("composer.graph.formats.html")
+_GRAPH_FOLDER = "graph/"
+_IMPORT = re.compile(r'^(?:import|export)\b[^;"]*"(\.\.?/[^"]+)"', re.MULTILINE)
+_MAIN = "main.js"
+#: Later ones replace rules of those before them.
+_STYLES = (
+    "vendor/uplot/uPlot.min.css",
+    *("style/base.css", "style/controls.css", "style/views.css"),
+    *("graph/picture.css", "style/graph.css"),
+)
+#: Views that are shown by the module of another one.
+_SHARED = {"": "graph", "actions": "services"}
 
 
 def prepare(dashboard: Dashboard, path: str, diagram: str) -> None:
@@ -242,3 +259,42 @@ def security_headers(host: str) -> list[tuple[bytes, bytes]]:
         (b"cross-origin-opener-policy", b"same-origin"),
         (b"cross-origin-resource-policy", b"same-origin"),
     ]
+
+
+@cache
+def index_of(view: str) -> bytes:
+    """Return the HTML of the page; ``view`` is the first part of the address.
+
+    It names all modules, so that the browser loads them at once: by itself, it finds the imports of
+    a module only when it has loaded the module.
+    """
+    modules = dict.fromkeys((*_closure(_MAIN), *_closure(f"views/{_SHARED.get(view, view)}.js")))
+    links = "".join(f'<link rel="modulepreload" href="/page/{name}">\n' for name in modules)
+    text = (PAGE / "index.html").read_text(encoding="utf-8")
+    return text.replace("</head>", f"{links}</head>", 1).encode()
+
+
+@cache
+def style_sheet() -> bytes:
+    """Return the styles of the page, after those of diagrams, as one file."""
+    from composer.graph.formats.theme import page_style
+
+    texts = (file_of_page(name).read_text(encoding="utf-8") for name in _STYLES)
+    return "\n".join((page_style(), *texts)).encode()
+
+
+def file_of_page(path: str) -> Traversable:
+    """Return a file by its address below ``/page``; it need not exist."""
+    if path.startswith(_GRAPH_FOLDER):
+        return GRAPH_FILES.joinpath(*path.removeprefix(_GRAPH_FOLDER).split("/"))
+    return PAGE.joinpath(*path.split("/"))
+
+
+def _closure(module: str) -> list[str]:
+    """Return a module and all that it imports, by their addresses below ``/page``."""
+    found = [module]
+    for name in found:
+        text = file_of_page(name).read_text(encoding="utf-8")
+        imported = (normpath(join(dirname(name), path)) for path in _IMPORT.findall(text))
+        found += [other for other in dict.fromkeys(imported) if other not in found]
+    return found

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from composer.dashboard.web.page_modules import file_of_page, index_of
+from composer.dashboard.web.app import file_of_page, index_of
 
 VIEWS = ("", "graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing")
 _LINK = re.compile(r'<link rel="modulepreload" href="/page/([^"]+)">')
