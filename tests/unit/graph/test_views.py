@@ -1,3 +1,5 @@
+"""What the views of systems show, besides the golden pictures of ``depot.yaml``."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -39,15 +41,6 @@ TALK = """
 """
 
 
-def test_messages_go_from_publisher_to_subscription_and_requests_from_client_to_server() -> None:
-    assert set(arrows(drawn(TALK))) == {
-        ("node:/left/talker", "topic:/chatter"),
-        ("topic:/chatter", "node:/right/listener"),
-        ("node:/right/asker", "service:/ask"),
-        ("service:/ask", "node:/answerer"),
-    }
-
-
 def test_the_rate_comes_from_the_timer_and_its_parameter_and_the_profile_is_shown_once() -> None:
     lines = arrows(drawn(TALK))
     assert lines["node:/left/talker", "topic:/chatter"] == ("4 Hz", "sensor_data")
@@ -72,18 +65,6 @@ def test_namespaces_are_frames_and_one_that_holds_one_other_is_none() -> None:
     assert clusters == {"/a/b": "", "/a/b/c": "/a/b", "/a/b/d": "/a/b", "/x/y/z": ""}
 
 
-def test_a_topic_stands_in_the_frame_of_its_name() -> None:
-    text = """
-        system: inside
-        nodes:
-          one: {namespace: a, publishers: {out: {type: std_msgs/msg/String}}}
-          two: {namespace: a, publishers: {out: {type: std_msgs/msg/String, topic: ~/out}}}
-    """
-    clusters = {vertex.key: vertex.cluster for vertex in drawn(text).vertices}
-    assert clusters["topic:/a/out"] == "/a"
-    assert clusters["topic:/a/two/out"] == "/a"
-
-
 def test_connections_join_ports_and_say_both_profiles_where_they_differ() -> None:
     text = TALK.replace(
         "/chatter, qos: sensor_data}}\n      asker",
@@ -97,44 +78,6 @@ def test_connections_join_ports_and_say_both_profiles_where_they_differ() -> Non
         "sensor_data → best_effort, volatile, keep_last 2",
     )
     assert lines["client:/right/asker.ask", "service:/answerer.ask"] == ("/ask", "Trigger")
-
-
-LIFECYCLE = """
-    system: order
-    executors: {quick: {kind: single_threaded}}
-    nodes:
-      late: {lifecycle: {depends_on: [early]}}
-      early: {executor: quick}
-      asleep: {lifecycle: {autostart: unconfigured}}
-"""
-
-
-def test_the_lifecycle_view_shows_the_steps_and_the_dependencies() -> None:
-    graph = drawn(LIFECYCLE, View.LIFECYCLE)
-    assert arrows(graph) == {("node:/early", "node:/late"): ("once active",)}
-    lines = {vertex.key: vertex.lines for vertex in graph.vertices}
-    assert lines["node:/early"] == ("early", "#1 configure, #3 activate")
-    assert lines["node:/asleep"] == ("asleep", "stays unconfigured")
-
-
-def test_the_states_view_puts_nodes_where_the_bring_up_takes_them() -> None:
-    lines = {vertex.key: vertex.lines for vertex in drawn(LIFECYCLE, View.STATES).vertices}
-    assert lines["state:active"] == ("active", "/late", "/early")
-    assert lines["state:unconfigured"] == ("unconfigured", "/asleep")
-    assert lines["state:finalized"] == ("finalized",)
-
-
-def test_the_deployment_view_groups_nodes_by_executor() -> None:
-    graph = drawn(LIFECYCLE, View.DEPLOYMENT)
-    assert {cluster.key: cluster.label for cluster in graph.clusters} == {
-        "executor:order.quick": "quick: single_threaded",
-        "executor:order.default": "default: events",
-    }
-    assert {vertex.key: vertex.cluster for vertex in graph.vertices} == {
-        "node:/late": "executor:order.default",
-        "node:/early": "executor:order.quick",
-        "node:/asleep": "executor:order.default",
-    }
 
 
 def test_the_deployment_view_names_processes_and_their_hosts() -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -31,9 +31,9 @@ STRING = "std_msgs/msg/String"
 STATE = QosProfile(durability=Durability.TRANSIENT_LOCAL)
 BILL = ObservedEndpoint(PortKind.PUBLISHER, "/bill", STRING, STATE)
 ASK = ObservedEndpoint(PortKind.SERVICE, "/front/ask", "std_srvs/srv/Trigger")
-CLERK = ObservedNode(
-    "/front/clerk", (BILL, ASK), "active", {"speed": 1.5, "on": True, "tags": ["a", "b"]}
-)
+VALUES = {"speed": 1.5, "on": True, "tags": ["a", "b"]}
+CLERK = ObservedNode("/front/clerk", (BILL, ASK), "active", VALUES)
+SILENT = ("lifecycle state", "parameters")
 GUARD = ObservedNode(
     "/guard", (ObservedEndpoint(PortKind.SUBSCRIPTION, "/bill", STRING, QosProfile()),), "inactive"
 )
@@ -65,12 +65,6 @@ def test_a_missing_node_is_reported_with_the_most_similar_one() -> None:
 def test_a_node_in_another_namespace_is_similar() -> None:
     (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
     assert "'/clerk' exists" in missing.hint
-
-
-def test_two_nodes_with_one_name_are_reported() -> None:
-    assert differences(replace(CLERK, count=2), GUARD, SLEEPER) == [
-        "/front/clerk: 2 nodes have this name"
-    ]
 
 
 def test_undeclared_nodes_are_extra_unless_ignored_hidden_or_the_manager() -> None:
@@ -114,82 +108,61 @@ def test_a_cleaned_up_node_is_reported_with_its_state_and_missing_endpoints() ->
     assert gone[1].hint == "the node is unconfigured: it has no ports"
 
 
-def test_an_unconfigured_node_needs_no_endpoints() -> None:
-    assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
-        "/sleeper: lifecycle state is inactive, declared unconfigured",
-        "/sleeper: publisher /dream is missing",
-    ]
-
-
 def test_the_autostart_state_can_be_overridden() -> None:
     inactive = replace(CLERK, state="inactive")
     assert differences(inactive, GUARD, SLEEPER, autostart=PrimaryState.INACTIVE) == []
+
+
+def bill(**changes: Any) -> dict[str, Any]:
+    """Return the endpoints of the clerk, with a change of one of them or of its profile."""
+    if not changes.keys() & {"type", "name"}:
+        changes = {"qos": replace(STATE, **changes)}
+    return {"endpoints": (replace(BILL, **changes), ASK)}
+
+
+def values(**changes: Any) -> dict[str, Any]:
+    return {"parameters": {**VALUES, **changes}}
 
 
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
         (
-            lambda end: replace(end, type="std_msgs/msg/Int8"),
-            f"type of publisher /bill is std_msgs/msg/Int8, declared {STRING}",
+            bill(type="std_msgs/msg/Int8"),
+            [f"type of publisher /bill is std_msgs/msg/Int8, declared {STRING}"],
         ),
         (
-            lambda end: replace(end, qos=replace(STATE, reliability=Reliability.BEST_EFFORT)),
-            "reliability of publisher /bill is best_effort, declared reliable",
+            bill(reliability=Reliability.BEST_EFFORT),
+            ["reliability of publisher /bill is best_effort, declared reliable"],
         ),
         (
-            lambda end: replace(end, qos=replace(STATE, durability=Durability.VOLATILE)),
-            "durability of publisher /bill is volatile, declared transient_local",
+            bill(durability=Durability.VOLATILE),
+            ["durability of publisher /bill is volatile, declared transient_local"],
         ),
+        (bill(deadline_ms=20.0), ["deadline_ms of publisher /bill is 20, declared no limit"]),
+        (bill(depth=77), []),  # discovery does not report it
+        (values(speed=2.5), ["parameter speed is 2.5, declared 1.5"]),
+        (values(on=1), ["parameter on is 1, declared true"]),
+        (values(tags=["a"]), ["parameter tags is ['a'], declared ['a', 'b']"]),
+        (values(use_sim_time=True), []),
+        ({"parameters": {"on": True, "tags": ["a", "b"]}}, ["parameter speed is missing"]),
+        ({"count": 2}, ["2 nodes have this name"]),
+        ({"state": ""}, ["lifecycle state is none: it is not a lifecycle node, declared active"]),
         (
-            lambda end: replace(end, qos=replace(STATE, deadline_ms=20.0)),
-            "deadline_ms of publisher /bill is 20, declared no limit",
+            {"state": None, "parameters": None},
+            [f"no response to the request for its {what}" for what in SILENT],
         ),
     ],
 )
-def test_types_and_offered_qos(
-    change: Callable[[ObservedEndpoint], ObservedEndpoint], expected: str
-) -> None:
-    clerk = replace(CLERK, endpoints=(change(BILL), ASK))
-    assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {expected}"]
-
-
-def test_depth_and_history_are_not_compared_because_discovery_omits_them() -> None:
-    deep = replace(BILL, qos=replace(STATE, depth=77))
-    assert differences(replace(CLERK, endpoints=(deep, ASK)), GUARD, SLEEPER) == []
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"speed": 2.5}, ["parameter speed is 2.5, declared 1.5"]),
-        ({"on": 1}, ["parameter on is 1, declared true"]),
-        ({"tags": ["a"]}, ["parameter tags is ['a'], declared ['a', 'b']"]),
-        ({"use_sim_time": True}, []),
-    ],
-)
-def test_parameter_values(values: dict[str, object], expected: list[str]) -> None:
-    assert CLERK.parameters is not None
-    clerk = replace(CLERK, parameters={**CLERK.parameters, **values})
+def test_differences_of_a_node(change: dict[str, Any], expected: list[str]) -> None:
+    clerk = replace(CLERK, **change)
     assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {text}" for text in expected]
 
 
-def test_a_missing_parameter() -> None:
-    clerk = replace(CLERK, parameters={"on": True, "tags": ["a", "b"]})
-    assert differences(clerk, GUARD, SLEEPER) == ["/front/clerk: parameter speed is missing"]
-
-
-def test_a_node_that_does_not_respond_is_reported() -> None:
-    silent = replace(CLERK, state=None, parameters=None)
-    assert differences(silent, GUARD, SLEEPER) == [
-        "/front/clerk: no response to the request for its lifecycle state",
-        "/front/clerk: no response to the request for its parameters",
-    ]
-
-
-def test_a_node_without_a_lifecycle_differs() -> None:
-    assert differences(replace(CLERK, state=""), GUARD, SLEEPER) == [
-        "/front/clerk: lifecycle state is none: it is not a lifecycle node, declared active"
+def test_an_unconfigured_node_needs_no_endpoints() -> None:
+    assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
+        "/sleeper: lifecycle state is inactive, declared unconfigured",
+        "/sleeper: publisher /dream is missing",
     ]
 
 
