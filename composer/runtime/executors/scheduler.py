@@ -16,11 +16,10 @@ from math import inf
 from time import monotonic, sleep
 
 from composer.model import ExecutorKind
-from composer.runtime.executors.base_loop import BUSY_S, YIELD_S
+from composer.runtime.executors.base_loop import BUSY_S, YIELD_S, ScheduledCall, TimerQueue
 from composer.runtime.executors.poller import Poller
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.tasks import Report, name_of
-from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
 from composer.runtime.executors.turns import Turn, TurnTaking
 
 #: How long calls, then items of entities, are served before the next poll.

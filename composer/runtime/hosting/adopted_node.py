@@ -26,14 +26,16 @@ from rclpy.waitable import Waitable
 from composer.model import PortKind
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.sources import Taken, rclpy_callback
-from composer.runtime.hosting.errors import HostingError
+from composer.runtime.hosting.declared_ports import HostingError
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.actions import HostedActionClient, HostedActionServer
-from composer.runtime.hosting.ports.publishers import HostedPublisher
-from composer.runtime.hosting.ports.qos_events import PendingQosEvents
 from composer.runtime.hosting.ports.services import ClientPort, HostedService
-from composer.runtime.hosting.ports.subscriptions import HostedSubscription
 from composer.runtime.hosting.ports.timers import HostedGuardCondition, HostedTimerPort
+from composer.runtime.hosting.ports.topics import (
+    HostedPublisher,
+    HostedSubscription,
+    PendingQosEvents,
+)
 from composer.runtime.ros.messages import load_type_support
 
 #: Arguments of ``Node.__init__`` that have no effect on a hosted node or are taken over.

@@ -17,10 +17,10 @@ from composer.runtime.hosting.instance import (
     HostedEntities,
     Instance,
     InstanceSettings,
+    SharedState,
     changed_parameters,
 )
 from composer.runtime.hosting.logger import HostedLogger
-from composer.runtime.hosting.shared_state import SharedState
 from composer.runtime.node.local_node import LocalNode
 
 

@@ -6,17 +6,14 @@ import threading
 from collections import deque
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rclpy.callback_groups import CallbackGroup
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.strand import as_a_whole
-from composer.runtime.hosting.user_code import UserFunction
-
-if TYPE_CHECKING:
-    from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.user_code import UserCode, UserFunction
 
 T = TypeVar("T")
 
@@ -40,11 +37,11 @@ class OwnGroup:
     raises, that is an error of the node, and the callback runs.
     """
 
-    def __init__(self, instance: Instance, group: CallbackGroup) -> None:
-        self._instance = instance
-        self._can_execute = UserFunction(instance, group.can_execute)
-        self._beginning = UserFunction(instance, group.beginning_execution)
-        self._ending = UserFunction(instance, group.ending_execution)
+    def __init__(self, code: UserCode, group: CallbackGroup) -> None:
+        self._code = code
+        self._can_execute = UserFunction(code, group.can_execute)
+        self._beginning = UserFunction(code, group.beginning_execution)
+        self._ending = UserFunction(code, group.ending_execution)
         self._waiting: deque[_Item] = deque()
         self._lock = threading.RLock()
         self._running: set[object] = set()  # entities
@@ -65,21 +62,21 @@ class OwnGroup:
         with self._lock:
             self._running.discard(entity)
         if self._waiting:
-            self._instance.context.loop.call_soon(self._run_permitted)
+            self._code.context.loop.call_soon(self._run_permitted)
 
     def _ask(self, question: UserFunction, entity: object) -> object:
         try:
             return question(entity)
         except BaseException as error:
-            self._instance.context.error_log.exception(question.__name__, error)
+            self._code.context.error_log.exception(question.__name__, error)
             return True
 
     def _run_permitted(self) -> None:
         while (item := self._next_permitted()) is not None:
             self._run(item.entity, item.work)
-        if self._waiting and not (self._will_ask or self._instance.ended.is_set()):
+        if self._waiting and not (self._will_ask or self._code.ended.is_set()):
             self._will_ask = True
-            self._instance.context.loop.call_later(_ASK_AGAIN_S, self._ask_again)
+            self._code.context.loop.call_later(_ASK_AGAIN_S, self._ask_again)
 
     def _next_permitted(self) -> _Item | None:
         """Remove and return the first item that the group lets begin; :meth:`ended` follows."""

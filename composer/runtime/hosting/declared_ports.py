@@ -1,19 +1,28 @@
-"""The ports that a class creates, matched with those that its node declares."""
+"""The ports and names that a class uses, matched with those that its node declares."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
 from itertools import count
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
-from composer.model import Isolation, Node, Port, PortKind, Qos
+from composer.behavior import TransitionFailed
+from composer.model import ChannelKind, Isolation, Node, Port, PortKind, Qos
+from composer.model.names import expand_name
 from composer.model.qos import PRESETS, QosProfile
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.hosting.errors import HostingError
 from composer.runtime.ros.qos_profiles import own_profile
+
+
+class HostingError(TransitionFailed):
+    """A class cannot be hosted; the text says why, and what to do instead.
+
+    It fails the transition, without a traceback: the reason is not a mistake in the class.
+    """
+
 
 #: Created by rclpy for every node, or by the composer.
 _OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})
@@ -119,3 +128,43 @@ def _difference(declared: QosProfile, actual: QosProfile) -> str:
         f"{name} is {getattr(actual, name)}, declared as {getattr(declared, name)}"
         for name in different
     )
+
+
+#: How rcl names the channel of a remapping rule.
+_SCHEMES = {ChannelKind.TOPIC: "rostopic", ChannelKind.SERVICE: "rosservice"}
+
+
+def remapping_arguments(node: Node) -> list[str]:
+    """Return the command-line arguments that give rcl the names of the node's topics and services.
+
+    As with ``ros2 run --ros-args -r``, the first matching rule counts: connections come before
+    remappings.
+    """
+    written = (f"{item.source}:={item.target}" for item in node.remappings)
+    rules = [*_connected(node), *written]
+    words = [word for rule in dict.fromkeys(rules) for word in ("-r", rule)]
+    return ["--ros-args", *words] if words else []
+
+
+def action_names(node: Node) -> Mapping[tuple[PortKind, str], str]:
+    """Return the full names of actions by their kind and the expanded name: rcl remaps none."""
+    found: dict[tuple[PortKind, str], str] = {}
+    for port in node.ports_of(PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):
+        found.setdefault((port.kind, _expanded(node, port.ros_name.value)), port.full_name)
+    for remapping in node.remappings:
+        for kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):
+            source = _expanded(node, remapping.source.value)
+            found.setdefault((kind, source), _expanded(node, remapping.target.value))
+    return found
+
+
+def _connected(node: Node) -> Iterator[str]:
+    for port in node.ports:
+        scheme = _SCHEMES.get(port.kind.channel)
+        own = _expanded(node, port.ros_name.value)
+        if scheme is not None and own != port.full_name:
+            yield f"{scheme}://{own}:={port.full_name}"
+
+
+def _expanded(node: Node, name: str) -> str:
+    return expand_name(name, node.ros_name.value, node.namespace.value)

@@ -25,9 +25,9 @@ from composer.model import PortKind
 from composer.runtime.executors.stacks import is_internal
 from composer.runtime.hosting import adopted_node
 from composer.runtime.hosting.adopted_node import AdoptedLifecycleNode, AdoptedNode
-from composer.runtime.hosting.errors import HostingError
-from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.user_code import current_instance, on_thread_start
+from composer.runtime.hosting.declared_ports import HostingError
+from composer.runtime.hosting.instance import Instance, current_instance
+from composer.runtime.hosting.user_code import on_thread_start
 from composer.runtime.ros.messages import load_type_support
 
 _SECOND_NODE = (

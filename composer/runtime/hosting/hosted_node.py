@@ -24,18 +24,22 @@ from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
 from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_class
-from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
+from composer.runtime.hosting.declared_ports import (
+    DeclaredPorts,
+    HostingError,
+    action_names,
+    remapping_arguments,
+    report_undeclared,
+)
 from composer.runtime.hosting.dispatch import install
-from composer.runtime.hosting.errors import HostingError
 from composer.runtime.hosting.instance import (
     HostedEntities,
     Instance,
     InstanceSettings,
+    SharedState,
     changed_parameters,
 )
 from composer.runtime.hosting.logger import HostedLogger
-from composer.runtime.hosting.names import action_names, remapping_arguments
-from composer.runtime.hosting.shared_state import SharedState
 from composer.runtime.hosting.user_code import ThreadedCall, end_callbacks
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class, plain_name

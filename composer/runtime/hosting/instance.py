@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -25,6 +25,7 @@ from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.callback_groups import OwnGroup
 from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.logger import HostedLogger
+from composer.runtime.hosting.user_code import UserCode, current_code
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.node.local_node import ActionServing, RunningPort
 
@@ -104,7 +105,7 @@ _SPINS_WITHIN_S = 0.05
 _GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 
 
-class Instance:
+class Instance(UserCode):
     """What the entities of one instance share."""
 
     def __init__(
@@ -114,18 +115,14 @@ class Instance:
         settings: InstanceSettings,
     ) -> None:
         """``contexts`` are the node's, gated by *active* and always on."""
-        self.context, self._always_on_context = contexts
+        context, self._always_on_context = contexts
+        super().__init__(context, settings.finish, may_block=settings.may_block)
         self.ports = ports
         self.overrides = settings.overrides
         self.logger = settings.logger
         self.action_names = settings.action_names
-        self.finish = settings.finish
         self.request = settings.request
         self.current_state = settings.current_state
-        loop = self.context.loop
-        #: Begin and end a call of a callback.
-        self.begin_blocking = loop.begin_blocking if settings.may_block else _ignore
-        self.end_blocking = loop.end_blocking
         self.entities = HostedEntities()
         #: The instance, once ``Node.__init__`` was called.
         self.node: Any = None
@@ -135,20 +132,12 @@ class Instance:
         self.signal_handlers: dict[int, Any] = {}
         #: True while the constructor runs.
         self.is_constructing = False
-        #: Done at the end of the next callback, if ``rclpy.spin_once`` waits for it.
-        self.spun: Future[None] | None = None
         #: The gates as they were before the constructor has spun.
         self._gates: list[tuple[LifecycleGate, bool, bool]] = []
         #: The parameters as they were declared.
         self.declared: dict[str, Parameter] = {}
-        #: Set when the instance has been destroyed.
-        self.ended = threading.Event()
         #: The executors of the class's own that the node was added to.
         self.executors: list[Executor] = []
-        #: The callbacks that were interrupted, with the identifiers of their threads.
-        self.interrupted: set[tuple[int, str]] = set()
-        #: The threads that the class has started.
-        self.threads: list[threading.Thread] = []
         #: Services of the ROS node that exist as long as the instance.
         self.lasting_services: list[Service] = []
         #: The thread of the constructor or of the current handler of a transition.
@@ -251,6 +240,12 @@ class Instance:
         return self.context.loop.wait_for(future, limit_s)
 
 
+def current_instance() -> Instance | None:
+    """Return the instance whose code the calling thread runs, or None."""
+    code = current_code()
+    return code if isinstance(code, Instance) else None
+
+
 def changed_parameters(node: Any, declared: Mapping[str, Parameter]) -> dict[str, Parameter]:
     """Return the parameters of a node whose values were set after they were ``declared``."""
     present = node._parameters
@@ -261,5 +256,32 @@ def changed_parameters(node: Any, declared: Mapping[str, Parameter]) -> dict[str
     }
 
 
-def _ignore(*, expected: bool) -> None:
-    """Do not watch a call."""
+_CALLBACKS = (
+    "_pre_set_parameters_callbacks",
+    "_on_set_parameters_callbacks",
+    "_post_set_parameters_callbacks",
+)
+_SHARED = ("_parameters", "_descriptors", *_CALLBACKS)
+
+
+class SharedState:
+    """Removes the parameters and callbacks that were added since it was created."""
+
+    def __init__(self, node: Any) -> None:
+        self._before = {name: (shared := getattr(node, name), shared.copy()) for name in _SHARED}
+
+    def restore(self) -> None:
+        """Remove what was added; what was there before keeps its present value."""
+        self._remove(_SHARED)
+
+    def remove_callbacks(self) -> None:
+        """Remove the callbacks that were added, but no parameters."""
+        self._remove(_CALLBACKS)
+
+    def _remove(self, names: Iterable[str]) -> None:
+        for shared, before in map(self._before.__getitem__, names):
+            if isinstance(shared, dict):
+                for name in shared.keys() - before.keys():
+                    del shared[name]
+            else:
+                shared[:] = [item for item in shared if item in before]

@@ -7,9 +7,10 @@ import threading
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from composer.behavior import CallCancelled
+from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import (
     calls_user_code,
@@ -22,33 +23,58 @@ from composer.runtime.executors.stacks import (
 from composer.runtime.executors.strand import in_steps, scope_of
 from composer.runtime.executors.tasks import sleep
 
-if TYPE_CHECKING:
-    from composer.runtime.callbacks.context import NodeContext
-    from composer.runtime.hosting.instance import Instance
+
+class UserCode:
+    """The code of one instance, as calls of it need to know it.
+
+    ``finish(reason)`` deactivates the node: the class says that it has finished. With
+    ``may_block``, others run while a call blocks.
+    """
+
+    def __init__(
+        self, context: NodeContext, finish: Callable[[str], None], *, may_block: bool
+    ) -> None:
+        self.context = context
+        self.finish = finish
+        #: Begin and end a call of a callback.
+        self.begin_blocking = context.loop.begin_blocking if may_block else _ignore
+        self.end_blocking = context.loop.end_blocking
+        #: Done at the end of the next callback, if ``rclpy.spin_once`` waits for it.
+        self.spun: Future[None] | None = None
+        #: Set when the instance has been destroyed.
+        self.ended = threading.Event()
+        #: The callbacks that were interrupted, with the identifiers of their threads.
+        self.interrupted: set[tuple[int, str]] = set()
+        #: The threads that the class has started.
+        self.threads: list[threading.Thread] = []
+
+
+def _ignore(*, expected: bool) -> None:
+    """Do not watch a call."""
 
 
 class _Current(threading.local):
-    instance: Instance | None = None
+    code: UserCode | None = None
 
 
 _CURRENT = _Current()
-_STARTED_BY = "_composer_instance"
+_STARTED_BY = "_composer_code"
 
 
-def current_instance() -> Instance | None:
-    """Return the instance whose code the calling thread runs, or None.
+def current_code() -> UserCode | None:
+    """Return the code that the calling thread runs, or None.
 
     Threads that an instance has started run its code.
     """
-    return _CURRENT.instance or getattr(threading.current_thread(), _STARTED_BY, None)
+    return _CURRENT.code or getattr(threading.current_thread(), _STARTED_BY, None)
 
 
 def on_thread_start(thread: threading.Thread) -> None:
-    """Remember which instance has started a thread, if any."""
-    instance = current_instance()
-    if instance is not None:
-        instance.threads.append(thread)
-        setattr(thread, _STARTED_BY, instance)
+    """Remember whose code has started a thread, if any."""
+    code = current_code()
+    if code is not None:
+        code.threads.append(thread)
+        setattr(thread, _STARTED_BY, code)
 
 
 class UserFunction:
@@ -57,9 +83,9 @@ class UserFunction:
     SystemExit means that the class has finished: the node is deactivated.
     """
 
-    def __init__(self, instance: Instance, function: Callable[..., Any]) -> None:
-        self._context = instance.context  # by which a call on a stack is recognized
-        self._instance = instance
+    def __init__(self, code: UserCode, function: Callable[..., Any]) -> None:
+        self._context = code.context  # by which a call on a stack is recognized
+        self.code = code
         self._function = function
         self.is_async = inspect.iscoroutinefunction(function)
         #: Whether the last call, or the last step of a coroutine, has blocked.
@@ -70,12 +96,12 @@ class UserFunction:
     @calls_user_code
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function. Raises what it raises."""
-        before, _CURRENT.instance = _CURRENT.instance, self._instance
-        began = self._instance.begin_blocking(expected=self.blocks)
+        before, _CURRENT.code = _CURRENT.code, self.code
+        began = self.code.begin_blocking(expected=self.blocks)
         try:
             result = self._function(*arguments, **options)
         except SystemExit:
-            self._instance.finish("it raised SystemExit")
+            self.code.finish("it raised SystemExit")
             return None
         except CallCancelled as error:  # it waited for a response when the node left *active*
             if self._context.gate.incoming:
@@ -83,15 +109,15 @@ class UserFunction:
             self._context.log.debug(f"{self.__name__}: {error}")
             return None
         finally:
-            self.blocks = self._instance.end_blocking(began)
-            _CURRENT.instance = before
-            if self._instance.spun is not None:
-                self._instance.spun.set_result(None)
+            self.blocks = self.code.end_blocking(began)
+            _CURRENT.code = before
+            if self.code.spun is not None:
+                self.code.spun.set_result(None)
         return in_steps(_Steps(self), result) if inspect.iscoroutine(result) else result
 
-    def is_one(self, instance: Instance, function: UserFunction | None) -> bool:
-        """Return whether this is ``function``; without it, any one of ``instance``."""
-        return self._instance is instance and function in (None, self)
+    def is_one(self, code: UserCode, function: UserFunction | None) -> bool:
+        """Return whether this is ``function``; without it, any one of ``code``."""
+        return self.code is code and function in (None, self)
 
 
 def call_in_group(context: NodeContext, function: Callable[..., Any], *arguments: Any) -> None:
@@ -107,25 +133,24 @@ def call_in_group(context: NodeContext, function: Callable[..., Any], *arguments
 
 
 class _Steps:
-    """Sets the instance whose code runs for each step of a coroutine."""
+    """Sets the code that runs for each step of a coroutine."""
 
-    __slots__ = ("_before", "_began", "_instance", "function")
+    __slots__ = ("_before", "_began", "function")
 
     def __init__(self, function: UserFunction) -> None:
         self.function = function
-        self._instance = function._instance
-        self._before: Instance | None = None
+        self._before: UserCode | None = None
         self._began: list[bool] | float | None = None
 
     def enter(self) -> None:
         """Begin a step, at once."""
-        self._before, _CURRENT.instance = _CURRENT.instance, self._instance
-        self._began = self._instance.begin_blocking(expected=self.function.blocks)
+        self._before, _CURRENT.code = _CURRENT.code, self.function.code
+        self._began = self.function.code.begin_blocking(expected=self.function.blocks)
 
     def leave(self) -> None:
         """End a step."""
-        self.function.blocks = self._instance.end_blocking(self._began)
-        _CURRENT.instance = self._before
+        self.function.blocks = self.function.code.end_blocking(self._began)
+        _CURRENT.code = self._before
 
 
 class CallAbandoned(Cancelled):
@@ -150,38 +175,36 @@ def interrupt(ident: int, call: FrameType | None = None) -> str:
     return ""
 
 
-async def end_callbacks(instance: Instance) -> None:
+async def end_callbacks(code: UserCode) -> None:
     """Wait a moment for the callbacks of an instance to return, then interrupt those that run."""
     until_s = time.monotonic() + _RETURN_WITHIN_S
-    while running_callbacks(instance) and time.monotonic() < until_s:
-        await sleep(instance.context.loop, _PERIOD_S)
-    interrupt_callbacks(instance)
+    while running_callbacks(code) and time.monotonic() < until_s:
+        await sleep(code.context.loop, _PERIOD_S)
+    interrupt_callbacks(code)
 
 
-def interrupt_callbacks(instance: Instance, function: UserFunction | None = None) -> None:
+def interrupt_callbacks(code: UserCode, function: UserFunction | None = None) -> None:
     """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
-    for ident, call, name in running_callbacks(instance, function):
+    for ident, call, name in running_callbacks(code, function):
         at = interrupt(ident, call)
-        if (ident, name) not in instance.interrupted:
-            instance.interrupted.add((ident, name))
+        if (ident, name) not in code.interrupted:
+            code.interrupted.add((ident, name))
             where = f"; it is at {at}" if at else ""
-            instance.context.log.warn(f"{name} is interrupted{where}")
+            code.context.log.warn(f"{name} is interrupted{where}")
 
 
 def running_callbacks(
-    instance: Instance, function: UserFunction | None = None
+    code: UserCode, function: UserFunction | None = None
 ) -> list[tuple[int, FrameType, str]]:
     """Return the callbacks that other threads run: the thread, the frame and the name of each."""
     current = threading.get_ident()
     found: list[tuple[int, FrameType, str]] = []
-    busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
+    busy = stacks_of(ident for ident in code.context.loop.busy_threads() if ident != current)
     for ident, stack in busy.items():
         with gc_paused():
             called = [(frame, item) for frame in stack if (item := _function_of(frame)) is not None]
         found += [
-            (ident, frame, item.__name__)
-            for frame, item in called
-            if item.is_one(instance, function)
+            (ident, frame, item.__name__) for frame, item in called if item.is_one(code, function)
         ][:1]
     return found
 
@@ -197,8 +220,8 @@ def _function_of(frame: FrameType) -> UserFunction | None:
 class ThreadedCall:
     """A call of user code that may block, on a thread of its own: the loop goes on."""
 
-    def __init__(self, instance: Instance, function: Callable[[], Any], name: str) -> None:
-        self._instance = instance
+    def __init__(self, code: UserCode, function: Callable[[], Any], name: str) -> None:
+        self._code = code
         self._function = function
         self._done: Future[Any] = Future()
         #: Where it was when its time was over: ``file:line``, in code of the user.
@@ -226,7 +249,7 @@ class ThreadedCall:
 
     @calls_user_code
     def _run(self) -> None:
-        _CURRENT.instance = self._instance
+        _CURRENT.code = self._code
         try:
             self._done.set_result(self._function())
         except BaseException as error:

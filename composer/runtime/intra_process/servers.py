@@ -17,9 +17,9 @@ from unique_identifier_msgs.msg import UUID
 from composer.base.fast_dataclass import dataclass
 from composer.model import Isolation, Port
 from composer.runtime.executors import actions
+from composer.runtime.executors.actions import GoalServer
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.goal_server import GoalServer
-from composer.runtime.intra_process.copying import copy_of
+from composer.runtime.intra_process.publisher import copy_of
 
 CallSoon = Callable[[Callable[[], object]], None]
 Receive = Callable[[Any, Any], None]

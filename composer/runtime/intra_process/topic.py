@@ -11,13 +11,13 @@ from rclpy.publisher import Publisher
 
 from composer.model import Isolation, Port
 from composer.model.qos import Durability, incompatibilities
-from composer.runtime.intra_process.copying import copy_of
 from composer.runtime.intra_process.match_flag import MATCHING, MatchListener
 from composer.runtime.intra_process.publisher import (
     GatedPublisher,
     PublisherContext,
     Target,
     combined,
+    copy_of,
 )
 
 

@@ -17,6 +17,7 @@ from composer.runtime.callbacks.reactions import (
 from composer.runtime.intra_process.publisher import GatedPublisher
 from composer.runtime.node.behavior_loader import method
 from composer.runtime.node.local_node import Entities, RunningPort
+from composer.runtime.node.transforms import Broadcasts, NodeTransforms
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
 from composer.runtime.ports.client import ClientPort
@@ -25,9 +26,7 @@ from composer.runtime.ports.service import ServicePort
 from composer.runtime.ports.subscription import SubscriptionPort
 from composer.runtime.ports.timer import TimerPort
 from composer.runtime.ros.messages import interface_class
-from composer.runtime.transforms.broadcaster import Broadcasts
 from composer.runtime.transforms.listener import TransformListeners
-from composer.runtime.transforms.node_transforms import NodeTransforms
 
 
 @dataclass(slots=True)

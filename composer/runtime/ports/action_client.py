@@ -15,7 +15,7 @@ from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.executors.futures import Future
-from composer.runtime.ports.calls import CallingPort, CallLimit
+from composer.runtime.ports.client import CallingPort, CallLimit
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 

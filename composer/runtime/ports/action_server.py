@@ -1,11 +1,12 @@
-"""The action server port."""
+"""The action server port, and the goals that it executes."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from rclpy.action.server import CancelResponse, GoalResponse, ServerGoalHandle
+from action_msgs.msg import GoalStatus
+from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse, ServerGoalHandle
 from rclpy.serialization import serialize_message
 
 from composer.base.fast_dataclass import dataclass
@@ -15,15 +16,87 @@ from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.executors.actions import GoalServer
 from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.goal_server import GoalServer
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.intra_process.servers import LocalActionServer
-from composer.runtime.ports.goal import RunningGoal
 from composer.runtime.ros.messages import Build, compile_message, interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
+
+
+class RunningGoal:
+    """The goal that an action handler gets; see :class:`composer.behavior.Goal`.
+
+    In rclpy a goal can only be canceled on a client's request. Here the node may cancel it too,
+    because it leaves *active* or because the handler does so.
+    """
+
+    def __init__(
+        self, handle: ServerGoalHandle, publish_local: Callable[[bytes, Any], None]
+    ) -> None:
+        """``publish_local`` gets the goal's identity and feedback for clients of the process."""
+        self._handle = handle
+        self._publish_local = publish_local
+        self._is_node_leaving = False
+        self.task: Future[Any] | None = None
+        self.ended: Future[None] = Future()
+
+    @property
+    def request(self) -> Any:
+        """The goal message."""
+        return self._handle.request
+
+    @property
+    def identity(self) -> bytes:
+        """The goal's UUID."""
+        return bytes(self._handle.goal_id.uuid)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the goal has not succeeded, aborted or been canceled yet."""
+        return bool(self._handle.is_active)
+
+    @property
+    def status(self) -> int:
+        """The status, a constant of action_msgs/msg/GoalStatus."""
+        return int(self._handle.status)
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        """Whether a client requested cancellation, or the node is leaving the active state."""
+        return self._is_node_leaving or bool(self._handle.is_cancel_requested)
+
+    def execute(self) -> None:
+        """Set the status to executing, unless the goal is being canceled."""
+        if self.status == GoalStatus.STATUS_ACCEPTED:
+            self._handle._update_state(GoalEvent.EXECUTE)
+
+    def request_cancel(self) -> None:
+        """Notify the handler that the node is leaving the active state."""
+        self._is_node_leaving = True
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Send feedback to the client. Raises TypeError for another type than the Feedback."""
+        if self.is_open:
+            self._handle.publish_feedback(feedback)
+            self._publish_local(self.identity, feedback)
+
+    def succeed(self) -> None:
+        """End the goal as succeeded."""
+        self._handle.succeed()
+
+    def abort(self) -> None:
+        """End the goal as aborted."""
+        self._handle.abort()
+
+    def canceled(self) -> None:
+        """End the goal as canceled."""
+        if self.status in (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING):
+            self._handle._update_state(GoalEvent.CANCEL_GOAL)
+        self._handle.canceled()
+
 
 #: Maximum time for handlers to end their goals once the node leaves *active*.
 CANCEL_LIMIT_S = 1.0

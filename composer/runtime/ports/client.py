@@ -1,17 +1,134 @@
-"""The service client port."""
+"""The service client port, and what it shares with action clients: time limits and reactions."""
 
 from __future__ import annotations
 
-from typing import Any
+import time
+from collections.abc import Callable
+from math import inf
+from typing import Any, TypeVar
 
-from composer.behavior import CallCancelled, CallError
+from composer.behavior import CallCancelled, CallError, CallTimeout, ServerUnavailable
 from composer.model import Event, Port
+from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.executors.exceptions import text_of
 from composer.runtime.executors.futures import Future, wrap_future
+from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.servers import LocalService
-from composer.runtime.ports.calls import CallingPort, CallLimit
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
+
+T = TypeVar("T")
+
+#: The time limit of a call unless YAML sets one.
+DEFAULT_TIMEOUT_MS = 5000.0
+#: rclpy does not notify when a server appears; polling costs microseconds.
+_POLL_PERIOD_S = 0.01
+
+
+class CallLimit:
+    """Limits one call to a time, and to the node's *active* period.
+
+    ``what`` names the call in errors, for example ``service '/plan'``.
+    """
+
+    __slots__ = ("_context", "_end_s", "_generation", "_timeout_ms", "_what")
+
+    def __init__(self, context: NodeContext, what: str, timeout_ms: float | None) -> None:
+        """Without ``timeout_ms``, the time is unlimited. Raises CallCancelled in a wrong state."""
+        self._generation = context.gate.generation  # read first, so that no cancellation is missed
+        if not context.gate.outgoing:
+            raise CallCancelled(context.gate.refusal)
+        self._context = context
+        self._what = what
+        self._timeout_ms = timeout_ms
+        self._end_s = inf if timeout_ms is None else time.monotonic() + timeout_ms / 1000.0
+
+    async def wait_for_server(self, is_available: Callable[[], bool]) -> None:
+        """Wait for the server. Raises ServerUnavailable and CallCancelled."""
+        while not is_available():
+            if time.monotonic() >= self._end_s:
+                raise ServerUnavailable(
+                    f"no server of {self._what} was available within {self._timeout_ms:g} ms"
+                )
+            await self._limit_to(sleep(self._context.loop, _POLL_PERIOD_S), inf)
+
+    async def wait_for_response(self, response: Any) -> Any:
+        """Return the result of a future, this package's or rclpy's.
+
+        Raises CallTimeout and CallCancelled. On a timeout the future is canceled, so that the
+        client forgets the request. If the node leaves *active*, it is not: rclpy would warn of the
+        late response to a forgotten request.
+        """
+        future = response if isinstance(response, Future) else wrap_future(response)
+        try:
+            return await self.limit(future)
+        except CallCancelled:
+            raise
+        except BaseException:
+            response.cancel()
+            raise
+
+    def limit(self, future: Future[T]) -> Future[T]:
+        """Fail ``future`` with CallTimeout or CallCancelled unless done in time; return it."""
+        return self._limit_to(future, self._end_s)
+
+    def _limit_to(self, future: Future[T], until_s: float) -> Future[T]:
+        gate = self._context.gate
+        gate.pending.add(future, until_s, self._timeout_error)
+        if gate.generation != self._generation:  # the node has just left *active*
+            future.set_exception(CallCancelled(gate.refusal))
+        return future
+
+    def _timeout_error(self) -> CallTimeout:
+        return CallTimeout(f"{self._what} did not answer within {self._timeout_ms:g} ms")
+
+
+class CallingPort:
+    """A client or action client port."""
+
+    def __init__(self, context: NodeContext, port: Port, what: str) -> None:
+        """Create a port; ``what`` is its server's kind in errors: ``service`` or ``action``."""
+        self._context = context
+        self._name = port.name.value
+        self._label = f"{port.kind} '{self._name}'"
+        self._what = f"{what} '{port.full_name}'"
+        self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
+        self._reactions: dict[Event, RunningReaction] = {}
+        statistics = context.statistics.callback(port.kind.value, self._name)
+        self._timer = CallbackTimer(context, statistics, port.budget_ms)
+        self._run = self._timer.wrap(self._run_reaction)
+
+    def react(self, event: Event, reaction: RunningReaction) -> None:
+        """Run ``reaction`` on each ``event`` of the port, such as a response or a failure."""
+        self._reactions[event] = reaction
+
+    def activate(self) -> None:
+        """Do nothing: the gate lets calls out."""
+
+    def _check_type(self, content: Any, content_type: Any, expected: str) -> None:
+        if not isinstance(content, content_type):
+            raise TypeError(f"{self._label} takes a {expected}, not {type(content).__name__}")
+
+    def _on_failure(self, error: BaseException) -> None:
+        """Log a failed call that no reaction handles."""
+        if isinstance(error, CallCancelled):
+            self._context.log.debug(f"{self._label}: {text_of(error)}")
+        elif Event.FAILURE not in self._reactions:
+            self._context.error_log.error(self._label, text_of(error))
+
+    def _react(self, event: Event, **values: Any) -> None:
+        reaction = self._reactions.get(event)
+        if reaction is not None and self._context.gate.incoming:
+            self._context.strand.post(lambda: self._run((reaction, event, values)))
+
+    def _run_reaction(self, item: tuple[RunningReaction, Event, dict[str, Any]]) -> None:
+        reaction, event, values = item
+        try:
+            reaction.run(**values)
+        except Exception as error:
+            self._context.error_log.exception(f"{self._label} on_{event}", error)
 
 
 class ClientPort(CallingPort):

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from action_msgs.srv import CancelGoal
 
-from composer.runtime.executors import goal_server
+from composer.runtime.executors import actions
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 TEXT = """
@@ -138,7 +138,7 @@ def test_goals_have_the_same_outcomes_in_process_and_by_dds(
 def test_the_results_of_ended_goals_are_not_kept(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(goal_server, "KEPT_STATUSES", 2)
+    monkeypatch.setattr(actions, "KEPT_STATUSES", 2)
     text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto")
     with running(text, tmp_path, going=MODULE) as system:
         outcomes = system.behavior("client").outcomes

@@ -10,7 +10,7 @@ from nav_msgs.msg import Path
 from sensor_msgs.msg import Image, Imu, JointState, LaserScan
 from std_msgs.msg import Header, String
 
-from composer.runtime.intra_process.copying import copy_of
+from composer.runtime.intra_process.publisher import copy_of
 
 MESSAGES = [
     String(data="text"),

@@ -11,7 +11,7 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from composer_interfaces.action import Navigate
 from rclpy.qos import qos_profile_action_status_default
 
-from composer.runtime.executors import goal_server
+from composer.runtime.executors import actions
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SERVER = """
@@ -158,8 +158,8 @@ class Handled(Behavior):
 def test_few_ended_goals_are_kept(
     tmp_path: Path, peer: Peer, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(goal_server, "KEPT_STATUSES", 2)
-    monkeypatch.setattr(goal_server, "KEPT_RESULTS", 3)
+    monkeypatch.setattr(actions, "KEPT_STATUSES", 2)
+    monkeypatch.setattr(actions, "KEPT_RESULTS", 3)
     with running(handled(kind), tmp_path, handled=INSTANT):
         statuses = peer.listen(
             GoalStatusArray, "/navigate/_action/status", qos_profile_action_status_default

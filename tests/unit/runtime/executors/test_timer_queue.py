@@ -7,7 +7,7 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime.executors.timer_queue import ScheduledCall, TimerQueue
+from composer.runtime.executors.base_loop import ScheduledCall, TimerQueue
 
 
 def call(due_s: float, period_s: float | None = None) -> ScheduledCall:
