@@ -255,8 +255,7 @@ class AdoptedNode(Node):
         """Give an action server or client its port."""
         instance = self._composer_instance
         if isinstance(action, ActionServer):
-            server = HostedActionServer(instance, action, full_name)
-            instance.entities.add_action_server(action, server.name, server)
+            instance.entities.add(action, HostedActionServer(instance, action, full_name))
         else:
             instance.begin(action, HostedActionClient(instance, action, full_name))
 

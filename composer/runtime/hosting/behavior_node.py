@@ -14,7 +14,6 @@ from composer.runtime.hosting.adopted_node import AdoptedNode
 from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import (
-    HostedEntities,
     Instance,
     InstanceSettings,
     SharedState,
@@ -22,6 +21,7 @@ from composer.runtime.hosting.instance import (
 )
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.node.local_node import LocalNode
+from composer.runtime.ports import PortSet
 
 
 class NodeOfBehavior:
@@ -63,7 +63,7 @@ class NodeOfBehavior:
             report_undeclared(context, port)
 
     @property
-    def entities(self) -> HostedEntities:
+    def entities(self) -> PortSet:
         """What was created with the node."""
         return self._instance.entities
 

@@ -33,7 +33,6 @@ from composer.runtime.hosting.declared_ports import (
 )
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import (
-    HostedEntities,
     Instance,
     InstanceSettings,
     SharedState,
@@ -48,6 +47,7 @@ from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
 from composer.runtime.node.node import WrongReturn
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameters import declare, ros_parameters
+from composer.runtime.ports import PortSet
 
 _THREAD_ENDS_WITHIN_S = 0.2
 #: A constructor or a handler of a transition is reported once it has run for so long.
@@ -60,7 +60,7 @@ class HostedNode(LocalNode):
     The ROS node, with its parameter and lifecycle services, exists in all states.
     """
 
-    _entities: HostedEntities
+    _entities: PortSet
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class HostedNode(LocalNode):
         install()
         self._hosted = cast(HostedClass, model.hosted_class)
         super().__init__(model, loop, options, listener, statistics)
-        self._entities = HostedEntities()
+        self._entities = PortSet()
         self._log_level: LogLevel = options.log_level
         self._instance: Instance | None = None
         #: The parameters as the model or the last instance has declared them, until the next one.
@@ -172,7 +172,7 @@ class HostedNode(LocalNode):
 
     def _discard(self, outcome: TransitionOutcome | None) -> None:
         instance, self._instance = self._instance, None
-        self._entities = HostedEntities()
+        self._entities = PortSet()
         if instance is None:
             return
         vars(self._ros)["_composer_instance"] = None
@@ -258,15 +258,6 @@ class HostedNode(LocalNode):
 
     def _request(self, transition: str) -> None:
         self.loop.run_task(self.lifecycle.change(transition))
-
-    def _time_switched(self) -> None:
-        self._context.strand.post(self._follow_clock)
-
-    def _follow_clock(self) -> None:
-        for port in self._entities.ports:
-            follow = getattr(port, "follow_clock", None)
-            if follow is not None:
-                follow()
 
     def _report_missing(self, ports: DeclaredPorts) -> None:
         log = self._context.log

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -27,51 +27,7 @@ from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.user_code import UserCode, current_code
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
-from composer.runtime.node.local_node import ActionServing, RunningPort
-
-
-class HostedEntities:
-    """The ports and timers of an instance. Any thread of the class may add one."""
-
-    def __init__(self) -> None:
-        self._by_entity: dict[object, tuple[RunningPort, bool]] = {}
-        self._action_servers: dict[str, ActionServing] = {}
-
-    def add(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
-        """Add the port of an entity of rclpy."""
-        self._by_entity[entity] = port, always_on
-
-    def add_action_server(self, server: object, name: str, port: ActionServing) -> None:
-        """Add the port of an action server."""
-        self._action_servers[name] = port
-        self.add(server, port)
-
-    def pop(self, entity: object) -> RunningPort | None:
-        """Remove and return the port of an entity, or None if it has none."""
-        port, _ = self._by_entity.pop(entity, (None, False))
-        for name in [name for name, kept in self._action_servers.items() if kept is port]:
-            del self._action_servers[name]
-        return port
-
-    @property
-    def ports(self) -> Iterator[RunningPort]:
-        """All of them, in the order in which they were created."""
-        return (port for port, _ in tuple(self._by_entity.values()))
-
-    @property
-    def gated(self) -> Iterator[RunningPort]:
-        """Those that work only while the node is active."""
-        return (port for port, always_on in tuple(self._by_entity.values()) if not always_on)
-
-    @property
-    def always_on(self) -> tuple[RunningPort, ...]:
-        """The others, which work from configure to cleanup."""
-        return tuple(port for port, always_on in tuple(self._by_entity.values()) if always_on)
-
-    @property
-    def action_servers(self) -> Mapping[str, ActionServing]:
-        """The action servers, by name."""
-        return dict(self._action_servers)
+from composer.runtime.ports import PortSet, RunningPort
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +79,7 @@ class Instance(UserCode):
         self.action_names = settings.action_names
         self.request = settings.request
         self.current_state = settings.current_state
-        self.entities = HostedEntities()
+        self.entities = PortSet()
         #: The instance, once ``Node.__init__`` was called.
         self.node: Any = None
         #: True while the constructor or a handler of a transition runs.

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import field
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, TypeVar
 
-from composer.base.fast_dataclass import dataclass
 from composer.model import Event, Node, Port, PortKind, Reaction, Timer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import (
@@ -16,8 +14,8 @@ from composer.runtime.callbacks.reactions import (
 )
 from composer.runtime.intra_process.publisher import GatedPublisher
 from composer.runtime.node.behavior_loader import method
-from composer.runtime.node.local_node import Entities, RunningPort
 from composer.runtime.node.transforms import Broadcasts, NodeTransforms
+from composer.runtime.ports import PortSet, RunningPort
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
 from composer.runtime.ports.client import ClientPort
@@ -28,27 +26,26 @@ from composer.runtime.ports.timer import TimerPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.transforms.listener import TransformListeners
 
+P = TypeVar("P", bound=RunningPort)
 
-@dataclass(slots=True)
-class NodeEntities:
-    """The entities of a configured node, by name, and its reactions to transitions.
 
+class NodeEntities(PortSet):
+    """The ports and timers of a configured node, and its reactions to transitions.
+
+    Those that send come first, then those that receive, timers, those of libraries.
     ``always_on_context`` is for ports and timers that are always on; only its gate differs.
     """
 
-    context: NodeContext
-    always_on_context: NodeContext
-    publishers: dict[str, PublisherPort] = field(default_factory=dict)
-    clients: dict[str, ClientPort] = field(default_factory=dict)
-    action_clients: dict[str, ActionClientPort] = field(default_factory=dict)
-    action_servers: dict[str, ActionServerPort] = field(default_factory=dict)
-    subscriptions: dict[str, SubscriptionPort] = field(default_factory=dict)
-    services: dict[str, ServicePort] = field(default_factory=dict)
-    timers: dict[str, TimerPort] = field(default_factory=dict)
-    transitions: dict[Event, RunningReaction] = field(default_factory=dict)
-    always_on: list[RunningPort] = field(default_factory=list)
-    transforms: NodeTransforms | None = None
-    of_libraries: Entities | None = None  # created with the behavior's `node`
+    def __init__(self, context: NodeContext, always_on_context: NodeContext) -> None:
+        super().__init__()
+        self._context = context
+        self._always_on_context = always_on_context
+        self.publishers: dict[str, PublisherPort] = {}
+        self.clients: dict[str, ClientPort] = {}
+        self.action_clients: dict[str, ActionClientPort] = {}
+        self.transitions: dict[Event, RunningReaction] = {}
+        self.transforms: NodeTransforms | None = None
+        self.of_libraries = PortSet()  # created with the behavior's `node`
 
     @property
     def senders(self) -> dict[str, GatedPublisher]:
@@ -57,23 +54,9 @@ class NodeEntities:
 
     @property
     def ports(self) -> Iterator[RunningPort]:
-        """All ports: first those that send, then those that receive, timers, those of libraries."""
-        yield from self.publishers.values()
-        yield from self.clients.values()
-        yield from self.action_clients.values()
-        yield from self.subscriptions.values()
-        yield from self.services.values()
-        yield from self.action_servers.values()
-        yield from self.timers.values()
-        if self.transforms is not None:
-            yield self.transforms
-        if self.of_libraries is not None:
-            yield from self.of_libraries.ports
-
-    @property
-    def gated(self) -> Iterator[RunningPort]:
-        """The ports and timers that work only while the node is active."""
-        return (port for port in self.ports if port not in self.always_on)
+        """All of them."""
+        yield from super().ports
+        yield from self.of_libraries.ports
 
     def create(self, model: Node, behavior: object | None, listeners: TransformListeners) -> None:
         """Create the entities of ``model``; if one fails, those created before it remain.
@@ -82,49 +65,39 @@ class NodeEntities:
         """
         self._log_dds_ports(model)
         for port in model.ports_of(PortKind.PUBLISHER):
-            self.publishers[port.name.value] = PublisherPort(self._context_of(port), port)
+            publisher = PublisherPort(self._context_of(port), port)
+            self.publishers[port.name.value] = self._added(publisher, port)
         for port in model.ports_of(PortKind.CLIENT):
-            self.clients[port.name.value] = ClientPort(self._context_of(port), port)
+            client = ClientPort(self._context_of(port), port)
+            self.clients[port.name.value] = self._added(client, port)
         for port in model.ports_of(PortKind.ACTION_CLIENT):
-            self.action_clients[port.name.value] = ActionClientPort(self._context_of(port), port)
+            action_client = ActionClientPort(self._context_of(port), port)
+            self.action_clients[port.name.value] = self._added(action_client, port)
         if model.transforms is not None:
-            self.transforms = NodeTransforms(self.context, model.transforms, listeners)
+            self.transforms = NodeTransforms(self._context, model.transforms, listeners)
+            self.add(self.transforms, self.transforms)
         self._bind_responses(model)
         for port in model.ports_of(PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.ACTION_SERVER):
-            self._add_receiver(port, behavior)
+            self._added(self._receiver(port, behavior), port)
         for timer in model.timers:
-            name = timer.name.value
             reaction = self._reaction(timer.reaction)
-            handler = method(behavior, f"on_{name}")
-            self.timers[name] = TimerPort(self._context_of(timer), timer, reaction, handler)
+            handler = method(behavior, f"on_{timer.name.value}")
+            self._added(TimerPort(self._context_of(timer), timer, reaction, handler), timer)
         for event, declared in model.reactions:
             self.transitions[event] = self._compile(declared)
-        self.always_on.extend(self._always_on(model))
+
+    def _added(self, port: P, declared: Port | Timer) -> P:
+        self.add(port, port, always_on=declared.always_on)
+        return port
 
     def _log_dds_ports(self, model: Node) -> None:
         for port in model.ports:
-            objection = self.context.router.dds_reason(port)
+            objection = self._context.router.dds_reason(port)
             if objection is not None:
-                self.context.log.debug(f"{port.kind} '{port.name}' uses DDS only: {objection}")
+                self._context.log.debug(f"{port.kind} '{port.name}' uses DDS only: {objection}")
 
     def _context_of(self, declared: Port | Timer) -> NodeContext:
-        return self.always_on_context if declared.always_on else self.context
-
-    def _always_on(self, model: Node) -> Iterator[RunningPort]:
-        sections: dict[PortKind, Mapping[str, RunningPort]] = {
-            PortKind.PUBLISHER: self.publishers,
-            PortKind.CLIENT: self.clients,
-            PortKind.ACTION_CLIENT: self.action_clients,
-            PortKind.SUBSCRIPTION: self.subscriptions,
-            PortKind.SERVICE: self.services,
-            PortKind.ACTION_SERVER: self.action_servers,
-        }
-        for port in model.ports:
-            if port.always_on:
-                yield sections[port.kind][port.name.value]
-        for timer in model.timers:
-            if timer.always_on:
-                yield self.timers[timer.name.value]
+        return self._always_on_context if declared.always_on else self._context
 
     def _bind_responses(self, model: Node) -> None:
         for port in model.ports_of(PortKind.CLIENT):
@@ -134,22 +107,19 @@ class NodeEntities:
             for event, declared in port.reactions:
                 self.action_clients[port.name.value].react(event, self._compile(declared))
 
-    def _add_receiver(self, port: Port, behavior: object | None) -> None:
+    def _receiver(self, port: Port, behavior: object | None) -> RunningPort:
         name = port.name.value
         context = self._context_of(port)
         handler = method(behavior, f"on_{name}")
-        match port.kind:
-            case PortKind.SUBSCRIPTION:
-                reaction = self._on_message(port)
-                self.subscriptions[name] = SubscriptionPort(context, port, reaction, handler)
-            case PortKind.SERVICE:
-                response_type = interface_class(port.interface.value).Response
-                reaction = self._reaction(port.reaction(Event.REQUEST), response_type)
-                self.services[name] = ServicePort(context, port, reaction, handler)
-            case PortKind.ACTION_SERVER:
-                reaction = self._reaction(port.reaction(Event.GOAL))
-                handlers = Handlers(handler, method(behavior, f"accept_{name}"))
-                self.action_servers[name] = ActionServerPort(context, port, reaction, handlers)
+        if port.kind is PortKind.SUBSCRIPTION:
+            return SubscriptionPort(context, port, self._on_message(port), handler)
+        if port.kind is PortKind.SERVICE:
+            response_type = interface_class(port.interface.value).Response
+            reaction = self._reaction(port.reaction(Event.REQUEST), response_type)
+            return ServicePort(context, port, reaction, handler)
+        reaction = self._reaction(port.reaction(Event.GOAL))
+        handlers = Handlers(handler, method(behavior, f"accept_{name}"))
+        return ActionServerPort(context, port, reaction, handlers)
 
     def _reaction(
         self, declared: Reaction | None, response_type: Any = None
@@ -166,4 +136,4 @@ class NodeEntities:
 
     def _compile(self, declared: Reaction, response_type: Any = None) -> RunningReaction:
         callers: dict[str, ReactionClient] = {**self.clients, **self.action_clients}
-        return RunningReaction(self.context, declared, self.senders, callers, response_type)
+        return RunningReaction(self._context, declared, self.senders, callers, response_type)

@@ -8,7 +8,7 @@ The kinds of nodes differ in what they create and call in a transition. See
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from time import monotonic
@@ -32,48 +32,9 @@ from composer.runtime.node.lifecycle import Lifecycle
 from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
+from composer.runtime.ports import PortSet, RunningPort
 
 T = TypeVar("T")
-
-
-class RunningPort(Protocol):
-    """A port or timer between the configuration and the cleanup of its node."""
-
-    def activate(self) -> None:
-        """Begin: the node is active now."""
-
-    def deactivate(self) -> None:
-        """Stop and discard what waits: the node is leaving *active*."""
-
-    def destroy(self) -> None:
-        """Destroy the ROS entity."""
-
-
-class ActionServing(RunningPort, Protocol):
-    """An action server, whose goals may take a moment to end."""
-
-    async def drain(self) -> None:
-        """Wait until the goals have ended, up to a time limit."""
-
-
-class Entities(Protocol):
-    """The ports and timers of a configured node."""
-
-    @property
-    def ports(self) -> Iterator[RunningPort]:
-        """All of them: first those that send, then those that receive, then timers."""
-
-    @property
-    def gated(self) -> Iterator[RunningPort]:
-        """Those that work only while the node is active."""
-
-    @property
-    def always_on(self) -> Iterable[RunningPort]:
-        """The others, which work from configure to cleanup."""
-
-    @property
-    def action_servers(self) -> Mapping[str, ActionServing]:
-        """The action servers among them, by name."""
 
 
 class LibraryNode(Protocol):
@@ -84,7 +45,7 @@ class LibraryNode(Protocol):
         """The rclpy node."""
 
     @property
-    def entities(self) -> Entities:
+    def entities(self) -> PortSet:
         """What was created with it."""
 
     def end(self) -> None:
@@ -100,7 +61,7 @@ class LocalNode(ABC):
     has from configure to cleanup.
     """
 
-    _entities: Entities
+    _entities: PortSet
     lifecycle: Lifecycle
 
     def __init__(
@@ -256,9 +217,13 @@ class LocalNode(ABC):
     def _discard(self, outcome: TransitionOutcome | None) -> None:
         """Release what is left after the entities were destroyed; without an outcome, forever."""
 
-    @abstractmethod
     def _time_switched(self) -> None:
         """Follow the node's switch to or from simulated time."""
+        self._context.strand.post(self._follow_clock)
+
+    def _follow_clock(self) -> None:
+        for port in self._entities.ports:
+            port.follow_clock()
 
     # --- hooks of the lifecycle
 
@@ -326,9 +291,8 @@ class LocalNode(ABC):
         for port in deactivated:
             port.deactivate()
         context.gate.cancel_pending()
-        for server in self._entities.action_servers.values():
-            if server in deactivated:
-                await server.drain()
+        for port in deactivated:
+            await port.drain()
 
     def _release(self, outcome: TransitionOutcome | None = None) -> None:
         self._context.cancel_tasks()

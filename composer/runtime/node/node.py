@@ -181,14 +181,6 @@ class RunningNode(LocalNode):
 
     # --- parameters
 
-    def _time_switched(self) -> None:
-        self._context.strand.post(self._follow_clock)
-
-    def _follow_clock(self) -> None:
-        for timer in self._entities.ports:
-            if isinstance(timer, TimerPort):
-                timer.follow_clock()
-
     def _check_timers(self, values: Mapping[str, Any]) -> str | None:
         """Return why a timer cannot use the new parameter values, or None."""
         for timer in self.model.timers:
@@ -202,8 +194,9 @@ class RunningNode(LocalNode):
         self._context.strand.post(lambda: self._follow_parameters(changes))
 
     def _follow_parameters(self, changes: Mapping[str, Any]) -> None:
-        for timer in self._entities.timers.values():
-            timer.follow_parameters()
+        for port in self._entities.ports:
+            if isinstance(port, TimerPort):
+                port.follow_parameters()
         handler = method(self._behavior, "on_parameters")
         if handler is not None:
             rest = self._context.call("on_parameters", handler, changes)

@@ -26,6 +26,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.stacks import interruptible
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.publisher import PublisherPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.transforms.buffer import Found, TransformBuffer
@@ -146,7 +147,7 @@ class Broadcasts:
                 self._reaction.run(message=message)
 
 
-class NodeTransforms:
+class NodeTransforms(RunningPort):
     """The frames of a configured node: one of its ports, as far as the lifecycle is concerned.
 
     It uses the buffer of the process from the start of *activating* until the node leaves *active*.

@@ -1,1 +1,66 @@
 """The ports of a running node, one kind per file. The node's lifecycle state gates all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+
+class RunningPort:
+    """A port or timer between the configuration and the cleanup of its node."""
+
+    __slots__ = ()
+
+    def activate(self) -> None:
+        """Begin: the node is active now. Without effect if the gate alone lets traffic through."""
+
+    def deactivate(self) -> None:
+        """Stop and discard what waits: the node is leaving *active*."""
+
+    async def drain(self) -> None:
+        """Wait until what has begun has ended, up to a time limit."""
+
+    def follow_clock(self) -> None:
+        """Follow the node's switch to or from simulated time."""
+
+    def destroy(self) -> None:
+        """Destroy the ROS entity."""
+
+
+class PortSet:
+    """The ports and timers of a configured node, in the order in which they were created.
+
+    Those that are always on work from configure to cleanup, the others while the node is active.
+    Any thread may add one.
+    """
+
+    def __init__(self) -> None:
+        self._ports: dict[object, RunningPort] = {}
+        self._always_on: set[RunningPort] = set()
+
+    def add(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
+        """Add the port of an entity."""
+        self._ports[entity] = port
+        if always_on:
+            self._always_on.add(port)
+
+    def pop(self, entity: object) -> RunningPort | None:
+        """Remove and return the port of an entity, or None if it has none."""
+        port = self._ports.pop(entity, None)
+        if port is not None:
+            self._always_on.discard(port)
+        return port
+
+    @property
+    def ports(self) -> Iterator[RunningPort]:
+        """All of them."""
+        return iter(tuple(self._ports.values()))
+
+    @property
+    def gated(self) -> Iterator[RunningPort]:
+        """Those that work only while the node is active."""
+        return (port for port in self.ports if port not in self._always_on)
+
+    @property
+    def always_on(self) -> tuple[RunningPort, ...]:
+        """The others."""
+        return tuple(port for port in self.ports if port in self._always_on)

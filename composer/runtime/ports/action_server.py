@@ -22,6 +22,7 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.intra_process.servers import LocalActionServer
+from composer.runtime.ports import RunningPort
 from composer.runtime.ros.messages import Build, compile_message, interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
@@ -110,7 +111,7 @@ class Handlers:
     accept: Callable[[Any], Any] | None = None
 
 
-class ActionServerPort:
+class ActionServerPort(RunningPort):
     """Executes goals while the node is active, one at a time unless the port is reentrant.
 
     Waiting goals are accepted and can be canceled. Goals beyond the depth of the port's QoS are
@@ -156,9 +157,6 @@ class ActionServerPort:
         context.loop.add_action_server(self._server)
         self._local = LocalActionServer(port, self._server, context.loop.run_task)
         self._remove = context.router.add_action_server(port, self._local)
-
-    def activate(self) -> None:
-        """Do nothing: the gate lets goals in."""
 
     def deactivate(self) -> None:
         """Cancel the waiting goals and request cancellation of the running ones."""

@@ -16,6 +16,7 @@ from composer.runtime.executors.exceptions import text_of
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.servers import LocalService
+from composer.runtime.ports import RunningPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
@@ -85,7 +86,7 @@ class CallLimit:
         return CallTimeout(f"{self._what} did not answer within {self._timeout_ms:g} ms")
 
 
-class CallingPort:
+class CallingPort(RunningPort):
     """A client or action client port."""
 
     def __init__(self, context: NodeContext, port: Port, what: str) -> None:
@@ -103,9 +104,6 @@ class CallingPort:
     def react(self, event: Event, reaction: RunningReaction) -> None:
         """Run ``reaction`` on each ``event`` of the port, such as a response or a failure."""
         self._reactions[event] = reaction
-
-    def activate(self) -> None:
-        """Do nothing: the gate lets calls out."""
 
     def _check_type(self, content: Any, content_type: Any, expected: str) -> None:
         if not isinstance(content, content_type):
@@ -167,9 +165,6 @@ class ClientPort(CallingPort):
     def send(self, content: Any) -> None:
         """Send a request for a reaction; failures without ``on_failure`` are logged."""
         self._context.spawn(self._send(content))
-
-    def deactivate(self) -> None:
-        """Do nothing: the gate cancels the pending calls."""
 
     def destroy(self) -> None:
         """Destroy the client."""

@@ -12,12 +12,13 @@ from composer.model import Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.mutation_check import RememberingTarget
 from composer.runtime.intra_process.publisher import PublisherContext, Target
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
-class PublisherPort:
+class PublisherPort(RunningPort):
     """Publishes while the node is active; otherwise drops and counts messages, and warns once."""
 
     __slots__ = (
@@ -52,9 +53,6 @@ class PublisherPort:
         """Warn again at the next message that is dropped."""
         self._warned = False
         self._qos_events.activate()
-
-    def deactivate(self) -> None:
-        """Do nothing: no message waits in a publisher."""
 
     def destroy(self) -> None:
         """Destroy the publisher."""

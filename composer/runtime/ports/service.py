@@ -18,6 +18,7 @@ from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.intra_process.servers import LocalService
+from composer.runtime.ports import RunningPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
@@ -52,7 +53,7 @@ class PendingRequest:
             self._reply.refuse(error)
 
 
-class ServicePort:
+class ServicePort(RunningPort):
     """Responds to requests by its reaction and handler while the node is active.
 
     Otherwise a request is refused. If a request is refused or its handler fails, the response has
@@ -101,9 +102,6 @@ class ServicePort:
             return
         self._context.statistics.calls += 1
         self._queue.put(request)
-
-    def activate(self) -> None:
-        """Do nothing: the gate lets requests in."""
 
     def deactivate(self) -> None:
         """Refuse the waiting requests."""

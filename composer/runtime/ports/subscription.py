@@ -16,13 +16,14 @@ from composer.model.qos import Durability
 from composer.runtime.callbacks.callback import mutation_checked
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
-class SubscriptionPort:
+class SubscriptionPort(RunningPort):
     """Passes messages to the port's reaction and handler while the node is active.
 
     Other messages are dropped and counted, except on a transient-local topic: a latched message

@@ -12,9 +12,10 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.tasks import TimerHandle
+from composer.runtime.ports import RunningPort
 
 
-class TimerPort(Callback):
+class TimerPort(Callback, RunningPort):
     """Calls the timer's reaction and handler while the node is active.
 
     A call that is due while the previous one is running is skipped and counted, unless the timer is

@@ -44,7 +44,7 @@ def test_messages_wait_while_a_handler_awaits_and_the_oldest_is_dropped(
         source.publish(Int64(data=0))
         system.wait_for_log("begin 0")
         node = system.node("slow")
-        waiting = node._entities.subscriptions["input"]._mailbox._messages
+        waiting = system.port("slow", "input")._mailbox._messages
         for number in range(1, 5):
             source.publish(Int64(data=number))
             wait_until(lambda n=number: len(waiting) + node.statistics.dropped == n)

@@ -37,7 +37,7 @@ def test_messages_between_hosted_classes_stay_in_the_process(tmp_path: Path) -> 
         wait_until(lambda: len(listener.numbers) >= 5 and len(listener.infos) >= 5)
         assert listener.numbers[:5] == [1, 2, 3, 4, 5]
         assert [number for number, _ in listener.infos[:5]] == [1, 2, 3, 4, 5]
-        publisher = system.node("talker")._entities._by_entity[talker.publisher][0]
+        publisher = system.node("talker")._entities._ports[talker.publisher]
         assert not publisher.gated._has_external
         counted = system.summary("/listener")
     assert counted.errors == 0

@@ -130,7 +130,7 @@ def test_goals_have_the_same_outcomes_in_process_and_by_dds(
         system.change("client", "deactivate")
         wait_until(lambda: len(client.outcomes) == 6)
         assert client.outcomes[-1] == "CallCancelled"
-        goals = system.node("server")._entities.action_servers["go"]._goals
+        goals = system.port("server", "go")._goals
         wait_until(lambda: not goals, "the end of the unawaited goal")
 
 
@@ -145,7 +145,7 @@ def test_the_results_of_ended_goals_are_not_kept(
         for count in range(1, 8):
             go(system, 1.0)
             wait_until(lambda count=count: len(outcomes) == count)
-        server = system.node("server")._entities.action_servers["go"]._server
+        server = system.port("server", "go")._server
         wait_until(lambda: len(server._goal_handles) <= 2, "the other goals")
 
 

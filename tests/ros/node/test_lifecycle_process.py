@@ -37,14 +37,14 @@ nodes:
   other:
     services: {alive: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}}
 """
-SERVICES = "service list --include-hidden --show-types"
+SERVICES = "service list --all --show-types"
 #: Commands that list the ROS graph and the node.
 LISTS = (
-    "topic list --include-hidden --show-types",
+    "topic list --all --show-types",
     SERVICES,
     "action list --show-types",
     "node list",
-    "node info /subject --include-hidden",
+    "node info /subject --all",
 )
 PORTS = ("input", "output", "trigger", "ask", "serve", "send")
 CYCLE = ("configure", "activate", "deactivate", "cleanup")

@@ -332,7 +332,7 @@ def test_goals_are_canceled_when_their_client_leaves_active(tmp_path: Path, peer
     with running(CLIENT.replace("TARGET", "1.0"), tmp_path, handled=PATIENT) as system:
         system.wait_for_log("begin 1.0")
         assert peer.change("/client", "deactivate")
-        server = system.node("server")._entities.action_servers["navigate"]
+        server = system.port("server", "navigate")
         wait_until(lambda: not server._goals, "the goal has ended")
         assert peer.state("/server") == "active"
         assert system.summary("/client").errors == 0

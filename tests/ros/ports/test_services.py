@@ -166,7 +166,7 @@ def test_pending_requests_are_refused_when_the_node_leaves_active(
         first = client.call_async(Trigger.Request())
         system.wait_for_log("begun")
         waiting = client.call_async(Trigger.Request())
-        port = system.node("handled")._entities.services["deferred"]
+        port = system.port("handled", "deferred")
         wait_until(lambda: len(port._pending) == 2)
         assert peer.change("/handled", "deactivate")
         answers = [finished(first), finished(waiting)]

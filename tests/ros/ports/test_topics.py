@@ -66,7 +66,7 @@ def test_messages_latched_while_inactive_arrive_on_activation(tmp_path: Path, pe
         source = peer.publisher(String, "/mode", latched)
         source.publish(String(data="old"))
         source.publish(String(data="ready"))
-        port = system.node("listener")._entities.subscriptions["mode"]
+        port = system.port("listener", "mode")
         wait_until(lambda: [message.data for _, message in tuple(port._latched)] == ["ready"])
         assert system.log() == []
         assert peer.change("/listener", "activate")

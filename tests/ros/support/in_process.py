@@ -132,6 +132,12 @@ class RunningSystem:
         """Return the behavior of a node, which exists from configure to cleanup."""
         return self.node(name)._behavior
 
+    def port(self, node: str, name: str) -> Any:
+        """Return a port of a configured node."""
+        return next(
+            port for port in self.node(node)._entities.ports if getattr(port, "_name", None) == name
+        )
+
     def change(self, node: str, *transitions: str) -> None:
         """Run transitions of a node, one after the other."""
         running_node = self.node(node)

@@ -22,10 +22,11 @@ from composer.runtime.hosting.user_code import (
     call_in_group,
     interrupt_callbacks,
 )
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.action_server import CANCEL_LIMIT_S
 
 
-class HostedActionServer:
+class HostedActionServer(RunningPort):
     """The port of an action server: it takes goals only while the node is active.
 
     When the node leaves *active*, running goals are asked to cancel, and feedback is dropped. Goals
@@ -49,9 +50,6 @@ class HostedActionServer:
         self._execution = UserFunction(instance, server._execute_callback)
         server.register_execute_callback(self._wrapped(self._execution, self._abort))
         instance.context.loop.add_action_server(server)
-
-    def activate(self) -> None:
-        """Do nothing: the gate lets goals in."""
 
     def deactivate(self) -> None:
         """Ask the running goals to cancel."""
@@ -174,7 +172,7 @@ class HostedActionServer:
         goal.execute(self._abort)
 
 
-class HostedActionClient:
+class HostedActionClient(RunningPort):
     """The port of an action client. Its goals go by DDS, while the node is active."""
 
     def __init__(self, instance: Instance, client: Any, full_name: str) -> None:
@@ -185,12 +183,6 @@ class HostedActionClient:
         self._send = self._client.send_goal_async
         self._client.send_goal_async = self._send_goal
         instance.context.loop.add_action_client(client)
-
-    def activate(self) -> None:
-        """Do nothing: the gate lets goals out."""
-
-    def deactivate(self) -> None:
-        """Do nothing: feedback and responses are dropped."""
 
     def destroy(self) -> None:
         """Destroy the client."""

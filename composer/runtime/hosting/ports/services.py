@@ -15,6 +15,7 @@ from composer.behavior import CallCancelled
 from composer.model import Port, PortKind
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.service import ServicePort
 
 
@@ -109,7 +110,7 @@ def fail(future: Future, error: BaseException) -> None:
     future.exception()
 
 
-class ClientPort:
+class ClientPort(RunningPort):
     """The port of a client: it fails the pending calls when the node leaves *active*."""
 
     def __init__(self, instance: Instance, client: Any) -> None:
@@ -119,9 +120,6 @@ class ClientPort:
         client.__class__ = HostedClient
         client._instance = instance
         instance.context.loop.add_client(client)
-
-    def activate(self) -> None:
-        """Do nothing: the gate lets calls out."""
 
     def deactivate(self) -> None:
         """Fail the pending calls."""
