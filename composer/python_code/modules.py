@@ -13,16 +13,17 @@ from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
+from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
 from composer.base.ownership import TrustedUsers
 from composer.base.regular_files import FileTooLargeError, NotRegularError, read_regular
 from composer.base.source import Span
-from composer.base.spelling import Vocabulary
 from composer.project import Project
 
 MAXIMUM_BYTES = 250_000
 #: Files of these types in a package may be modules that are compiled when it is built.
-COMPILED = frozenset({".c", ".cpp", ".pyx", ".pyd", ".so"})
+_COMPILED = (".c", ".cpp", ".pyx", ".pyd", ".so")
+_MODULES = (".py", ".pyi", *_COMPILED)
 _MAXIMUM_FILES = 2000  # in a folder
 
 #: Other codecs of Python may take quadratic time, or do not encode text.
@@ -162,44 +163,59 @@ class NearbyModules:
     """The modules next to one that does not exist.
 
     ``package`` is the longest part of its name that is a package, ``missing`` the part that
-    follows. ``similar`` are modules that may be meant. ``is_misspelled``: the module is not just
-    not installed. A file of the project has a name without dots, unlike most modules of packages.
+    follows. ``names`` are the modules next to that part. ``may_be_compiled``: there may be more.
     """
 
     package: str
     missing: str
-    similar: Sequence[str]
-    is_misspelled: bool
+    names: Sequence[str]
+    may_be_compiled: bool
+
+    @property
+    def path(self) -> str:
+        """The name up to the missing part."""
+        return f"{self.package}.{self.missing}".lstrip(".")
+
+    @property
+    def similar(self) -> str | None:
+        """The module that was most likely meant."""
+        return nearest(self.missing, self.names)
 
     @property
     def hint(self) -> str | None:
-        """The name that was most likely meant, as a hint."""
-        return f"did you mean '{self.similar[0]}'?" if self.similar else None
+        """The name that was most likely meant, as a hint; also one that is installed."""
+        installed = () if self.package else _modules_in(map(Path, sys.path))
+        close = self.similar or nearest(self.missing, filter(str.isidentifier, installed))
+        return f"did you mean '{close}'?" if close is not None else None
 
 
-def nearby_modules(module: str, folder: Path, project: Project) -> NearbyModules:
-    """Look for what is next to ``module``, a dotted name that no file has."""
-    parts = module.split(".")
-    bases = [*dict.fromkeys((folder, *project.node_folders))]
-    for count in range(len(parts) - 1, 0, -1):
-        folders = [*_package_folders(parts[:count], bases)]
-        if folders:
-            similar = _similar_modules(parts[count], folders)
-            return NearbyModules(".".join(parts[:count]), parts[count], similar, True)
-    similar = _similar_modules(parts[0], bases)
-    is_misspelled = bool(similar) and len(parts) == 1
-    similar = similar or _similar_modules(parts[0], map(Path, sys.path))
-    return NearbyModules("", parts[0], similar, is_misspelled)
+def nearby_modules(module: str, folders: Iterable[Path]) -> NearbyModules:
+    """Look for what is next to ``module``, a dotted name that no file has, in some folders."""
+    parts, bases, package = module.split("."), [*dict.fromkeys(folders)], 0
+    places = bases
+    for count in range(1, len(parts)):
+        inner = [*_package_folders(parts[:count], bases)]
+        if inner:
+            places, package = inner, count
+    names = _modules_in(places)
+    return NearbyModules(
+        package=".".join(parts[:package]),
+        missing=parts[package],
+        names=tuple(filter(str.isidentifier, names)),
+        may_be_compiled=bool(package) and any(suffix in _COMPILED for suffix in names.values()),
+    )
 
 
-def files_and_folders(folder: Path) -> list[str]:
-    """Return the names of the files and folders in a folder that may be modules."""
-    kinds = (".py", *COMPILED)
-    with suppress(OSError, ValueError), os.scandir(folder) as items:
-        return [
-            x.name for x in islice(items, _MAXIMUM_FILES) if x.name.endswith(kinds) or x.is_dir()
-        ]
-    return []
+def _modules_in(folders: Iterable[Path]) -> dict[str, str]:
+    """Return the names of the files and folders that may be modules, with their suffixes."""
+    modules: dict[str, str] = {}
+    for folder in folders:
+        with suppress(OSError, ValueError), os.scandir(folder) as items:
+            for item in islice(items, _MAXIMUM_FILES):
+                name = item.name.partition(".")[0]
+                if item.name.endswith(_MODULES) or item.is_dir():
+                    modules[name] = Path(item.name).suffix
+    return modules
 
 
 def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:
@@ -211,8 +227,3 @@ def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:
         with suppress(OSError, ValueError):
             if candidate.is_dir():
                 yield candidate
-
-
-def _similar_modules(name: str, folders: Iterable[Path]) -> Sequence[str]:
-    names = (item.partition(".")[0] for folder in folders for item in files_and_folders(folder))
-    return Vocabulary(tuple(dict.fromkeys(filter(str.isidentifier, names)))).close(name)

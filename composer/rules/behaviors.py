@@ -34,17 +34,13 @@ from composer.rules.analysis.context import Context
 from composer.rules.analysis.formatting import a
 from composer.rules.analysis.python_nodes import behaviors, distinct_behaviors
 from composer.rules.analysis.subjects import wiring
-from composer.rules.python import missing, unnamed
+from composer.rules.python import CLASS_MISSING, as_warning, missing, unnamed
 
 MISSING_HANDLER = error("RC433", "missing-handler")
 HANDLER_WITHOUT_PORT = error("RC434", "handler-without-port")
-HANDLER_ANNOTATION = warning("RC451", "handler-annotation")
 HANDLER_SIGNATURE = error("RC435", "handler-signature")
 BLOCKING_CALL = warning("RC436", "blocking-call")
-ENDLESS_LOOP = warning("RC450", "endless-loop")
-MODULE_MISSING = error("RC431", "behavior-module-missing")
-CLASS_MISSING = error("RC432", "behavior-class-missing")
-NODE_AS_BEHAVIOR = error("RC534", "node-as-behavior")
+WRONG_CLASS = error("RC462", "wrong-class")
 
 
 def check_handlers(context: Context) -> Iterator[Diagnostic]:
@@ -139,7 +135,8 @@ def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
             label = Label(source.reference.text.span, "the behavior of this node")
             span = span_of(annotation, scope.source)
             given = (("type", f"{node.name}.{_stem(name)}"),)
-            yield Diagnostic(HANDLER_ANNOTATION, message, span, (label,), relies_on=given)
+            rule = as_warning(HANDLER_SIGNATURE)
+            yield Diagnostic(rule, message, span, (label,), relies_on=given)
 
 
 _BLOCKING = re.compile(
@@ -224,7 +221,7 @@ def _endless(method: Method, loop: ast.While) -> Diagnostic:
     if not method.is_async:
         hint += f", and write 'async def {method.name}'"
     span = start_span(loop, len("while"), method.span.file)
-    return Diagnostic(ENDLESS_LOOP, message, span, hint=hint)
+    return Diagnostic(BLOCKING_CALL, message, span, hint=hint)
 
 
 def endless_loops(function: Function) -> Iterator[ast.While]:
@@ -260,12 +257,12 @@ def check_behaviors(context: Context) -> Iterator[Diagnostic]:
     """Check that every behavior names a class, and that its module can be read and defines it."""
     for node in context.system.nodes:
         if node.behavior is not None:
-            yield from unnamed(node.behavior, "behavior", CLASS_MISSING)
+            yield from unnamed(node.behavior, "behavior")
     for node, source in behaviors(context):
-        yield from missing(source, MODULE_MISSING, CLASS_MISSING, MODULE_MISSING)
+        yield from missing(source, CLASS_MISSING)
         if source.class_span is not None and source.is_rclpy_node:
             yield Diagnostic(
-                NODE_AS_BEHAVIOR,
+                WRONG_CLASS,
                 f"'{source.reference.class_name}' is an rclpy node, not a behavior",
                 source.reference.text.span,
                 (Label(source.class_span, "here"),),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
-from composer.base.diagnostics import Diagnostic, Label, error, info, nearest, warning
+from composer.base.diagnostics import Diagnostic, Label, Severity, error, nearest
 from composer.base.spelling import is_typo
 from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
 from composer.model.qos import incompatibilities
@@ -15,11 +16,8 @@ from composer.rules.analysis.python_nodes import hosted_classes
 from composer.rules.analysis.subjects import type_subject
 from composer.rules.python import as_warning
 
-CLASS_PORT_MISSING = warning("RC499", "class-port-missing")
-CLASS_PORT_TYPE = error("RC487", "class-port-type")
-CLASS_PORT_QOS = info("RC493", "class-port-qos")
-CLASS_PARAMETER = warning("RC485", "class-parameter")
-CLASS_PARAMETER_TYPE = error("RC486", "class-parameter-type")
+CLASS_PORT = error("RC487", "class-port")
+CLASS_PARAMETER = error("RC485", "class-parameter")
 
 _KINDS = frozenset({PortKind.PUBLISHER, PortKind.SUBSCRIPTION, PortKind.SERVICE, PortKind.CLIENT})
 #: The policies that decide whether endpoints match.
@@ -57,7 +55,8 @@ def _missing_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
         # Connections may name a port as the class does.
         meant = sorted({port.name.value, *others})
         subjects = tuple(("port", f"{item.node.name}.{other}") for other in meant)
-        yield Diagnostic(CLASS_PORT_MISSING, message, port.ros_name.span, (), hint, subjects)
+        rule = as_warning(CLASS_PORT)
+        yield Diagnostic(rule, message, port.ros_name.span, (), hint, subjects)
 
 
 def _last(name: str) -> str:
@@ -78,7 +77,7 @@ def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic
         if types and port.interface.value not in {other.interface for other in types}:
             message = f"{what} with type {types[0].interface}, not {port.interface}"
             label = Label(types[0].span, "created here")
-            rule = as_warning(CLASS_PORT_TYPE, unless=item.is_certain(types[0].span))
+            rule = as_warning(CLASS_PORT, unless=item.is_certain(types[0].span))
             subjects = (type_subject(port),)
             yield Diagnostic(rule, message, port.interface.span, (label,), subjects=subjects)
         elif len(same) == 1 and port.qos.known and port.qos.explicit:
@@ -101,7 +100,8 @@ def _different_qos(
         if topic.name == port.full_name
     ]
     pairs = [(qos, other) if is_publisher else (other, qos) for other in ends]
-    rule = as_warning(CLASS_PORT_QOS, unless=not any(incompatibilities(*pair) for pair in pairs))
+    is_problem = any(incompatibilities(*pair) for pair in pairs)
+    rule = replace(CLASS_PORT, severity=Severity.WARNING if is_problem else Severity.INFO)
     for policy in _POLICIES:
         here, there = getattr(declared, policy), getattr(qos, policy)
         if here != there:
@@ -127,7 +127,7 @@ def _parameters(item: ClassOfNode) -> Iterator[Diagnostic]:
         if type_ is not None and given in _TYPES and type_.value != given:
             message = f"class '{class_name}' declares parameter '{name}' as {type_}, not {given}"
             label = Label(type_.span, "declared here")
-            rule = as_warning(CLASS_PARAMETER_TYPE, unless=item.is_certain(type_.span))
+            rule = as_warning(CLASS_PARAMETER, unless=item.is_certain(type_.span))
             yield Diagnostic(rule, message, parameter.type.span, (label,))
 
 
@@ -151,7 +151,7 @@ def _undeclared(
         message = f"class '{item.hosted.reference.class_name}' declares no parameter '{name}'"
         hint = f"did you mean '{close}'?" if close is not None else None
         yield Diagnostic(
-            CLASS_PARAMETER,
+            as_warning(CLASS_PARAMETER),
             message,
             parameter.name.span,
             hint=hint,

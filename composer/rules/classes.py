@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.base.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import ExecutorKind, Node, System
 from composer.model.dependencies import dependency_edges
 from composer.python_code.nodes import ClassOfNode
@@ -14,16 +14,11 @@ from composer.python_code.syntax import Method
 from composer.python_code.trees import SCOPES, is_none, span_of, walk
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.python_nodes import hosted_classes
-from composer.rules.python import as_warning, missing, unnamed
+from composer.rules.behaviors import BLOCKING_CALL, WRONG_CLASS
+from composer.rules.python import NOT_INSTALLED, as_warning, missing, unnamed
 
-CLASS_MISSING = error("RC460", "class-missing")
-CLASS_NOT_INSTALLED = info("RC461", "class-not-installed")
-CLASS_NOT_A_NODE = error("RC462", "class-not-a-node")
 CLASS_ARGUMENTS = error("RC463", "class-arguments")
-CLASS_SPINS = error("RC464", "class-spins")
-CLASS_SECOND_NODE = error("RC465", "class-second-node")
-CLASS_CONTEXT = error("RC466", "class-context")
-CLASS_BLOCKS = warning("RC467", "class-blocks")
+UNSUPPORTED_CLASS = error("RC464", "unsupported-class")
 
 
 def check_classes(context: Context) -> Iterator[Diagnostic]:
@@ -33,14 +28,14 @@ def check_classes(context: Context) -> Iterator[Diagnostic]:
     """
     for node in context.system.nodes:
         if node.hosted_class is not None:
-            yield from unnamed(node.hosted_class.reference, "class", CLASS_MISSING)
+            yield from unnamed(node.hosted_class.reference, "class")
     for item in hosted_classes(context):
         source = item.source
-        yield from missing(source, CLASS_MISSING, CLASS_MISSING, CLASS_NOT_INSTALLED)
+        yield from missing(source, NOT_INSTALLED)
         if source.complete and source.class_span is not None and not source.is_rclpy_node:
             message = f"class '{source.reference.class_name}' is not derived from rclpy's Node"
             hint = "for a class without ROS, write 'behavior' instead of 'class'"
-            yield item.diagnostic(CLASS_NOT_A_NODE, message, source.class_span, hint)
+            yield item.diagnostic(WRONG_CLASS, message, source.class_span, hint)
         constructor = item.constructor
         if constructor is not None and constructor.known and constructor.node is not None:
             unknown = list(_unknown_arguments(item, constructor))
@@ -114,7 +109,7 @@ def _constructor(item: ClassOfNode) -> Iterator[Diagnostic]:
         return
     for call in constructor.calls:
         if call.name == "rclpy.spin" and not call.deferred:
-            rule = as_warning(CLASS_SPINS, unless=item.is_certain(call.span))
+            rule = as_warning(UNSUPPORTED_CLASS, unless=item.is_certain(call.span))
             message = f"the constructor of '{name}' calls rclpy.spin, which never returns"
             hint = "spin in the main function of the program, or run it as an 'executable'"
             yield item.diagnostic(rule, message, call.span, hint)
@@ -127,7 +122,7 @@ def _constructor(item: ClassOfNode) -> Iterator[Diagnostic]:
                 span = span_of(function, constructor.span.file)
             case _:
                 continue
-        rule = as_warning(CLASS_CONTEXT, unless=item.is_certain(span))
+        rule = as_warning(UNSUPPORTED_CLASS, unless=item.is_certain(span))
         for keyword in keywords:
             is_passed_on = getattr(keyword.value, "id", None) in given  # it may be None
             if keyword.arg in _REFUSED and not (is_none(keyword.value) or is_passed_on):
@@ -140,7 +135,7 @@ def _second_nodes(item: ClassOfNode) -> Iterator[Diagnostic]:
     for method in item.source.methods:
         for call in method.calls:
             if call.name in _CREATORS:
-                rule = as_warning(CLASS_SECOND_NODE, unless=item.is_certain(call.span))
+                rule = as_warning(UNSUPPORTED_CLASS, unless=item.is_certain(call.span))
                 message = f"'{method.name}' of '{name}' creates a second node"
                 hint = "declare it as a node of the system, or run the program as an 'executable'"
                 yield item.diagnostic(rule, message, call.span, hint)
@@ -156,14 +151,14 @@ def _blocking_calls(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
             if call.name == "input" and not call.deferred:
                 message = f"{what} reads from the terminal"
                 hint = "run the program in a terminal of its own, outside the system"
-                yield item.diagnostic(CLASS_BLOCKS, message, call.span, hint)
+                yield item.diagnostic(BLOCKING_CALL, message, call.span, hint)
             elif others[1:] and call.name == "time.sleep" and method.name != "__init__":
                 other = next(other for other in others if other is not item.node)
                 message = f"{what} sleeps, and node '{other.name}' waits"
-                yield item.diagnostic(CLASS_BLOCKS, message, call.span, _ALONE)
+                yield item.diagnostic(BLOCKING_CALL, message, call.span, _ALONE)
             elif others and _waits_for_response(call):
                 message = f"{what} waits for a response that its only thread would have to receive"
-                yield item.diagnostic(CLASS_BLOCKS, message, call.span, _ALONE)
+                yield item.diagnostic(BLOCKING_CALL, message, call.span, _ALONE)
 
 
 def _waiting_constructor(item: ClassOfNode, system: System) -> Iterator[Diagnostic]:
@@ -178,7 +173,7 @@ def _waiting_constructor(item: ClassOfNode, system: System) -> Iterator[Diagnost
         if not call.deferred and call.name.rpartition(".")[2] in _WAITS:
             name = item.source.reference.class_name
             message = f"the constructor of '{name}' waits, maybe for a node that is not active yet"
-            yield item.diagnostic(CLASS_BLOCKS, message, call.span, _DEPENDS)
+            yield item.diagnostic(BLOCKING_CALL, message, call.span, _DEPENDS)
             return
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from composer.base.diagnostics import Diagnostic, error, info, suggestion
+from composer.base.diagnostics import Diagnostic, error, suggestion
 from composer.base.source import Located, Span
 from composer.model import Executable, ExecutableKind, LifecycleKind
 from composer.project.executables import (
@@ -18,8 +18,8 @@ from composer.project.executables import (
 )
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.earlier_errors import is_misspelled
+from composer.rules.python import NOT_INSTALLED
 
-EXECUTABLE_NOT_INSTALLED = info("RC472", "executable-not-installed")
 INVALID_EXECUTABLE = error("RC473", "invalid-executable")
 
 #: Arguments with these suffixes are files, and are looked for.
@@ -98,15 +98,11 @@ def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
             program = executable.command[0]
             is_path = "/" in program.value or is_unresolved(program.value)
             if not is_path and find_program(program.value, executable.folder, os.environ) is None:
-                yield Diagnostic(
-                    EXECUTABLE_NOT_INSTALLED, f"program '{program}' is not in PATH", program.span
-                )
+                yield Diagnostic(NOT_INSTALLED, f"program '{program}' is not in PATH", program.span)
         elif package is None or is_unresolved(package.value) or not has_ros_packages(os.environ):
             continue
         elif not has_package(package.value, os.environ):
-            yield Diagnostic(
-                EXECUTABLE_NOT_INSTALLED, f"package '{package}' is not installed", package.span
-            )
+            yield Diagnostic(NOT_INSTALLED, f"package '{package}' is not installed", package.span)
 
 
 def check_incomplete_executable(context: Context) -> Iterator[Diagnostic]:

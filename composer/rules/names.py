@@ -22,7 +22,6 @@ from composer.rules.analysis.formatting import a, free_name, safe_name
 from composer.rules.analysis.subjects import connection_subjects, namespace_subjects
 
 INVALID_NAME = error("RC221", "invalid-name")
-INVALID_NAMESPACE = error("RC222", "invalid-namespace")
 DEEP_NAMESPACE = warning("RC231", "deep-namespace")
 HIDDEN_NAME = info("RC232", "hidden-name")
 
@@ -69,7 +68,7 @@ def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
             problem = namespace_problem(namespace.value)
             inside = [node for node in system.nodes if _is_inside(node, namespace.value)]
             yield Diagnostic(
-                INVALID_NAMESPACE,
+                INVALID_NAME,
                 f"namespace '{namespace}' {problem}",
                 namespace.span,
                 subjects=tuple(namespace_subjects(inside)),
@@ -100,7 +99,7 @@ def _invalid_system_name(system: System) -> Iterator[Diagnostic]:
     if problem is not None:
         valid = safe_name(name.value)
         hint = f"rename it to '{valid}'" if valid != name.value else None
-        yield Diagnostic(INVALID_NAMESPACE, f"system name '{name}' {problem}", name.span, hint=hint)
+        yield Diagnostic(INVALID_NAME, f"system name '{name}' {problem}", name.span, hint=hint)
 
 
 def check_invalid_ros_name(context: Context) -> Iterator[Diagnostic]:

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Literal, TypeAlias
 
 from composer.base.diagnostics import (
@@ -24,24 +23,21 @@ from composer.base.diagnostics import (
 )
 from composer.interfaces import Interfaces
 from composer.model import BehaviorReference, Node
-from composer.project import Project
 from composer.python_code.checks import code_problems
-from composer.python_code.checks.imports import import_problems
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.modules import nearby_modules
 from composer.python_code.problems import Family, Problem
-from composer.python_code.syntax import Method, Module
+from composer.python_code.syntax import Method
 from composer.python_code.trees import start_span, walk
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.python_nodes import distinct_behaviors, distinct_classes
 from composer.rules.analysis.spans import class_name_hint, part_of
 from composer.rules.analysis.subjects import package_subjects
 
+CLASS_MISSING = error("RC460", "class-missing")
 UNKNOWN_IMPORT = error("RC444", "unknown-import")
-MODULE_NOT_INSTALLED = info("RC445", "module-not-installed")
-INTERNAL_IMPORT = warning("RC446", "internal-import")
+NOT_INSTALLED = info("RC445", "not-installed")
 UNDEFINED_NAME = warning("RC447", "undefined-name")
-MISSING_ATTRIBUTE = warning("RC458", "missing-attribute")
 CALL_ARGUMENTS = warning("RC452", "call-arguments")
 TYPE_ERROR = warning("RC455", "type-error")
 MISSING_SELF = error("RC449", "missing-self")
@@ -49,6 +45,7 @@ UNUSED_RESULT = warning("RC453", "unused-result")
 NOT_CHECKED = info("RC437", "not-checked")
 PYTHON_SYNTAX = error("RC441", "python-syntax")
 UNKNOWN_ATTRIBUTE = error("RC442", "unknown-attribute")
+MISSING_ATTRIBUTE = warning("RC458", "missing-attribute")
 WRONG_MESSAGE_TYPE = error("RC457", "wrong-message-type")
 MISSING_RETURN = error("RC448", "missing-return")
 MISSING_AWAIT = error("RC443", "missing-await")
@@ -139,7 +136,7 @@ def _rules() -> Mapping[str, Rule]:
 
 def check_python(context: Context) -> Iterator[Diagnostic]:
     """Report the problems of the files of behaviors and classes, each once."""
-    for source, what, problem in _import_problems(context):
+    for source, what, problem in _alternatives(context):
         yield diagnostic(problem, None, source, what, context.interfaces)
     for node, source, what in sources(context):
         for problem in code_problems(node, source, context.interfaces):
@@ -154,56 +151,47 @@ def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
         yield item.node, item.source, "class"
 
 
-def _import_problems(context: Context) -> Iterator[tuple[BehaviorSource, What, Problem]]:
-    """Yield the problems of the imports in all files."""
-    checked: set[Path] = set()
-    for _, source, what in sources(context):
-        for module in source.own_modules:
-            if module.path not in checked:
-                checked.add(module.path)
-                folder = source.reference.folder
-                for problem in import_problems(module, folder, context.interfaces):
-                    yield source, what, problem
-                for problem in _alternatives(module, context):
-                    yield source, what, problem
-
-
-def _alternatives(module: Module, context: Context) -> Iterator[Problem]:
+def _alternatives(context: Context) -> Iterator[tuple[BehaviorSource, What, Problem]]:
     """Yield the messages and other interfaces that a condition chooses at run time."""
     packages = context.interfaces.packages()
-    chosen = {
-        name
-        for name, origins in module.alternatives.items()
-        if any(origin.module.partition(".")[0] in packages for origin in origins)
+    modules = {
+        module.path: (source, what, module)
+        for _, source, what in sources(context)
+        for module in source.own_modules
     }
-    for node in walk(module.tree.body) if chosen else ():
-        if isinstance(node, ast.alias) and (node.asname or node.name) in chosen:
-            chosen.remove(node.asname or node.name)
-            message = f"'{node.asname or node.name}' is imported from several modules, so its uses"
-            span = start_span(node, len(node.name), module.source)
-            yield Problem(Family.NOT_CHECKED, f"{message} are not checked", span)
+    for source, what, module in modules.values():
+        chosen = {
+            name
+            for name, origins in module.alternatives.items()
+            if any(origin.module.partition(".")[0] in packages for origin in origins)
+        }
+        for node in walk(module.tree.body) if chosen else ():
+            if isinstance(node, ast.alias) and (node.asname or node.name) in chosen:
+                chosen.remove(node.asname or node.name)
+                name = node.asname or node.name
+                message = f"'{name}' is imported from several modules, so its uses are not checked"
+                span = start_span(node, len(node.name), module.source)
+                yield source, what, Problem(Family.NOT_CHECKED, message, span)
 
 
-def unnamed(reference: BehaviorReference, what: str, rule: Rule) -> Iterator[Diagnostic]:
+def unnamed(reference: BehaviorReference, what: str) -> Iterator[Diagnostic]:
     """Report a name that is not one of a class."""
     text = reference.text
     if not ((reference.module and reference.class_name) or is_unresolved(text.value)):
         message = f"{what} '{text}' is not 'module:Class'"
-        yield Diagnostic(rule, message, text.span, hint=class_name_hint(text.value))
+        yield Diagnostic(CLASS_MISSING, message, text.span, hint=class_name_hint(text.value))
 
 
-def missing(
-    source: BehaviorSource, module_rule: Rule, class_rule: Rule, not_installed: Rule
-) -> Iterator[Diagnostic]:
+def missing(source: BehaviorSource, not_installed: Rule) -> Iterator[Diagnostic]:
     """Report what is missing; ``not_installed`` is for modules that may exist elsewhere."""
     reference = source.reference
     module, name = reference.module, reference.class_name
     span = part_of(reference.text, 0, len(module))
     if source.problem is not None:
         if not source.broken:  # or else it is reported in the module
-            yield Diagnostic(module_rule, f"module '{module}' {source.problem}", span)
+            yield Diagnostic(CLASS_MISSING, f"module '{module}' {source.problem}", span)
     elif not source.module_found:
-        nearby = nearby_modules(module, reference.folder, Project.at(reference.folder))
+        nearby = nearby_modules(module, (reference.folder, *reference.node_folders))
         message = f"no Python module named '{module}'"
         hint = nearby.hint or (
             f"expected {module.replace('.', '/')}.py next to the YAML file, among the node types,"
@@ -211,8 +199,9 @@ def missing(
         )
         if nearby.package:
             message = f"package '{nearby.package}' has no module '{nearby.missing}'"
-        rule = module_rule if nearby.is_misspelled else not_installed
-        if rule is not module_rule:
+        is_misspelled = nearby.package or ("." not in module and nearby.similar)
+        rule = CLASS_MISSING if is_misspelled else not_installed
+        if rule is not CLASS_MISSING:
             message = (
                 f"module '{module}' is not found on this computer, so its class is not checked"
             )
@@ -220,4 +209,4 @@ def missing(
     elif not source.class_found:
         message = f"module '{module}' has no class '{name}'"
         span = part_of(reference.text, len(module) + 1, len(name))
-        yield Diagnostic(class_rule, message, span, hint=suggestion(name, source.class_names))
+        yield Diagnostic(CLASS_MISSING, message, span, hint=suggestion(name, source.class_names))

@@ -13,8 +13,7 @@ from composer.rules.analysis.formatting import number, port_name
 from composer.rules.analysis.rates import rates, timed_publishers
 
 QOS_DURATION_TOO_SHORT = warning("RC312", "qos-duration-too-short")
-UNSUITED_DEPTH = info("RC314", "unsuited-depth")
-UNSUITED_RELIABILITY = info("RC316", "unsuited-reliability")
+UNSUITED_QOS = info("RC314", "unsuited-qos")
 
 
 def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
@@ -72,7 +71,7 @@ def check_shallow_queue(context: Context) -> Iterator[Diagnostic]:
             rate_hz = known.topic_hz(port.full_name) if _is_shallow(port.qos.profile) else None
             if rate_hz is not None and rate_hz >= FAST_HZ:
                 yield Diagnostic(
-                    UNSUITED_DEPTH,
+                    UNSUITED_QOS,
                     f"reliable topic '{port.full_name}' at {number(rate_hz)} Hz "
                     "has a queue depth of 1",
                     port.qos.policy_span("depth"),
@@ -98,7 +97,7 @@ def check_keep_all(context: Context) -> Iterator[Diagnostic]:
                 continue
             if qos.profile.history is History.KEEP_ALL:
                 yield Diagnostic(
-                    UNSUITED_DEPTH,
+                    UNSUITED_QOS,
                     "'keep_all' lets queues grow without limit",
                     qos.policy_span("history"),
                     hint="use 'keep_last' with a depth",
@@ -141,7 +140,7 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
     else:
         hint = "use 'qos: sensor_data'"
     return Diagnostic(
-        UNSUITED_RELIABILITY,
+        UNSUITED_QOS,
         f"sensor data on '{port.full_name}' at {number(rate_hz)} Hz uses reliable QoS",
         port.qos.policy_span("reliability"),
         tuple(
@@ -164,7 +163,7 @@ def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:
                 continue
             if _COMMAND.search(port.full_name):
                 yield Diagnostic(
-                    UNSUITED_RELIABILITY,
+                    UNSUITED_QOS,
                     f"'{port.full_name}' carries commands, but is best effort and may lose them",
                     port.qos.policy_span("reliability"),
                     hint="use 'qos: command'",
@@ -181,7 +180,7 @@ def check_unreliable_state(context: Context) -> Iterator[Diagnostic]:
             qos = port.qos
             if port.kind.channel is ChannelKind.TOPIC and qos.known and _is_lost(qos.profile):
                 yield Diagnostic(
-                    UNSUITED_RELIABILITY,
+                    UNSUITED_QOS,
                     "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
                     qos.policy_span("reliability"),
                     hint="use 'reliable' or 'volatile', unless an external node requires both",

@@ -16,7 +16,7 @@ from composer.rules.references import UNDECLARED_NAME
 
 TIMER_PERIOD = error("RC411", "timer-period")
 UNUSUAL_RATE = info("RC412", "unusual-rate")
-PERIOD_UNIT = warning("RC535", "period-unit")
+UNLIKELY_UNIT = warning("RC533", "unlikely-unit")
 
 
 def check_unknown_timer(context: Context) -> Iterator[Diagnostic]:
@@ -99,7 +99,7 @@ def check_period_unit(context: Context) -> Iterator[Diagnostic]:
             if parameter is None or unit in (None, _EXPECTED_UNITS[period.unit]):
                 continue
             yield Diagnostic(
-                PERIOD_UNIT,
+                UNLIKELY_UNIT,
                 f"'{period.unit}' of timer '{timer.name}' is parameter '{parameter.name}', "
                 f"which is in {unit}",
                 period.span,

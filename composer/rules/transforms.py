@@ -23,12 +23,12 @@ from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.expressions import message_templates
 from composer.rules.analysis.formatting import number
 from composer.rules.analysis.frames import BROADCAST, FrameUse, place, uses_of_behaviors
+from composer.rules.timers import UNLIKELY_UNIT
 
 FRAME_ID_SLASH = warning("RC309", "frame-id-slash")
 TRANSFORM_SOURCE = error("RC515", "transform-source")
 INVALID_QUATERNION = error("RC516", "invalid-quaternion")
 UNDECLARED_TRANSFORM = error("RC517", "undeclared-transform")
-ROTATION_UNIT = warning("RC533", "rotation-unit")
 
 _SUBSCRIPTION = PortKind.SUBSCRIPTION
 
@@ -163,7 +163,7 @@ def check_rotation_unit(context: Context) -> Iterator[Diagnostic]:
             for angle in static.angles_rad:
                 if abs(angle.value) > _FULL_TURN * _TOLERANCE:
                     yield Diagnostic(
-                        ROTATION_UNIT,
+                        UNLIKELY_UNIT,
                         f"{number(angle.value)} rad is more than a full turn",
                         angle.span,
                         hint="write degrees in 'rotation_deg'",

@@ -25,8 +25,6 @@ from composer.rules.python import diagnostic, sources
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.
 _Use: TypeAlias = tuple[object, ...]
-#: Rules about imports; their texts have the names that may have been meant.
-_ABOUT_IMPORTS = frozenset({"unknown-import", "module-not-installed"})
 #: Rules about the arguments of a function: names in it, and calls of it, follow from theirs.
 _ABOUT_SIGNATURES = frozenset({"handler-signature", "missing-self"})
 
@@ -96,8 +94,6 @@ def _follows(
         errors = context.once(earlier_errors)
         if not node.complete or node.name.value in errors.nodes:
             return True  # the port may be declared where the file is wrong
-    if _is_meant(problem, reported):
-        return True
     if problem.family is Family.ARGUMENTS and any(
         item.rule.name in _ABOUT_SIGNATURES
         and (problem.span.text.endswith(item.primary.text) or item.primary.text in problem.message)
@@ -108,31 +104,16 @@ def _follows(
 
 
 def _has_reported(item: Diagnostic, problem: Problem) -> bool:
-    """Return whether a rule has reported the same place."""
+    """Return whether a rule has reported the same place, or the signature of its function."""
+    if item.rule.name in _ABOUT_SIGNATURES and _is_within_function(problem.span, item.primary):
+        return True
     start = problem.span.column - item.primary.column
     return problem.span.is_on_line_of(item.primary) and 0 <= start < item.primary.length
 
 
-def _is_meant(problem: Problem, reported: Sequence[Diagnostic]) -> bool:
-    """Return whether a problem is there because of a wrong import or signature."""
-    name = f"'{problem.span.text}'"
-    for item in reported:
-        if item.primary.file.path != problem.span.file.path:
-            continue
-        is_import = item.rule.name in _ABOUT_IMPORTS and problem.family is Family.NAME
-        # A class that is not imported may be the one that was meant.
-        is_class = name[1].isupper() and item.rule.name == "unknown-import"
-        if is_import and (is_class or name in f"{item.message} {item.hint}"):
-            return True
-        is_signature = item.rule.name in _ABOUT_SIGNATURES
-        if is_signature and _is_within_function(problem.span, item.primary):
-            return True
-    return False
-
-
 def _is_within_function(span: Span, signature: Span) -> bool:
     """Return whether a place is in the function whose signature is at another one."""
-    if span.line < signature.line:
+    if span.file.path != signature.file.path or span.line < signature.line:
         return False
     lines = span.file.lines[signature.line : span.line]
     depth = _indentation(span.file.line(signature.line))

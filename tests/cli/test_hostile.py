@@ -146,7 +146,7 @@ nodes:
     result = validate(tmp_path, ".")
     assert result.code == 1
     assert sorted(result.rules) == [
-        "behavior-module-missing",
+        "class-missing",
         "unknown-interface",
         "unknown-node-type",
     ]
@@ -168,7 +168,7 @@ def test_links_out_of_the_project_are_not_followed(tmp_path: Path) -> None:
     result = validate(project, ".")
     assert result.code == 1
     assert sorted(result.rules) == [
-        "behavior-module-missing",
+        "class-missing",
         "unknown-node-type",
         "unreadable-file",
         "unreadable-file",

@@ -112,7 +112,7 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
     assert "--set:2 unknown-parameter" in found
     assert "--set:3 unknown-node" in found
     assert "--set:4 invalid-override" in found
-    assert "--namespace:1 invalid-namespace" in found
+    assert "--namespace:1 invalid-name" in found
 
 
 def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None:
@@ -168,6 +168,6 @@ def test_text_from_elsewhere_belongs_to_a_folder(tmp_path: Path, interfaces: Int
 def test_a_node_type_is_checked_alone(tmp_path: Path, interfaces: Interfaces) -> None:
     path = write(tmp_path, "node: camera\nbehavior: camera:Camera\n", "nodes/camera.yaml")
     loading = load(path, shown="camera.yaml", interfaces=interfaces)
-    assert errors(loading) == ["camera.yaml:2 behavior-module-missing"]
+    assert errors(loading) == ["camera.yaml:2 class-missing"]
     (tmp_path / "nodes" / "camera.py").write_text("class Camera: ...\n")
     assert errors(load(path, interfaces=interfaces)) == []

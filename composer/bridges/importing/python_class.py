@@ -94,7 +94,7 @@ def _check(source: BehaviorSource, text: str, folder: Path) -> None:
     if not source.module_found:
         raise ClassNotFound(
             f"no Python module named '{module}'",
-            nearby_modules(module, folder, Project.at(folder)).hint
+            nearby_modules(module, (folder, *Project.at(folder).node_folders)).hint
             or "it is searched for in this folder, among the node types, and on Python's path",
         )
     if not source.class_found:

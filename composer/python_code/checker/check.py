@@ -61,10 +61,11 @@ class Check:
             problem = reader.problem()
             keys = {(finding.path, about) for about in reader.about}
             if problem is not None:
-                keys.add((finding.path, problem.message))
+                if finding.kind != "missing-import":  # all places of one are shown together
+                    keys.add((finding.path, problem.message))
                 if seen.isdisjoint(keys):
                     found.append((finding.path, problem))
-            seen |= keys
+            seen |= keys | {(finding.path, about) for about in reader.follow_ups}
         return found
 
     def _syntax_problems(self, refused: set[str]) -> Iterator[tuple[str, Problem]]:

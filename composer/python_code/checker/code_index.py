@@ -9,7 +9,14 @@ from typing import TypeVar
 
 from composer.base.source import Span
 from composer.python_code.syntax import Module
-from composer.python_code.trees import Function, catches, dotted, positional_arguments, span_of
+from composer.python_code.trees import (
+    Function,
+    catches,
+    dotted,
+    positional_arguments,
+    span_of,
+    walk,
+)
 
 _Statement = TypeVar("_Statement", bound=ast.stmt)
 #: What code raises that uses a value of a wrong type.
@@ -64,6 +71,12 @@ class CodeIndex:
         """Names of which ``hasattr`` asks for an attribute."""
         tests = (call for call in self._calls if dotted(call.func) == "hasattr" and call.args)
         return frozenset(dotted(call.args[0]) for call in tests)
+
+    def import_at(self, line: int) -> ast.Import | ast.ImportFrom | None:
+        """Return the import in a line; None in a ``try`` or the like, where it may fail."""
+        always = walk(self.module.tree.body, closed=(ast.If, ast.Match, ast.Try, ast.With))
+        imports = (node for node in always if isinstance(node, ast.Import | ast.ImportFrom))
+        return next((node for node in imports if _holds(node, line)), None)
 
     def expression_at(self, span: Span) -> ast.expr | None:
         """Return the outermost expression at a place."""

@@ -16,6 +16,7 @@ from composer.base.diagnostics import nearest, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.python_code.checker.code_index import CodeIndex
+from composer.python_code.checker.imports import Imports
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.checker.relevance import Relevance, unguarded_value
@@ -103,8 +104,10 @@ class Reader:
     relevance: Relevance
     owners: Owners
     span: Span
-    #: What is wrong: further problems with the same name, type or call follow from this one.
+    #: What is wrong: of several problems with the same name, type or call, the first is reported.
     about: list[str] = field(default_factory=list)
+    #: What further problems are about that follow from this one.
+    follow_ups: list[str] = field(default_factory=list)
 
     @property
     def _is_class(self) -> bool:
@@ -132,6 +135,33 @@ class Reader:
 
     def _is_about_call(self, called: str) -> None:
         self.about.append(f"line {self.span.line} {called}")
+
+    def _import(self) -> Problem | None:
+        node = self.code.import_at(self.span.line)
+        if node is None:
+            return None
+        imports = Imports(self.code.module, self.source, self.owners.interfaces)
+        found = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
+        wanted = found["imported"] if found is not None else node.names[0].name
+        if isinstance(node, ast.Import):
+            failed = imports.missing_module(self.span.text.split()[0], "")
+        else:
+            module = "." * node.level + (node.module or "")
+            missing = imports.missing_module if found is None else imports.missing_name
+            failed = missing(module, wanted)
+        if failed is None:
+            return None
+        self._is_meant(failed.part)
+        place = re.search(rf"\b{re.escape(failed.part)}\b", self.span.text)
+        self.span = self.span.part(place.start() if place else 0, len(failed.part))
+        return Problem(failed.family, failed.message, self.span, failed.hint, failed.is_certain)
+
+    def _is_meant(self, name: str) -> None:
+        """Leave out the names that follow from a misspelled import."""
+        meant = {x for x in self.code.names if _is_near(x, name)}
+        if name[:1].isupper():  # another class may have been meant
+            meant |= {x for x in self.code.names if x[:1].isupper()}
+        self.follow_ups += [f"name {x}" for x in meant]
 
     def _attribute(self) -> Problem | None:
         in_module = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
@@ -182,20 +212,20 @@ class Reader:
         name, module = found["name"] or found["imported"], found["module"]
         top = module.partition(".")[0]
         is_standard = top in sys.stdlib_module_names
-        own = {item.path.stem for item in self.source.own_modules}
-        is_interface = top in self.owners.interfaces.packages()
+        is_known = is_standard or top in _COMPLETE_MODULES
+        if found["imported"] and not is_known:
+            return self._import()
         if found["imported"]:
-            self.about += [f"name {other}" for other in self.code.names if _is_near(other, name)]
-            if is_interface or module in own:
-                return None  # the composer checks these imports, and knows where such a name is
-        if not (is_standard or is_interface or top in _COMPLETE_MODULES or module in own):
+            self._is_meant(name)
+        own = {item.path.stem for item in self.source.own_modules}
+        if not (is_known or top in self.owners.interfaces.packages() or module in own):
             return None  # part of it may be compiled
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
-        names = dir(sys.modules[module]) if is_standard and module in sys.modules else ()
+        is_loaded = module in sys.modules and (is_standard or top == "composer")
+        names = dir(sys.modules[module]) if is_loaded else ()
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
-        is_import = bool(found["imported"]) and is_standard
-        family = Family.IMPORT if is_import else Family.ATTRIBUTE
+        family = Family.IMPORT if found["imported"] else Family.ATTRIBUTE
         return self._made(family, f"module '{module}' has no '{name}'", hint)
 
     def _argument(self) -> Problem | None:
@@ -348,6 +378,7 @@ _READERS = {
     "bad-function-definition": Reader._missing_self,
     "bad-return": Reader._return,
     "missing-attribute": Reader._attribute,
+    "missing-import": Reader._import,
     "missing-module-attribute": Reader._attribute,
     "unexpected-keyword": Reader._keyword,
     "unknown-name": Reader._name,

@@ -23,7 +23,7 @@ _CERTAIN_KINDS = frozenset(
     | {"not-callable", "unexpected-keyword", "unknown-name", "unused-coroutine"}
 )
 #: Kinds that are kept in any code.
-_ALWAYS = frozenset({"invalid-syntax", "missing-module-attribute", "parse-error"})
+_ALWAYS = frozenset({"invalid-syntax", "missing-import", "missing-module-attribute", "parse-error"})
 #: Kinds that are kept in classes if they are about a type of ROS.
 _KINDS_ABOUT_TYPES = frozenset(
     {"bad-argument-type", "bad-index", "not-async", "not-iterable", "unsupported-operation"}

@@ -2,53 +2,42 @@
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
-from composer.interfaces import Interfaces
-from composer.python_code.checks.imports import import_problems
-from composer.python_code.problems import Family
-from composer.python_code.syntax import read_module
+from composer.base.diagnostics import Diagnostic
+from composer.loading import load
 
-
-@cache
-def interfaces() -> Interfaces:
-    return Interfaces.load()
-
-
-HELPERS = {
+FILES = {
     "motor.py": "SPEED = 1\n\n\ndef start(): ...\n",
     "arms/__init__.py": "LEFT = 1\n",
     "arms/grip.py": "",
+    #: A package may have interfaces and modules.
+    "std_srvs/__init__.py": "",
+    "fast/__init__.py": "",
+    "fast/core.pyx": "",
+    "fast/solver.py": "",
+    "system.yaml": (
+        "system: a\nnodes: {n: {behavior: 'code:Robot', timers: {tick: {period_ms: 100}}}}\n"
+    ),
 }
-#: A package may have interfaces and modules.
-INTERFACES = {"std_srvs/__init__.py": ""}
-COMPILED = {"fast/__init__.py": "", "fast/core.pyx": "", "fast/solver.py": ""}
-
-
-def found(code: str, folder: Path) -> list[tuple[Family, str, str | None]]:
-    for name, text in {**HELPERS, **COMPILED, **INTERFACES, "code.py": code}.items():
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
-    module = read_module(folder / "code.py", "code.py")
-    problems = import_problems(module, folder, interfaces())
-    return [(item.family, item.span.text, item.hint) for item in problems]
-
-
+BEHAVIOR = "class Robot:\n    def on_tick(self): ...\n"
+NOT_INSTALLED = "install it, or correct the name"
+#: Statements, the text that is underlined and the hint.
 FAIL = [
     ("import nmpy", "nmpy", "did you mean 'numpy'?"),
     ("import moter", "moter", "did you mean 'motor'?"),
     ("import os.pth", "pth", None),
     ("import xml.etre", "etre", None),
     ("import arms.grp", "grp", "did you mean 'grip'?"),
-    ("from .moter import SPEED", "moter", "did you mean 'motor'?"),
-    ("from . import moter", "moter", "did you mean 'motor'?"),
+    ("from .mottor import SPEED", "mottor", "did you mean 'motor'?"),
+    ("from . import motr", "motr", "did you mean 'motor'?"),
     ("from arms import LEFTT", "LEFTT", "did you mean 'LEFT'?"),
     ("import sensr_msg.msg", "sensr_msg", "did you mean 'sensor_msgs'?"),
     ("from motor import SPED", "SPED", "did you mean 'SPEED'?"),
-    ("from .motor import SPED", "SPED", "did you mean 'SPEED'?"),
+    ("from .motor import SPEDE", "SPEDE", "did you mean 'SPEED'?"),
     ("from std_msgs.mgs import String", "mgs", "did you mean 'msg'?"),
     ("from std_msgs.msg import Strin", "Strin", "did you mean 'String'?"),
     ("from std_msgs.msg import Twist", "Twist", "import it from 'geometry_msgs.msg'"),
@@ -59,68 +48,112 @@ FAIL = [
     ("import rclpy.qso", "qso", "did you mean 'qos'?"),
     ("from composer.behavor import Goal", "behavor", "did you mean 'behavior'?"),
 ]  # fmt: skip
+ELSEWHERE = [
+    ("import fastkalman", "fastkalman", NOT_INSTALLED),
+    ("from mars_msgs.msg import Crater", "mars_msgs", NOT_INSTALLED),
+    ("import bson", "bson", NOT_INSTALLED),
+    ("import ntplib", "ntplib", NOT_INSTALLED),
+    ("import cma", "cma", NOT_INSTALLED),
+    ("import arms.gripper", "gripper", NOT_INSTALLED),
+    ("from . import generated", "generated", NOT_INSTALLED),
+    ("from arms import made", "made", NOT_INSTALLED),
+    ("from .written import parameters", "written", NOT_INSTALLED),
+    ("import maths", "maths", NOT_INSTALLED),
+]
+SUCCEED = """\
+from std_srvs.srv import Trigger
+import std_srvs.srv
+from fast import solvr, other
+import fast.slver
+from composer.typed import DriverBehavior
+import math, os.path, collections.abc, xml.etree, motor, arms
+from motor import SPEED, start
+from . import motor
+from .motor import start
+from arms import LEFT, __doc__
+import rclpy, numpy.linalg, tf2_ros
+import rclpy.action.client
+from std_srvs.srv import Trigger, Trigger_Request
+from std_msgs.msg import *
+from composer.behavior import Goal, Changes
+from contextlib import suppress
+from typing import TYPE_CHECKING
+try:
+    import quick
+except ImportError:
+    quick = None
+with suppress(ImportError):
+    import quick
+if TYPE_CHECKING:
+    import quick
+if os.environ.get('OLD'):
+    from motor import SPED
+else:
+    import quick
+"""
 
 
-@pytest.mark.parametrize(("code", "text", "hint"), FAIL)
-def test_imports_that_fail(code: str, text: str, hint: str | None, tmp_path: Path) -> None:
-    assert found(code, tmp_path) == [(Family.IMPORT, text, hint)]
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> Mapping[tuple[str, int], Diagnostic]:
+    """Return what is reported about imports, by file and line; one check reads all files."""
+    folder = tmp_path_factory.mktemp("imports")
+    codes = {
+        "fails": "\n".join(code for code, *_ in FAIL),
+        "elsewhere": "\n".join(code for code, *_ in ELSEWHERE),
+        "succeeds": SUCCEED,
+        "searching": "import sys\nsys.path.insert(0, '/opt/tools')\nimport meter\n",
+        "loading": "import importlib\nimportlib.import_module('a')\nimport motoor\n",
+        "internal": "from composer.model.names import join\n",
+    }
+    imports = "".join(f"import {name}\n" for name in codes)
+    files = {**FILES, "code.py": imports + BEHAVIOR}
+    for name, text in {**files, **{f"{name}.py": code for name, code in codes.items()}}.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    diagnostics = load(folder / "system.yaml").diagnostics
+    return {(Path(x.primary.file.path).stem, x.primary.line): x for x in diagnostics}
 
 
 @pytest.mark.parametrize(
-    "code",
-    [
-        "import fastkalman",
-        "from mars_msgs.msg import Crater",
-        "import bson",
-        "import ntplib",
-        "import cma",
-        "import arms.gripper",
-        "from . import generated",
-        "from arms import generated",
-        "from .generated import parameters",
-        "import sys\nsys.path.insert(0, '/opt/tools')\nimport meter",
-        "import importlib\nimportlib.import_module('a')\nimport moter",
-    ],
+    ("file", "line", "rule", "case"),
+    [("fails", line, "unknown-import", case) for line, case in enumerate(FAIL, 1)]
+    + [("elsewhere", line, "not-installed", x) for line, x in enumerate(ELSEWHERE, 1)],
 )
-def test_modules_that_may_be_elsewhere(code: str, tmp_path: Path) -> None:
-    [(family, _, hint)] = found(code, tmp_path)
-    assert family is Family.NOT_INSTALLED
-    assert "did you mean" not in str(hint)
-
-
-def test_a_module_like_one_of_the_standard_library(tmp_path: Path) -> None:
-    hint = "did you mean 'math'?"
-    assert found("import maths", tmp_path) == [(Family.NOT_INSTALLED, "maths", hint)]
-
-
-def test_an_internal_module(tmp_path: Path) -> None:
-    [(family, text, _)] = found("from composer.model.names import join", tmp_path)
-    assert (family, text) == (Family.INTERNAL, "composer.model")
+def test_imports_that_fail(
+    file: str,
+    line: int,
+    rule: str,
+    case: tuple[str, str, str | None],
+    reported: Mapping[tuple[str, int], Diagnostic],
+) -> None:
+    code, text, hint = case
+    item = reported[file, line]
+    assert (item.rule.name, item.primary.text, item.hint) == (rule, text, hint), code
 
 
 @pytest.mark.parametrize(
-    "code",
+    ("place", "rule", "text"),
     [
-        "from std_srvs.srv import Trigger\nimport std_srvs.srv",
-        "from fast import solvr, other",
-        "import fast.slver",
-        "from composer.typed import Driver",
-        "import math, os.path, collections.abc, xml.etree, motor, arms",
-        "from motor import SPEED, start",
-        "from . import motor",
-        "from .motor import start",
-        "from arms import LEFT, __doc__",
-        "import rclpy, numpy.linalg, tf2_ros",
-        "from rclpy import init, qos, shutdwn\nimport rclpy.action.client",  # names: type checker
-        "from std_srvs.srv import Trigger, Trigger_Request",
-        "from std_msgs.msg import *",
-        "from composer.behavior import Goal, Changes",
-        "from composer.typed import DriverBehavior",
-        "try:\n    import quick\nexcept ImportError:\n    quick = None",
-        "from contextlib import suppress\nwith suppress(ImportError):\n    import quick",
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import quick",
-        "import os\nif os.environ.get('OLD'):\n    from motor import SPED\nelse:\n    import quick",
+        (("searching", 3), "not-installed", "meter"),
+        (("loading", 3), "not-installed", "motoor"),
+        (("internal", 1), "unknown-import", "composer.model.names"),
     ],
 )
-def test_imports_that_succeed_or_need_not(code: str, tmp_path: Path) -> None:
-    assert found(code, tmp_path) == []
+def test_modules_that_are_found_at_run_time_or_are_not_public(
+    place: tuple[str, int],
+    rule: str,
+    text: str,
+    reported: Mapping[tuple[str, int], Diagnostic],
+) -> None:
+    assert (reported[place].rule.name, reported[place].primary.text) == (rule, text)
+    assert "did you mean" not in str(reported[place].hint)
+
+
+def test_imports_that_succeed_or_need_not(
+    reported: Mapping[tuple[str, int], Diagnostic],
+) -> None:
+    rules = {"unknown-import", "not-installed"}
+    assert [
+        x for (file, _), x in reported.items() if file == "succeeds" and x.rule.name in rules
+    ] == []
+    assert ("code", 1) not in reported

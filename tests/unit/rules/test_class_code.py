@@ -424,28 +424,28 @@ PUBLISHED = (
     ("line", "rule"),
     [
         ("parameters: {offset: {type: double, default: 1.0}}", None),
-        ("parameters: {offset: {type: integer, default: 1}}", "class-parameter-type"),
+        ("parameters: {offset: {type: integer, default: 1}}", "class-parameter"),
         ("parameters: {gains: {type: double_array, default: [1.0]}}", None),
-        ("parameters: {gains: {type: double, default: 1.0}}", "class-parameter-type"),
+        ("parameters: {gains: {type: double, default: 1.0}}", "class-parameter"),
         ("parameters: {any: {type: string, default: a}}", None),
         ("parameters: {arm.length: {type: double, default: 1.0}}", None),
         ("parameters: {length: {type: double, default: 1.0}}", "class-parameter"),
         ("parameters: {use_sim_time: {type: bool, default: true}}", None),
         ("publishers: {text: {type: std_msgs/msg/String, topic: ~/text, external: true}}", None),
         ("publishers: {text: {type: std_msgs/msg/Int32, topic: ~/text, external: true}}",
-         "class-port-type"),
+         "class-port"),
         ("publishers: {text: {type: std_msgs/msg/Int32, topic: text, external: true}}", None),
         (PUBLISHED % "command", None),
         (PUBLISHED % "{extends: command, lifespan_ms: 100}", None),
         (PUBLISHED % "{extends: command, depth: 1}", None),
-        (PUBLISHED % "{extends: command, deadline_ms: 100}", "class-port-qos"),
-        (PUBLISHED % "state", "class-port-qos"),
+        (PUBLISHED % "{extends: command, deadline_ms: 100}", "class-port"),
+        (PUBLISHED % "state", "class-port"),
         ("subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}",
          None),
         ("subscriptions: {scan: {type: std_msgs/msg/String, qos: command, external: true}}",
-         "class-port-qos"),
+         "class-port"),
         ("subscriptions: {fast: {type: std_msgs/msg/String, qos: state, external: true}}",
-         "class-port-qos"),
+         "class-port"),
         ("subscriptions: {any: {type: std_msgs/msg/String, qos: state, external: true}}", None),
     ],
 )  # fmt: skip
@@ -454,7 +454,7 @@ def test_parameters_and_ports_agree_with_the_class(
 ) -> None:
     (tmp_path / "declaring.py").write_text(DECLARING, encoding="utf-8")
     system = f"system: a\nnodes:\n  n:\n    class: declaring:Declaring\n    {line}\n"
-    rules = {"class-parameter", "class-parameter-type", "class-port-qos", "class-port-type"}
+    rules = {"class-parameter", "class-port"}
     found = [item.rule.name for item in diagnostics_in(system, tmp_path)]
     assert [name for name in found if name in rules] == ([rule] if rule is not None else [])
 
@@ -474,7 +474,7 @@ def test_another_qos_is_a_warning_if_another_end_does_not_match(
     )
     code = DECLARING.replace('"~/text"', '"/text"')
     (tmp_path / "declaring.py").write_text(code, encoding="utf-8")
-    found = [item for item in diagnostics_in(system, tmp_path) if item.rule.code == "RC493"]
+    found = [item for item in diagnostics_in(system, tmp_path) if item.rule.code == "RC487"]
     assert [item.rule.severity for item in found] == [severity]
 
 
@@ -488,23 +488,23 @@ class Robot(Node):
         {init}
 """
 REFUSED = [
-    ('super().__init__("r", cli_args=["-r"])', "class-context", Severity.ERROR),
+    ('super().__init__("r", cli_args=["-r"])', "unsupported-class", Severity.ERROR),
     ('super().__init__("r", cli_args=cli_args)', None, None),
     ('super().__init__("r", cli_args=None)', None, None),
-    ('super().__init__("r")\n        rclpy.spin(self)', "class-spins", Severity.ERROR),
+    ('super().__init__("r")\n        rclpy.spin(self)', "unsupported-class", Severity.ERROR),
     (
         'super().__init__("r")\n        if spins:\n            rclpy.spin(self)',
-        "class-spins",
+        "unsupported-class",
         Severity.WARNING,
     ),
     (
         'super().__init__("r")\n        self.x = rclpy.create_node("x")',
-        "class-second-node",
+        "unsupported-class",
         Severity.ERROR,
     ),
     (
         'super().__init__("r")\n        self.x = spins and rclpy.create_node("x")',
-        "class-second-node",
+        "unsupported-class",
         Severity.WARNING,
     ),
 ]

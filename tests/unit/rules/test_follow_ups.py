@@ -274,7 +274,7 @@ MISTAKES = {
             "qos: command}}}",
             above="namespace: a-b",
         ),
-        ["invalid-namespace"],
+        ["invalid-name"],
     ),
     "a variable of copies that is unknown does not make their names equal": (
         system(

@@ -59,12 +59,12 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     ),
     "a behavior with a dot instead of a colon": (
         "system: demo\nnodes: {n: {behavior: lift.Lift}}\n",
-        "behavior-class-missing",
+        "class-missing",
         ["did you mean 'lift:Lift'?"],
     ),
     "a behavior without a class": (
         "system: demo\nnodes: {n: {behavior: 'lift:'}}\n",
-        "behavior-class-missing",
+        "class-missing",
         ["write 'module:Class'"],
     ),
     "threads of an executor that has one": (
@@ -86,17 +86,17 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     "sensor data with a reliable subscription": (
         f"{LIDAR.replace(', external: true', '')}  map:\n"
         f"    subscriptions: {{scan: {{{SCAN}, topic: /scan, qos: command, log: x}}}}\n",
-        "unsuited-reliability",
+        "unsuited-qos",
         ["use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"],
     ),
     "sensor data for external nodes": (
         LIDAR,
-        "unsuited-reliability",
+        "unsuited-qos",
         ["let subscriptions use 'qos: sensor_data'; a reliable publisher serves them too"],
     ),
     "joint states, which consumers request reliably": (
         LIDAR.replace("LaserScan", "JointState"),
-        "unsuited-reliability",
+        "unsuited-qos",
         [],
     ),
     "a variable of an include with for_each": (
@@ -122,7 +122,7 @@ def test_hint(tmp_path: Path, text: str, rule: str, hints: list[str | None]) -> 
 def test_reliable_subscriptions_are_labeled(tmp_path: Path) -> None:
     text = HINTS["sensor data with a reliable subscription"][0]
     [diagnostic] = [
-        item for item in diagnostics_in(text, tmp_path) if item.rule.name == "unsuited-reliability"
+        item for item in diagnostics_in(text, tmp_path) if item.rule.name == "unsuited-qos"
     ]
     assert [(label.message, label.span.line) for label in diagnostic.related] == [
         ("'map.scan' requests it", 7)

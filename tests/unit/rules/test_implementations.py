@@ -46,13 +46,13 @@ def folder(tmp_path: Path) -> Path:
         ),
         (
             "pytst.node:Camera",
-            "class-not-installed",
+            "not-installed",
             "module 'pytst.node' is not found on this computer, so its class is not checked",
             "did you mean 'pytest'?",
         ),
         (
             "zzz.node:Camera",
-            "class-not-installed",
+            "not-installed",
             "module 'zzz.node' is not found on this computer, so its class is not checked",
             "expected zzz/node.py next to the YAML file, among the node types, or on Python's"
             " module search path",
@@ -98,4 +98,4 @@ def test_missing_packages_are_reported_where_ros_is_installed(
     assert rules_broken(text, tmp_path) == []
 
     (tmp_path / "share/ament_index/resource_index/packages").mkdir(parents=True)
-    assert rules_broken(text, tmp_path) == ["executable-not-installed"]
+    assert rules_broken(text, tmp_path) == ["not-installed"]

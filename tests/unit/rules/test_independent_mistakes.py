@@ -52,7 +52,7 @@ INDEPENDENT = {
             LISTENER.replace("type", "topic: /a/chatter, type"),
             UNHEARD,
         ),
-        ["invalid-namespace", "subscription-without-publisher"],
+        ["invalid-name", "subscription-without-publisher"],
     ),
     "the best effort commands of another node": (
         system(
@@ -64,7 +64,7 @@ INDEPENDENT = {
             "external: true}}}",
             connections=("{topic: /a, from: program.out, to: reader.in, qos: command}",),
         ),
-        ["outside-qos", "unsuited-reliability"],
+        ["outside-qos", "unsuited-qos"],
     ),
     "an executor that other processes share": (
         system(

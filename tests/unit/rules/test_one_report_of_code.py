@@ -177,11 +177,11 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
     ),
     "a service that annotates a message": (
         {"system.yaml": ECHO_BY_CODE.replace("String", "Empty"), "code.py": EMPTY},
-        [("handler-annotation", "code.py", 5)],
+        [("handler-signature", "code.py", 5)],
     ),
     "a port that a class and a connection name otherwise": (
         {"system.yaml": CLASS_PORT, "talker.py": TALKER},
-        [("class-port-missing", "system.yaml", 5)],
+        [("class-port", "system.yaml", 5)],
     ),
     "a transition of a class without its argument": (
         {"system.yaml": "system: a\nnodes:\n  n: {class: 'meter:Meter'}\n", "meter.py": METER},
@@ -192,7 +192,7 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
             "system.yaml": "system: a\nnodes:\n  n: {behavior: 'meter:Meter'}\n",
             "meter.py": METER.replace("(self):", "(self, state):"),
         },
-        [("node-as-behavior", "system.yaml", 3)],
+        [("wrong-class", "system.yaml", 3)],
     ),
     "an import whose name was to be another one": (
         {"system.yaml": HELPER, "code.py": IMPORTED % "CallFailed"},

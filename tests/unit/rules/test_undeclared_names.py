@@ -28,7 +28,7 @@ def reported(node: str, folder: Path, above: str = "") -> list[tuple[str, str]]:
         ("external: true, remappings: {joint_states: /arm/joint_states}", []),
         (
             "class: 'zzz:Arm', remappings: {chatter: news, 'rosservice://arm/go': go}",
-            [("info", "class-not-installed")],
+            [("info", "not-installed")],
         ),
         (f"{PROGRAM}, {WORDS}, remappings: {{chatter: news}}", []),
         (f"{PROGRAM}, remappings: {{'lidar:scan': a, 'rostopic://~/b': b}}", []),
@@ -128,7 +128,7 @@ def test_parameter_files(
         ),
         # PX4's QoS: described for a program, chosen for a node of the system.
         (f"{PROGRAM}, {WORDS.replace('command', PX4)}", []),
-        (WORDS.replace("command", PX4), [("info", "unsuited-reliability")]),
+        (WORDS.replace("command", PX4), [("info", "unsuited-qos")]),
     ],
 )
 def test_names_and_qos(node: str, expected: list[tuple[str, str]], tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ class Arm(Node):
     ("values", "expected"),
     [
         ("{rate_hz: 2.5, of_another_node: 1}", []),
-        ("{rate_hz: 2}", [("error", "class-parameter-type")]),
+        ("{rate_hz: 2}", [("error", "class-parameter")]),
         ("{rat_hz: 2.5}", [("warning", "class-parameter")]),
     ],
 )

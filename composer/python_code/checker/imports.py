@@ -1,0 +1,152 @@
+"""Imports that fail: whether a name is misspelled, or a module is only missing on this computer."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from composer.base.diagnostics import suggestion
+from composer.base.fast_dataclass import dataclass
+from composer.base.spelling import edit_distance
+from composer.interfaces import Interfaces
+from composer.interfaces.sources import FOLDERS
+from composer.project import Project
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.modules import is_compiled, module_below, module_file, nearby_modules
+from composer.python_code.problems import Family
+from composer.python_code.stubs.folder import LIBRARIES
+from composer.python_code.syntax import Module, defined_names
+
+#: Packages that users often import. Where files are validated, they may be missing.
+_USUAL = frozenset(
+    {"ament_index_python", "composer", "cv2", "cv_bridge", "launch", "launch_ros", "numpy"}
+    | {"message_filters", "rclpy", "sensor_msgs_py", "tf2_geometry_msgs", "tf2_py", "tf2_ros"}
+    | {"tf2_sensor_msgs", "tf_transformations"}
+)
+#: With these, a file gets modules that the current search path does not show.
+_AT_RUN_TIME = ("sys.path", "import_module", "importlib.util", "addsitedir", "__import__")
+_LONG_NAME = 8  # letters, of which two may be wrong
+
+
+@dataclass(frozen=True, slots=True)
+class FailedImport:
+    """What cannot be imported: the wrong part of the name, and what is wrong with it."""
+
+    part: str
+    message: str
+    hint: str | None = None
+    family: Family = Family.IMPORT
+    is_certain: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Imports:
+    """The imports of one file of a behavior or class. Relative names begin with their dots."""
+
+    module: Module
+    source: BehaviorSource
+    interfaces: Interfaces
+
+    def missing_module(self, name: str, wanted: str) -> FailedImport | None:
+        """Return why a module cannot be imported; None if it exists, but not as Python source.
+
+        ``wanted`` is the name to import from it, or "".
+        """
+        relative = name.lstrip(".")
+        top, _, rest = relative.partition(".")
+        packages = self.interfaces.packages() if relative == name else ()
+        if top in packages and rest.partition(".")[0] in FOLDERS:  # maybe a private module
+            return self.missing_name(name, wanted) if rest in FOLDERS and wanted else None
+        exists = any(module_below(base, relative.split(".")) for base in self._folders(name))
+        if exists or (relative == name and _is_installed(name)):
+            if top != "composer":
+                return None
+            message = f"'{name}' is internal to the composer and may change without notice"
+            hint = "behaviors import from 'composer.behavior' only"
+            return FailedImport(name, message, hint, is_certain=False)
+        if top in sys.stdlib_module_names and relative == name:
+            return self._failed(rest or top, f"no module named '{name}'")
+        nearby = nearby_modules(relative, self._folders(name))
+        names = {*nearby.names}
+        if nearby.package in packages:
+            names.update(FOLDERS)
+        elif not nearby.package and relative == name:
+            names.update(_USUAL, packages)
+        is_complete = nearby.package in (*packages, "rclpy") or not nearby.may_be_compiled
+        if nearby.missing in names or not is_complete:
+            return None
+        message = f"no module named '{name.removesuffix(relative)}{nearby.path}'"
+        return self._misspelled(nearby.missing, message, names, " is installed")
+
+    def missing_name(self, module: str, name: str) -> FailedImport | None:
+        """Return why a name cannot be imported from a module; None if that is not known."""
+        message = f"module '{module}' has no '{name}'"
+        package, _, folder = module.partition(".")
+        if package in self.interfaces.packages() and folder in ("", *FOLDERS):
+            prefix = f"{package}/{folder}/"
+            listed = self.interfaces.names(folder) if folder else ()
+            others = [item.removeprefix(prefix) for item in listed if item.startswith(prefix)]
+            hint = self._home(package, folder, name) or suggestion(name, others)
+            return self._failed(name, message, hint) if hint or folder else None
+        last = module.rpartition(".")[2]
+        files = [item for item in self.source.own_modules if item.path.stem == last]
+        packages = [item for item in self.source.own_modules if item.path.parent.name == last]
+        names = {other for item in files or packages for other in defined_names(item)}
+        if any(item.dynamic for item in files or packages):
+            return None
+        if files:
+            return self._failed(name, message, suggestion(name, names))
+        nearby = nearby_modules(f"{module.lstrip('.')}.{name}".lstrip("."), self._folders(module))
+        is_own = packages or module == "." * len(module)
+        if nearby.may_be_compiled or name in nearby.names or not is_own:
+            return None
+        return self._misspelled(name, message, names.union(nearby.names))
+
+    def _folders(self, name: str) -> list[Path]:
+        """Return the folders in which a module is looked for."""
+        level = len(name) - len(name.lstrip("."))
+        if level:
+            return [*self.module.path.parents[level - 1 : level]]
+        reference = self.source.reference
+        homes = (self.module.path.parent, reference.folder)
+        return [*homes, *reference.node_folders, LIBRARIES]
+
+    def _home(self, package: str, folder: str, name: str) -> str | None:
+        """Return the hint with the only module that has an interface: in a package, or any."""
+        own = [f"{package}.{part}" for part in sorted(FOLDERS)]
+        others = [f"{other}.{folder}" for other in self.interfaces.packages() if folder]
+        for modules in (own, others):
+            paths = {home: f"{home.replace('.', '/')}/{name}" for home in modules}
+            homes = [home for home, path in paths.items() if self.interfaces.find(path)]
+            if homes:
+                return f"import it from '{homes[0]}'" if len(homes) == 1 else None
+        return None
+
+    def _misspelled(
+        self, name: str, message: str, names: Iterable[str], where: str = ""
+    ) -> FailedImport:
+        """Return the problem of a name: an error if another one was meant, else an info.
+
+        ``where`` ends the message of an info.
+        """
+        limit = 2 if len(name) >= _LONG_NAME else 1
+        near = [(edit_distance(name, other), other) for other in names if other[:1] == name[:1]]
+        distance, close = min(near, default=(limit + 1, ""))
+        if distance <= limit:
+            return self._failed(name, message, f"did you mean '{close}'?")
+        hint = "install it, or correct the name"
+        return FailedImport(name, f"{message}{where}", hint, Family.NOT_INSTALLED)
+
+    def _failed(self, part: str, message: str, hint: str | None = None) -> FailedImport:
+        """Return an error, unless the file searches for modules itself."""
+        if any(text in self.module.source.text for text in _AT_RUN_TIME):
+            hint = "the file searches for modules itself"
+            return FailedImport(part, message, hint, Family.NOT_INSTALLED)
+        return FailedImport(part, message, hint)
+
+
+def _is_installed(name: str) -> bool:
+    """Return whether a module outside of the project exists."""
+    home = Path(__file__).parent
+    return is_compiled(name) or module_file(name, home, Project.at(home)) is not None
