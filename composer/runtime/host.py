@@ -46,7 +46,6 @@ from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
 from composer.runtime.manager.other_instances import Instance
 from composer.runtime.metrics.figures import merged_chains
 from composer.runtime.middleware.dds_profiles import use_large_system_profile
-from composer.runtime.middleware.dds_segment import segment_for_large_messages
 from composer.runtime.middleware.environment import (
     ROS_ARGUMENTS,
     active_variables,
@@ -55,19 +54,18 @@ from composer.runtime.middleware.environment import (
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
-from composer.runtime.process.fast_exit import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
+from composer.runtime.process.libraries import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.signals import stop_signals
 from composer.runtime.ros.message_sizes import sends_large_messages
 from composer.runtime.supervision import events
-from composer.runtime.supervision.commands import Commands
+from composer.runtime.supervision.commands import Commands, SystemStart
 from composer.runtime.supervision.events import NodeSummary, Outcome, Report, Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor
 from composer.runtime.supervision.main_queue import Command, Item, MainQueue
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet, NodeSetOptions
 from composer.runtime.supervision.reconciler import Reconciler
-from composer.runtime.supervision.start import SystemStart
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 
@@ -191,6 +189,10 @@ class Host:
         """Return the block in which this process joins the ROS graph."""
         if not sends_large_messages(self._system):
             return nullcontext()
+        from composer.runtime.middleware.dds_xml import (  # noqa: PLC0415 - slow, rare
+            segment_for_large_messages,
+        )
+
         warn = partial(self._reporter.log, LogLevel.WARN, PROGRAM_LOGGER)
         return segment_for_large_messages(os.environ, get_rmw_implementation_identifier(), warn)
 

@@ -81,8 +81,7 @@ def run(
     result, declared, relative = loaded
     require_ros("compose hosts run", declared)
     from composer.client.hosts.deployment import DeploymentOptions
-    from composer.client.hosts.start import remote_processes, run_on_hosts
-    from composer.client.hosts.used_files import question_about
+    from composer.client.hosts.start import question_about, remote_processes, run_on_hosts
 
     start = given_options(context, (*START_OPTIONS, "all_or_nothing"))
     processes = remote_processes(declared)
@@ -138,7 +137,7 @@ def sync(
     result, declared, _ = load_for_hosts(system)
     from composer.client.hosts.start import sync_hosts
     from composer.client.hosts.sync import SyncOptions, root_problem
-    from composer.runtime.process.addresses import is_this_computer
+    from composer.runtime.process.computer import is_this_computer
 
     root = result.project.root
     problem = root_problem(root)
@@ -239,8 +238,13 @@ def _run_server(discovery: Discovery) -> None:
     from composer.model import LogLevel
     from composer.runtime.children.discovery_server import discovery_servers
     from composer.runtime.process import StartRefused
-    from composer.runtime.process.service_manager import READY, STOPPING, ServiceManager
-    from composer.runtime.process.signals import WakeupPipe, stop_signals
+    from composer.runtime.process.signals import (
+        READY,
+        STOPPING,
+        ServiceManager,
+        WakeupPipe,
+        stop_signals,
+    )
 
     require_ros("compose hosts discovery-server")
     manager, wakeup = ServiceManager(), WakeupPipe()
@@ -275,7 +279,7 @@ def _run_server(discovery: Discovery) -> None:
 
 def _is_running(discovery: Discovery) -> bool:
     """Return whether all servers with addresses of this computer run, and there is one."""
-    from composer.runtime.process.addresses import PortState, port_state, resolve
+    from composer.runtime.process.computer import PortState, port_state, resolve
 
     states = []
     for host, port in discovery.servers:

@@ -178,7 +178,7 @@ def run(
     C_STREAMS.redirect()  # before libraries of ROS are loaded
     warnings = ShowWarnings.COUNT if dry_run else ShowWarnings.ALL
     import composer.loading  # noqa: F401 - importing its extension modules would wait for the thread
-    from composer.runtime.process.library_loading import loading_libraries
+    from composer.runtime.process.libraries import loading_libraries
 
     # A process of a system may have environment variables of its own, which have to be set first.
     is_loading_ros = process is None and not dry_run and not wait
@@ -286,7 +286,7 @@ def _run(
     from composer.runtime.host import Host
     from composer.runtime.process import StartRefused
     from composer.runtime.process.instance_lock import ALREADY_RUNS, AlreadyRunning
-    from composer.runtime.process.service_manager import ALIVE, READY, STOPPING, ServiceManager
+    from composer.runtime.process.signals import ALIVE, READY, STOPPING, ServiceManager
     from composer.runtime.supervision.events import BroughtUp, Event, Logged, NodeFailed, Stopping
 
     with ExitStack() as stack:
@@ -334,7 +334,7 @@ def _options(
     from composer.cli.support.process import end_within
     from composer.model import LogLevel
     from composer.runtime.host_options import HostOptions
-    from composer.runtime.process.usage import process_start_s
+    from composer.runtime.process.computer import process_start_s
 
     return HostOptions(
         run_for_s=run_for,

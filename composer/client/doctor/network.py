@@ -22,7 +22,7 @@ from composer.runtime.middleware.shared_memory import (
     SHARED_MEMORY,
     free_bytes,
 )
-from composer.runtime.process.addresses import (
+from composer.runtime.process.computer import (
     PortState,
     has_interface,
     interface_names,

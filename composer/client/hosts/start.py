@@ -1,19 +1,83 @@
-"""The commands: ``compose hosts run`` and ``compose hosts sync`` as one call each."""
+"""What commands do with hosts, as one call each: compare, start and end, copy."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AsyncExitStack
+from pathlib import Path
 
+from composer.base.source import SourceFile
 from composer.client.hosts.check import HostsDiffer, compare_all, connect_all
 from composer.client.hosts.connection import HostError
 from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess
 from composer.client.hosts.inventory import Question, take_inventory
 from composer.client.hosts.sync import SyncOptions, copy_project, prepare_workspace
-from composer.model import Host, Process, System
-from composer.runtime.process.addresses import is_this_computer
+from composer.model import BehaviorReference, Executable, Host, Process, System
+from composer.project import SETTINGS_FILE, Project
+from composer.python_code.lookup import find_behavior
+from composer.runtime.process.computer import is_this_computer
 from composer.runtime.process.signals import STOP_SIGNALS
+
+_LONGEST_NAME = 256  # of a file, for Linux
+
+
+def question_about(system: System, path: Path, project: Project) -> Question:
+    """Return what other computers must have in common with this one to run the system in ``path``.
+
+    The files are those of the project: YAML, parameters, Python code, programs and settings. What
+    is installed is compared by its version.
+    """
+    names = {
+        str(found.resolve().relative_to(project.root))
+        for found in (path, *_files(system, project))
+        if project.holds(found) and found.is_file()
+    }
+    interfaces = {port.interface.value for node in system.nodes for port in node.all_ports}
+    return Question(tuple(sorted(names)), tuple(sorted(interfaces)))
+
+
+def _files(system: System, project: Project) -> Iterator[Path]:
+    for source in _sources(system):
+        yield Path(source.path)
+    for node in system.nodes:
+        yield from node.type_files
+        if node.executable is not None:
+            yield from _words_of(node.executable)
+    seen: set[tuple[str, Path]] = set()
+    for reference in _references(system):
+        key = (reference.text.value, reference.folder)
+        if key not in seen:
+            seen.add(key)
+            yield from (module.path for module in find_behavior(reference).own_modules)
+    yield project.root / SETTINGS_FILE
+
+
+def _words_of(executable: Executable) -> Iterator[Path]:
+    """Yield the words of the command of a program, as files: a script may be any of them."""
+    folder = executable.folder
+    if executable.working_directory is not None:
+        folder /= executable.working_directory.value
+    for word in executable.command:
+        if len(word.value) < _LONGEST_NAME:
+            yield folder / word.value
+
+
+def _sources(system: System) -> Iterator[SourceFile]:
+    """Yield the YAML files in which something of the system is written."""
+    spans = [node.span for node in system.nodes]
+    spans += [process.span for process in system.processes]
+    spans += [host.span for host in system.hosts]
+    spans += [executor.span for executor in system.executors]
+    yield from {system.source, *system.parameter_files, *(span.file for span in spans)}
+
+
+def _references(system: System) -> Iterator[BehaviorReference]:
+    for node in system.nodes:
+        if node.behavior is not None:
+            yield node.behavior
+        if node.hosted_class is not None:
+            yield node.hosted_class.reference
 
 
 def remote_processes(system: System) -> tuple[RemoteProcess, ...]:

@@ -10,12 +10,16 @@
 See docs/decisions/0012-output-never-blocks.md.
 """
 
-from composer.client.run_log.reading import last_records
-from composer.client.run_log.record import Record
-from composer.client.run_log.rotation import RotatingFile
-from composer.client.run_log.runs import Run, RunFolder, current_domain, find_parts, find_runs
-from composer.client.run_log.selection import Selection, parse_since
-from composer.client.run_log.system_log import SystemLog
+from composer.client.run_log.reading import SystemLog, last_records
+from composer.client.run_log.record import Record, Selection, parse_since
+from composer.client.run_log.runs import (
+    RotatingFile,
+    Run,
+    RunFolder,
+    current_domain,
+    find_parts,
+    find_runs,
+)
 
 __all__ = [
     "Record",

@@ -1,17 +1,20 @@
-"""Read the records of a run, also while it goes on."""
+"""Reads the log of a system: that of its run, and those of processes that its run does not log."""
 
 from __future__ import annotations
 
+import heapq
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import TracebackType
 from typing import BinaryIO
 
 from composer.base.regular_files import NotRegularError, open_regular
 from composer.client.run_log.record import Record, parse_line
-from composer.client.run_log.rotation import log_files
-from composer.client.run_log.runs import Run
+from composer.client.run_log.runs import Run, find_parts, find_runs, log_files
+from composer.model.names import PROGRAM_LOGGER
 
 _MAX_LINE_BYTES = 1_000_000
 
@@ -85,3 +88,76 @@ class _LineReader:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+_POLL_S = 0.1
+_SECOND_NS = 1_000_000_000
+#: What a process says about states, the one that coordinates it says as well.
+_INFO = "info"
+
+
+class SystemLog:
+    """The records of a run and of its processes, in the order of their times, each of them once.
+
+    What a process has logged belongs to the run that was the last one to start before, and to the
+    first run if there was none.
+    """
+
+    def __init__(self, logs: Path, run: Run) -> None:
+        """Find the processes of a run in ``logs``, the ROS log folder."""
+        self._logs = logs
+        self._run = run
+        self._reader = RunReader(run)
+        self._parts: dict[Path, RunReader] = {}
+        same = (run.system, run.domain)
+        runs = [each for each in find_runs(logs, run.system) if (each.system, each.domain) == same]
+        names = [each.name for each in runs]
+        number = names.index(run.name) if run.name in names else 0
+        self._from_ns = _start_ns(run) if number > 0 else 0
+        self._next = runs[number + 1] if number + 1 < len(runs) else None
+
+    def __enter__(self) -> SystemLog:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for reader in (self._reader, *self._parts.values()):
+            reader.close()
+
+    def new(self) -> Iterator[Record]:
+        """Yield the records that have been written since the last call. Raises OSError."""
+        for part in find_parts(self._logs, self._run):
+            if part.folder not in self._parts and self._may_contain(part):
+                self._parts[part.folder] = RunReader(part)
+        parts = (filter(self._belongs, reader.new()) for reader in self._parts.values())
+        return heapq.merge(self._reader.new(), *parts, key=lambda record: record.time_ns)
+
+    def follow(self, wait: Callable[[float], None] = time.sleep) -> Iterator[Record]:
+        """Yield new records until the process of the run has ended. Raises OSError.
+
+        ``wait(seconds)`` is called while there are none.
+        """
+        while True:
+            is_running = self._run.is_running()  # first: what it wrote before its end is read below
+            yield from self.new()
+            if not is_running:
+                return
+            wait(_POLL_S)
+
+    def _may_contain(self, part: Run) -> bool:
+        is_later = self._next is not None and part.name > self._next.name
+        return not is_later and part.written_ns() >= self._from_ns
+
+    def _belongs(self, record: Record) -> bool:
+        if record.logger == PROGRAM_LOGGER and record.level == _INFO:
+            return False
+        is_later = self._next is not None and record.time_ns >= _start_ns(self._next)
+        return not is_later and record.time_ns >= self._from_ns
+
+
+def _start_ns(run: Run) -> int:
+    return int(run.started.timestamp() * 1000) * (_SECOND_NS // 1000)

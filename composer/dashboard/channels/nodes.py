@@ -13,7 +13,7 @@ from composer.dashboard.feeds import Feed
 from composer.dashboard.observing.reports import ReportPair, ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
-from composer.runtime.process.usage import ProcessUsage, process_usage
+from composer.runtime.process.computer import ProcessUsage, process_usage
 
 if TYPE_CHECKING:
     from composer.client.systems.system_reports import NodeReport, SystemReport

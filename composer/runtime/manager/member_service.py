@@ -20,7 +20,7 @@ from composer.runtime.manager.proxy_services import Nodes
 from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import FINALIZED, ManagedNode, TransitionOutcome
-from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN
+from composer.runtime.outside_nodes.remote_node import DONE_IN
 from composer.runtime.ros.limited_requests import TooLarge, limited
 from composer.runtime.ros.manager_protocol import (
     CHANGE_STATES,

@@ -26,7 +26,7 @@ from composer.runtime.outside_nodes.outside_node import (
     OutsideNode,
     TransitionRefused,
 )
-from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN, GOALS
+from composer.runtime.outside_nodes.remote_node import DONE_IN, GOALS
 from composer.runtime.ros.manager_protocol import CREATE
 
 #: A report follows a successful response soon; each second there is one in any case.

@@ -17,7 +17,7 @@ from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.options import ProcessContext
-from composer.runtime.process.addresses import is_this_computer
+from composer.runtime.process.computer import is_this_computer
 
 _POLL_S = 0.01
 

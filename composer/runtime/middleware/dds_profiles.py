@@ -21,12 +21,12 @@ _PROFILE_FOR_LARGE_SYSTEMS = Path(__file__).with_name("fast_dds_large.xml")
 _PROFILE_FOR_COMMANDS = Path(__file__).with_name("fast_dds_commands.xml")
 _PROFILE_FOR_COMMANDS_ON_LOCALHOST = Path(__file__).with_name("fast_dds_commands_localhost.xml")
 #: Read by Fast DDS 2 only; other middleware and later versions do not need the profile.
-_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _OTHER_VARIABLE = "FASTDDS_DEFAULT_PROFILES_FILE"
 _SERVER_VARIABLE = "ROS_DISCOVERY_SERVER"
-_TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
+TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
 _UDP = "UDPv4"
-_RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 #: Variables that the profile for localhost does not replace.
 _OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 #: The names of profiles that are written at run time.
@@ -46,25 +46,25 @@ def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = 
     if TrustedUsers.starting_at(folder).other_owner(user_file) is not None:
         environment[_SKIP_USER_FILE_VARIABLE] = "1"
     if _is_generated(environment):  # by the process that has started this one
-        environment[_VARIABLE] = str(_PROFILE)
-    variables = (_VARIABLE, _OTHER_VARIABLE, _SERVER_VARIABLE)
+        environment[PROFILES_VARIABLE] = str(_PROFILE)
+    variables = (PROFILES_VARIABLE, _OTHER_VARIABLE, _SERVER_VARIABLE)
     if any(map(environment.get, variables)):
         return
     if user_file.exists() and not environment.get(_SKIP_USER_FILE_VARIABLE):
         return
-    environment[_VARIABLE] = str(_PROFILE)
+    environment[PROFILES_VARIABLE] = str(_PROFILE)
 
 
 def is_own_profile(environment: Mapping[str, str]) -> bool:
     """Say whether a system uses one of our profiles: the user has not configured Fast DDS."""
-    path = environment.get(_VARIABLE)
+    path = environment.get(PROFILES_VARIABLE)
     ours = (str(_PROFILE), str(_PROFILE_FOR_LARGE_SYSTEMS))
     return path in ours or _is_generated(environment)
 
 
 def is_default_profile(environment: Mapping[str, str]) -> bool:
     """Say whether the profile is that of :func:`use_discovery_profile`."""
-    return environment.get(_VARIABLE) == str(_PROFILE)
+    return environment.get(PROFILES_VARIABLE) == str(_PROFILE)
 
 
 def save_profile(content: str) -> Path:
@@ -84,7 +84,7 @@ def save_profile(content: str) -> Path:
 
 
 def _is_generated(environment: Mapping[str, str]) -> bool:
-    path = Path(environment.get(_VARIABLE) or "")
+    path = Path(environment.get(PROFILES_VARIABLE) or "")
     return path.parent.name == FOLDER_NAME and path.name.startswith(_GENERATED)
 
 
@@ -94,15 +94,15 @@ def use_command_profile(environment: MutableMapping[str, str]) -> None:
     With the range LOCALHOST, rmw_fastrtps adds shared memory to any profile. Therefore the profile
     for localhost implements that range itself, and the variable is reset.
     """
-    transports = environment.get(_TRANSPORTS_VARIABLE) or _UDP
-    if environment.get(_VARIABLE) != str(_PROFILE) or transports != _UDP:
+    transports = environment.get(TRANSPORTS_VARIABLE) or _UDP
+    if environment.get(PROFILES_VARIABLE) != str(_PROFILE) or transports != _UDP:
         return
-    if environment.get(_RANGE_VARIABLE) != "LOCALHOST":
-        environment[_VARIABLE] = str(_PROFILE_FOR_COMMANDS)
-        environment[_TRANSPORTS_VARIABLE] = _UDP
+    if environment.get(RANGE_VARIABLE) != "LOCALHOST":
+        environment[PROFILES_VARIABLE] = str(_PROFILE_FOR_COMMANDS)
+        environment[TRANSPORTS_VARIABLE] = _UDP
     elif not any(map(environment.get, _OTHER_RANGE_VARIABLES)):
-        environment[_VARIABLE] = str(_PROFILE_FOR_COMMANDS_ON_LOCALHOST)
-        environment[_RANGE_VARIABLE] = "SYSTEM_DEFAULT"
+        environment[PROFILES_VARIABLE] = str(_PROFILE_FOR_COMMANDS_ON_LOCALHOST)
+        environment[RANGE_VARIABLE] = "SYSTEM_DEFAULT"
 
 
 def use_large_system_profile(environment: MutableMapping[str, str]) -> None:
@@ -111,5 +111,5 @@ def use_large_system_profile(environment: MutableMapping[str, str]) -> None:
     With the default profile, the thread that announces the end of a participant would be stopped
     before it has; other processes would wait for the participant for 20 s.
     """
-    if environment.get(_VARIABLE) == str(_PROFILE):
-        environment[_VARIABLE] = str(_PROFILE_FOR_LARGE_SYSTEMS)
+    if environment.get(PROFILES_VARIABLE) == str(_PROFILE):
+        environment[PROFILES_VARIABLE] = str(_PROFILE_FOR_LARGE_SYSTEMS)

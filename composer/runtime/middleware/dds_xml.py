@@ -1,20 +1,37 @@
-"""Changes to our profiles of Fast DDS, which are XML: interfaces, announcements, segments."""
+"""Changes to our profiles of Fast DDS, which are XML: interfaces, announcements, segments.
+
+The default segment of Fast DDS (0.5 MB) does not hold one image of 640 x 480 pixels: its fragments
+wait for each other, and with best-effort QoS most of them are lost. See
+docs/decisions/0013-fast-dds.md.
+"""
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from html import escape
+from tempfile import NamedTemporaryFile
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from composer.model import Discovery
 from composer.runtime.middleware.dds_profiles import (
+    PROFILES_VARIABLE,
+    RANGE_VARIABLE,
+    TRANSPORTS_VARIABLE,
     is_default_profile,
     is_own_profile,
     save_profile,
 )
+from composer.runtime.middleware.shared_memory import (
+    LARGE_SEGMENT_BYTES,
+    MEGABYTE,
+    MIN_FREE_BYTES,
+    SHARED_MEMORY,
+    free_bytes,
+)
 from composer.runtime.process import StartRefused
-from composer.runtime.process.addresses import has_interface, interface_names
+from composer.runtime.process.computer import has_interface, interface_names
 
 _NAMESPACE = "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"
 _SHARED_MEMORY, _UDP = "shared_memory", "udp"
@@ -111,9 +128,6 @@ def _parse(text: str) -> Element:
     return ElementTree.fromstring(text)  # noqa: S314 - a text of ours
 
 
-_PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
-_TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
-_RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _UNUSED = "'interfaces' of the system are not used"
 #: With others, rmw_fastrtps replaces the transports of a profile.
 _RANGES = ("", "SUBNET", "SYSTEM_DEFAULT")
@@ -134,16 +148,16 @@ def use_interfaces(discovery: Discovery, environment: MutableMapping[str, str]) 
             )
     if (
         not is_own_profile(environment)
-        or environment.get(_TRANSPORTS_VARIABLE)
-        or environment.get(_RANGE_VARIABLE, "") not in _RANGES
+        or environment.get(TRANSPORTS_VARIABLE)
+        or environment.get(RANGE_VARIABLE, "") not in _RANGES
     ):
         return [
             f"{_UNUSED}: the environment sets a profile or transports of Fast DDS, or"
-            f" {_RANGE_VARIABLE}"
+            f" {RANGE_VARIABLE}"
         ]
-    content = profile_for_interfaces(environment[_PROFILES_VARIABLE], interfaces)
+    content = profile_for_interfaces(environment[PROFILES_VARIABLE], interfaces)
     try:
-        environment[_PROFILES_VARIABLE] = str(save_profile(content))
+        environment[PROFILES_VARIABLE] = str(save_profile(content))
     except OSError as error:
         return [f"{_UNUSED}: cannot write the profile '{error.filename}': {error.strerror}"]
     return []
@@ -168,5 +182,87 @@ def announce_less_often(environment: MutableMapping[str, str]) -> None:
     """
     if is_default_profile(environment):
         with suppress(OSError):
-            content = without(environment[_PROFILES_VARIABLE], "leaseAnnouncement")
-            environment[_PROFILES_VARIABLE] = str(save_profile(content))
+            content = without(environment[PROFILES_VARIABLE], "leaseAnnouncement")
+            environment[PROFILES_VARIABLE] = str(save_profile(content))
+
+
+_PEERS_VARIABLE = "ROS_STATIC_PEERS"
+#: With it, rmw_fastrtps sets up the transports in a way that a profile cannot express.
+_DEPRECATED_VARIABLE = "ROS_LOCALHOST_ONLY"
+#: The limit of Fast DDS without a profile.
+_MESSAGE_BYTES = 65_500
+#: What rmw_fastrtps sets for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: a profile with that variable
+#: would have two shared memory transports. See fast_dds_commands_localhost.xml.
+_PARTICIPANTS_ON_LOCALHOST = 32
+_NO_MULTICAST = "<metatrafficUnicastLocatorList><locator/></metatrafficUnicastLocatorList>"
+_PEER = "<locator><udpv4><address>{}</address></udpv4></locator>"
+
+
+def segment_for_large_messages(
+    environment: MutableMapping[str, str], rmw: str, warn: Callable[[str], None]
+) -> AbstractContextManager[None]:
+    """Return a block that selects a large segment: join the ROS graph in it.
+
+    Without effect with another middleware than rmw_fastrtps, or if the user has configured it. If
+    there is not enough shared memory, call ``warn`` and keep the default size.
+    """
+    if not rmw.startswith("rmw_fastrtps") or not _may_choose(environment):
+        return nullcontext()
+    free = free_bytes()
+    if free < MIN_FREE_BYTES:
+        warn(
+            f"only {free // MEGABYTE} MB are free in {SHARED_MEMORY}: large messages to other"
+            " processes may be late or lost; see 'compose doctor'"
+        )
+        return nullcontext()
+    return enlarged_segment(environment)
+
+
+def _may_choose(environment: Mapping[str, str]) -> bool:
+    """Say whether the user has not configured the transports of Fast DDS."""
+    reach = environment.get(RANGE_VARIABLE)
+    if environment.get(TRANSPORTS_VARIABLE) or not is_own_profile(environment):
+        return False
+    if reach == "LOCALHOST":
+        return not environment.get(_DEPRECATED_VARIABLE)
+    return reach != "OFF"
+
+
+@contextmanager
+def enlarged_segment(environment: MutableMapping[str, str]) -> Iterator[None]:
+    """Within the block, select a profile with a large segment.
+
+    Afterwards, the environment is as before: processes that this one starts have segments of their
+    own.
+    """
+    before = dict(environment)
+    peers = None
+    if before.get(RANGE_VARIABLE) == "LOCALHOST":
+        peers = list(filter(None, before.get(_PEERS_VARIABLE, "").split(";")))
+    content = profile_with_segment(before[PROFILES_VARIABLE], peers)
+    with ExitStack() as stack:
+        with suppress(OSError):  # no folder for temporary files
+            file = stack.enter_context(NamedTemporaryFile(prefix="fast_dds_", suffix=".xml"))
+            file.write(content)
+            file.flush()
+            stack.callback(environment.update, before)
+            environment[PROFILES_VARIABLE] = file.name
+            if peers is not None:
+                environment[RANGE_VARIABLE] = "SYSTEM_DEFAULT"
+        yield
+
+
+def profile_with_segment(path: str, peers: Sequence[str] | None) -> bytes:
+    """Return the profile in the file ``path`` with a large segment, as XML.
+
+    With ``peers``, it also implements the discovery range LOCALHOST with these static peers.
+    """
+    profile = Profile(path)
+    child(profile.shared_memory, "segment_size").text = str(LARGE_SEGMENT_BYTES)
+    child(profile.shared_memory, "maxMessageSize").text = str(_MESSAGE_BYTES)
+    if peers is not None:
+        child(profile.udp, "maxInitialPeersRange").text = str(_PARTICIPANTS_ON_LOCALHOST)
+        known = "".join(_PEER.format(escape(peer)) for peer in ("127.0.0.1", *peers))
+        locators = f"<initialPeersList>{known}</initialPeersList>"
+        extend(child(profile.rtps, "builtin"), _NO_MULTICAST + locators)
+    return profile.text().encode()

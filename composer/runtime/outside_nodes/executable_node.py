@@ -31,8 +31,7 @@ from composer.runtime.outside_nodes.outside_node import (
     elsewhere_text,
     missing_text,
 )
-from composer.runtime.outside_nodes.presence import NodePresence
-from composer.runtime.outside_nodes.remote_lifecycle import NotAnswered, RemoteLifecycle
+from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteLifecycle
 
 #: How long a killed process may take to disappear.
 _KILLED_WITHIN_S = 1.0

@@ -15,8 +15,7 @@ from composer.runtime.outside_nodes.outside_node import (
     elsewhere_text,
     missing_text,
 )
-from composer.runtime.outside_nodes.presence import NodePresence
-from composer.runtime.outside_nodes.remote_lifecycle import NotAnswered, RemoteLifecycle
+from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteLifecycle
 
 _PERIOD_S = 0.5
 _NOTHING_EARLIER: frozenset[bytes] = frozenset()

@@ -23,7 +23,7 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
-from composer.runtime.outside_nodes.remote_lifecycle import DONE_IN, GOALS
+from composer.runtime.outside_nodes.remote_node import DONE_IN, GOALS
 
 UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
 _DURING = {

@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM, SIGHUP and SIGQUIT as requests to stop, and a pipe that wakes the main loop."""
+"""Signals as requests to stop, a pipe that wakes the main loop, messages to a service manager."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 import os
 import select
 import signal
+import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager, suppress
 from types import FrameType
 
@@ -87,3 +88,24 @@ def stop_signals(
         signal.set_wakeup_fd(fd_before)
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if ends_process else handler)
+
+
+_VARIABLE = "NOTIFY_SOCKET"
+READY, STOPPING, ALIVE = "READY=1", "STOPPING=1", "WATCHDOG=1"
+
+
+class ServiceManager:
+    """Sends messages, from any thread."""
+
+    def __init__(self, environment: MutableMapping[str, str] = os.environ) -> None:
+        name = environment.pop(_VARIABLE, "")
+        # Those that begin with '@' are in Linux' abstract namespace.
+        self._address = f"\0{name[1:]}" if name.startswith("@") else name
+
+    def send(self, *messages: str) -> None:
+        """Send messages such as READY; if the service manager is gone, they are lost."""
+        if not self._address:
+            return
+        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as datagrams:
+            datagrams.setblocking(False)
+            datagrams.sendto("\n".join(messages).encode(), self._address)

@@ -18,9 +18,9 @@ from composer.runtime.supervision.main_queue import (
     CallbackHanging,
     LoopRecovered,
     NodeEvent,
+    SharedDesiredState,
 )
 from composer.runtime.supervision.node_set import NodeSet
-from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 
 _SHORTEST_PERIOD_S = 0.005
 _LONGEST_PERIOD_S = 1.0

@@ -1,4 +1,4 @@
-"""The queue of the main thread: stop requests, and events to handle one after the other."""
+"""What the main thread shares with others: the desired state, and the queue of what it handles."""
 
 from __future__ import annotations
 
@@ -11,8 +11,33 @@ from contextlib import contextmanager
 from typing import Generic, TypeAlias, TypeVar
 
 from composer.base.fast_dataclass import dataclass
-from composer.plan import Fault
+from composer.plan import DesiredState, Fault
 from composer.runtime.process.signals import WakeupPipe
+
+
+class SharedDesiredState:
+    """The current desired state. Thread-safe.
+
+    Nodes record external transitions, on their own threads, before they answer the request. The
+    supervisor changes the rest, on the main thread. The lock gives all changes one order, and is
+    held for microseconds only: no transition waits for the supervisor or for another node.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._value = DesiredState({})
+
+    @property
+    def value(self) -> DesiredState:
+        """The desired state now."""
+        return self._value
+
+    def update(self, change: Callable[[DesiredState], DesiredState]) -> DesiredState:
+        """Replace the desired state by ``change(desired state)``, and return that."""
+        with self._lock:
+            self._value = change(self._value)
+            return self._value
+
 
 T = TypeVar("T")
 K = TypeVar("K")

@@ -6,8 +6,13 @@ from composer.model import LogLevel, Node, PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
 from composer.runtime.supervision import events
-from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved, NodeReturned
-from composer.runtime.supervision.shared_desired_state import SharedDesiredState
+from composer.runtime.supervision.main_queue import (
+    Item,
+    MainQueue,
+    NodeMoved,
+    NodeReturned,
+    SharedDesiredState,
+)
 from composer.runtime.supervision.status import Status
 
 #: The state that each transition ends in if it succeeds, and the goal that it sets.

@@ -14,8 +14,13 @@ from composer.base.fast_dataclass import dataclass
 from composer.plan import Plan, Step
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import TransitionOutcome
-from composer.runtime.supervision.main_queue import Item, MainQueue, NodeMoved, StepEnded
-from composer.runtime.supervision.shared_desired_state import SharedDesiredState
+from composer.runtime.supervision.main_queue import (
+    Item,
+    MainQueue,
+    NodeMoved,
+    SharedDesiredState,
+    StepEnded,
+)
 
 if TYPE_CHECKING:  # this module and its tests need no ROS
     from composer.runtime.supervision.node_set import NodeSet

@@ -28,9 +28,8 @@ from composer.runtime.supervision.events import (
     RollingBack,
     Stuck,
 )
-from composer.runtime.supervision.main_queue import Item, MainQueue
+from composer.runtime.supervision.main_queue import Item, MainQueue, SharedDesiredState
 from composer.runtime.supervision.plan_executor import ExecutionOptions, PlanExecutor, StepFailed
-from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 from composer.runtime.supervision.status import Status
 
 if TYPE_CHECKING:  # this module and its tests need no ROS

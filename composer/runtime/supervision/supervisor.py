@@ -32,11 +32,11 @@ from composer.runtime.supervision.main_queue import (
     NodeEvent,
     NodeMoved,
     NodeReturned,
+    SharedDesiredState,
     StepEnded,
 )
 from composer.runtime.supervision.plan_executor import ExecutionOptions, StepFailed
 from composer.runtime.supervision.reconciler import Reconciler
-from composer.runtime.supervision.shared_desired_state import SharedDesiredState
 
 #: In the cause of a plan that moves of several nodes have caused.
 _MAX_CAUSES = 3

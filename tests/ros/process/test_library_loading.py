@@ -10,7 +10,7 @@ import pytest
 
 _LOAD = """
 import os, sys
-from composer.runtime.process.library_loading import loading_libraries
+from composer.runtime.process.libraries import loading_libraries
 with loading_libraries():
     pass
 assert "rclpy" not in sys.modules

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from composer.runtime.supervision.health_monitor import HealthMonitor, _ObservedCallback
-from composer.runtime.supervision.shared_desired_state import SharedDesiredState
+from composer.runtime.supervision.main_queue import SharedDesiredState
 from tests.ros.support.in_process import system_of
 
 

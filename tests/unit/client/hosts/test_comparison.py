@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from composer.client.hosts import inventory as inventory_module
-from composer.client.hosts.comparison import differences
+from composer.client.hosts.check import differences
 from composer.client.hosts.inventory import (
     Inventory,
     Question,
@@ -20,7 +20,7 @@ from composer.client.hosts.inventory import (
     take_inventory,
     written_question,
 )
-from composer.client.hosts.used_files import question_about
+from composer.client.hosts.start import question_about
 from composer.loading import load
 
 HERE = Inventory(

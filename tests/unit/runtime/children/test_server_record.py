@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.children.server_record import ServerRecord
+from composer.runtime.children.discovery_server import ServerRecord
 
 IDENTITY = (0, "127.0.0.1", 11811)
-OTHER = "from composer.runtime.children.server_record import ServerRecord as R; r = R{}; print({})"
+OTHER = (
+    "from composer.runtime.children.discovery_server import ServerRecord as R; r = R{}; print({})"
+)
 
 
 @pytest.fixture(autouse=True)

@@ -7,12 +7,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.runtime.middleware import dds_segment
+from composer.runtime.middleware import dds_xml
 from composer.runtime.middleware.dds_profiles import (
     use_discovery_profile,
     use_large_system_profile,
 )
-from composer.runtime.middleware.dds_segment import segment_for_large_messages
+from composer.runtime.middleware.dds_xml import segment_for_large_messages
 from composer.runtime.middleware.shared_memory import LARGE_SEGMENT_BYTES, MIN_FREE_BYTES
 
 TAG = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
@@ -21,7 +21,7 @@ FAST_DDS = "rmw_fastrtps_cpp"
 
 @pytest.fixture(autouse=True)
 def _enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dds_segment, "free_bytes", lambda: MIN_FREE_BYTES)
+    monkeypatch.setattr(dds_xml, "free_bytes", lambda: MIN_FREE_BYTES)
 
 
 @pytest.mark.parametrize("large_system", [False, True])
@@ -70,7 +70,7 @@ def test_other_middlewares_keep_their_environment(tmp_path: Path) -> None:
 
 
 def test_too_little_memory_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(dds_segment, "free_bytes", lambda: MIN_FREE_BYTES - 1)
+    monkeypatch.setattr(dds_xml, "free_bytes", lambda: MIN_FREE_BYTES - 1)
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
     before = dict(environment)

@@ -15,8 +15,7 @@ import pytest
 from composer.base.source import Located, SourceFile, Span
 from composer.model import Discovery, DiscoveryKind
 from composer.runtime.middleware.dds_profiles import is_own_profile, use_discovery_profile
-from composer.runtime.middleware.dds_segment import profile_with_segment
-from composer.runtime.middleware.dds_xml import use_interfaces
+from composer.runtime.middleware.dds_xml import profile_with_segment, use_interfaces
 from composer.runtime.middleware.environment import (
     active_variables,
     adopt_discovery,
@@ -25,7 +24,7 @@ from composer.runtime.middleware.environment import (
     use_discovery,
 )
 from composer.runtime.process import StartRefused
-from composer.runtime.process.addresses import PortState, port_state
+from composer.runtime.process.computer import PortState, port_state
 from composer.runtime.process.instance_lock import hold_instance_lock
 
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"

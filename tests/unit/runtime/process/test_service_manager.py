@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.process.service_manager import READY, ServiceManager
+from composer.runtime.process.signals import READY, ServiceManager
 
 
 @pytest.mark.parametrize("address", ["notify", "\0composer-test"])

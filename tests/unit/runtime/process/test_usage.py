@@ -7,7 +7,7 @@ from pathlib import Path
 
 CODE = """
 import os, sys, time
-from composer.runtime.process.usage import process_start_s
+from composer.runtime.process.computer import process_start_s
 if len(sys.argv) == 1:
     os.execv(sys.executable, [sys.executable, __file__, "again"])
 print(process_start_s(), time.monotonic())
