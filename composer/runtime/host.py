@@ -63,8 +63,9 @@ from composer.runtime.supervision.commands import Commands, SystemStart
 from composer.runtime.supervision.events import NodeSummary, Outcome, Report, Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor
 from composer.runtime.supervision.main_queue import Command, Item, MainQueue
+from composer.runtime.supervision.node_factory import NodeFactory
 from composer.runtime.supervision.node_listener import SupervisionListener
-from composer.runtime.supervision.node_set import CreationFailed, NodeSet, NodeSetOptions
+from composer.runtime.supervision.node_set import CreationFailed, NodeSet
 from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
@@ -103,20 +104,11 @@ class Host:
         self._status = Status(system, is_child=bool(key))
         is_member = self._options.process is not None
         self._report_key = key or (os.urandom(_KEY_BYTES).hex() if is_member else "")
-        self._node_set = NodeSet(
-            system,
-            self._make_listener,
-            NodeSetOptions(
-                log_level=self._options.log_level,
-                transition_timeout_s=self._options.transition_timeout_s,
-                tracing=self._options.tracing,
-                check_mutation=self._options.check_mutation,
-                namespace=join(system.namespace, system.name.value),
-                member_command=self._options.member_command,
-                write_log=self._reporter.log,
-                together=self._main_queue.together,
-            ),
+        factory = NodeFactory(
+            *(system, self._make_listener, self._options),
+            *(self._reporter.log, self._main_queue.together),
         )
+        self._node_set = NodeSet(system, factory)
         self._supervisor = Supervisor(
             Reconciler(system, self._node_set, self._main_queue, self._status, self._reporter)
         )
@@ -282,7 +274,9 @@ class Host:
         return True
 
     def _bring_up_and_supervise(self) -> None:
-        monitor = HealthMonitor(self._node_set, self._supervisor.shared, self._main_queue.put)
+        monitor = HealthMonitor(
+            self._node_set, self._supervisor.shared, self._main_queue.put, self._reporter
+        )
         monitor.start()
         try:
             if self._bring_up():

@@ -9,13 +9,12 @@ from collections.abc import Callable
 from types import FrameType
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import PrimaryState
+from composer.model import LogLevel, PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.node.managed_node import ManagedNode
+from composer.runtime.supervision.events import Reporter, Stuck
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.main_queue import (
-    CallbackBlocks,
-    CallbackHanging,
     LoopRecovered,
     NodeEvent,
     SharedDesiredState,
@@ -52,12 +51,18 @@ class HealthMonitor:
     """A thread that checks the nodes of a node set periodically and reports failures."""
 
     def __init__(
-        self, node_set: NodeSet, desired: SharedDesiredState, report: Callable[[NodeEvent], None]
+        self,
+        node_set: NodeSet,
+        desired: SharedDesiredState,
+        report: Callable[[NodeEvent], None],
+        reporter: Reporter,
     ) -> None:
+        """``report`` receives failures; the user sees by ``reporter`` which callbacks take long."""
         self._node_set = node_set
         self._desired = desired
         self._serial = 0  # of the desired state before the check
         self._report = report
+        self._reporter = reporter
         self._end = threading.Event()
         self._callbacks: dict[FrameType, _ObservedCallback] = {}  # by their calls
         self._reported: set[tuple[str, str]] = set()  # nodes and their callbacks that block
@@ -166,12 +171,16 @@ class HealthMonitor:
         if lasts_s < observed.limit_s:
             if lasts_s >= BLOCKS_AFTER_S and (node, callback.name) not in self._reported:
                 self._reported.add((node, callback.name))
-                self._report(CallbackBlocks(node, callback.name, lasts_s, callback.location()))
+                # Once: it may be meant to, or it may hang.
+                text = f"{callback.name} has not returned for {lasts_s:.0f} s; it is at"
+                logger = self._full_name(node).strip("/").replace("/", ".")
+                self._reporter.log(LogLevel.WARN, logger, f"{text} {callback.location()}")
             return
         if observed.interrupted_s is None:
             observed.interrupted_s = now_s
-            stack = callback.stack()
-            self._report(CallbackHanging(node, callback.name, observed.limit_s, stack))
+            action = f"return from {callback.name} within {1000.0 * observed.limit_s:g} ms"
+            at_s, stack = self._reporter.elapsed_s, callback.stack()
+            self._reporter.report(Stuck(at_s, self._full_name(node), action, stack))
             # Otherwise the next callback hangs as soon as this one returns.
             self._node_set.nodes[node].block()
             callback.interrupt()
@@ -187,6 +196,9 @@ class HealthMonitor:
         if not (observed.is_lost or observed.callback.in_transition):
             text = f"{observed.callback.name} took longer than {1000.0 * observed.limit_s:g} ms"
             self._report(Fault(observed.node, FaultKind.CALLBACK, text, self._serial))
+
+    def _full_name(self, name: str) -> str:
+        return self._node_set.nodes[name].full_name
 
     def _check_hung_loops(self, now_s: float) -> None:
         """Report hung loops that run again, at each check until the supervisor has handled it."""

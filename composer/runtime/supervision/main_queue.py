@@ -64,26 +64,6 @@ class StepEnded:
 
 
 @dataclass(frozen=True, slots=True)
-class CallbackHanging:
-    """A callback takes too long. ``node`` is a key; ``stack`` is where the callback is."""
-
-    node: str
-    callback: str
-    limit_s: float
-    stack: str
-
-
-@dataclass(frozen=True, slots=True)
-class CallbackBlocks:
-    """A callback has not returned for a while, which may be right. ``location`` is where it is."""
-
-    node: str
-    callback: str
-    for_s: float
-    location: str
-
-
-@dataclass(frozen=True, slots=True)
 class LoopRecovered:
     """A callback whose loop was abandoned has returned after all. ``loop`` is its name."""
 
@@ -111,9 +91,7 @@ class Command:
     all_or_nothing: bool = False
 
 
-NodeEvent: TypeAlias = (
-    Fault | NodeMoved | StepEnded | CallbackHanging | CallbackBlocks | LoopRecovered | NodeReturned
-)
+NodeEvent: TypeAlias = Fault | NodeMoved | StepEnded | LoopRecovered | NodeReturned
 Item: TypeAlias = NodeEvent | Command
 
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
-from composer.model import LogLevel, PrimaryState
+from composer.model import PrimaryState
 from composer.plan import (
     DesiredState,
     Fault,
@@ -22,11 +22,8 @@ from composer.plan import (
     is_nothing_left,
     reconcile,
 )
-from composer.runtime.supervision.events import Stuck
 from composer.runtime.supervision.fault_handler import FaultHandler
 from composer.runtime.supervision.main_queue import (
-    CallbackBlocks,
-    CallbackHanging,
     Command,
     LoopRecovered,
     NodeEvent,
@@ -50,7 +47,6 @@ class Supervisor:
         self._node_set = reconciler.node_set
         self._main_queue = reconciler.main_queue
         self._status = reconciler.status
-        self._reporter = reconciler.reporter
         self._reconciler = reconciler
         self._faults = FaultHandler(reconciler)
 
@@ -223,10 +219,6 @@ class Supervisor:
                 self._on_moved([moved, *self._main_queue.take_next(NodeMoved)])
             case StepEnded(node=name):
                 self._reconciler.end_step(name)
-            case CallbackBlocks() as blocks:
-                self._on_callback_blocks(blocks)
-            case CallbackHanging() as hanging:
-                self._on_callback_hanging(hanging)
             case LoopRecovered() as recovered:
                 self._faults.on_loop_recovered(recovered)
             case NodeReturned(node=name):
@@ -256,18 +248,6 @@ class Supervisor:
             texts.append(f"restart {restart.attempt} of {self._node_set.nodes[name].full_name}")
         if texts:
             self.reconcile_settled(", ".join(texts))
-
-    def _on_callback_blocks(self, blocks: CallbackBlocks) -> None:
-        """Say once that a callback takes long: it may be meant to, or it may hang."""
-        logger = self._node_set.nodes[blocks.node].full_name.strip("/").replace("/", ".")
-        text = f"{blocks.callback} has not returned for {blocks.for_s:.0f} s; it is at"
-        self._reporter.log(LogLevel.WARN, logger, f"{text} {blocks.location}")
-
-    def _on_callback_hanging(self, hanging: CallbackHanging) -> None:
-        """Report a callback that takes too long; the health monitor interrupts it."""
-        full_name = self._node_set.nodes[hanging.node].full_name
-        action = f"return from {hanging.callback} within {1000.0 * hanging.limit_s:g} ms"
-        self._reporter.report(Stuck(self._reporter.elapsed_s, full_name, action, hanging.stack))
 
     def _on_returned(self, name: str) -> None:
         """Bring a node up again that was not there, or not as expected, and what depends on it."""

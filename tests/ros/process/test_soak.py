@@ -15,15 +15,17 @@ from pathlib import Path
 import pytest
 
 from tests.ros.dashboard.test_foxglove_limits import raw
-from tests.ros.process.test_restarts import PROGRAMS, SYSTEM, TALKER, children, settled, usage
+from tests.ros.process.test_restarts import PROGRAMS, SYSTEM, TALKER, Usage, children, usage
 from tests.ros.support.commands import compose
 from tests.ros.support.dashboard import Dashboard
 from tests.ros.support.system_process import PATIENCE_S, RunningSystem
 
 #: Restarts of everything, several times as often as the system waits before the next one.
-RESTARTS = "{max_attempts: 100000, window_ms: 3600000, backoff_ms: 20, backoff_max_ms: 200}"
+RESTARTS = "{max_attempts: 10000, window_ms: 3600000, backoff_ms: 20, backoff_max_ms: 200}"
 KILL_PERIOD_S = 3.0
-WARM_UP_KILLS = 10
+KILLS = 10
+#: The system, its dashboard, the launcher, the executable and the other process.
+PROCESSES = 5
 #: Of the system, and of the dashboard beside it.
 MEMORY_MB, DASHBOARD_MB = 12.0, 8.0
 SPARE_THREADS = 2
@@ -57,6 +59,19 @@ def wait_until_up(system: RunningSystem) -> None:
         time.sleep(0.2)  # poll: each look is a command
 
 
+def steady(pid: int, processes: int) -> Usage:
+    """Return the usage of a process and its descendants once it does not change any more."""
+    end_s = time.monotonic() + PATIENCE_S
+    before: Usage | None = None
+    while True:
+        time.sleep(2.0)  # poll: nothing announces that everything has restarted
+        now = usage(pid)
+        same = before is not None and before.descriptors == now.descriptors
+        if (same and now.processes == processes) or time.monotonic() > end_s:
+            return now
+        before = now
+
+
 @pytest.mark.soak
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("seconds", [30, 600])
@@ -80,36 +95,35 @@ def test_kills_of_any_process(seconds: int, tmp_path: Path) -> None:
                 os.kill(chance.choice(victims), signal.SIGKILL)
             wait_until_up(system)
 
-        with raw(dashboard.address, max_queue=1, close_timeout=0) as stalled:
-            stalled.subscribe("/chatter")
-            with lifecycle_client("talker") as first_codes, lifecycle_client("driver") as codes:
-                for _ in range(WARM_UP_KILLS):
+        def kill_some(times: int) -> None:
+            """Kill with a client that stalls, and which the dashboard drops after a while."""
+            options = {"max_queue": 1, "close_timeout": 0, "ping_interval": None}
+            with raw(dashboard.address, **options) as stalled:
+                stalled.subscribe("/chatter")
+                for _ in range(times):
                     kill_one()
-                first = usage(pid)
-                first_of_dashboard = usage(dashboard.process.pid)
-                end_s = time.monotonic() + seconds
-                while time.monotonic() < end_s:
-                    kill_one()
-                    print(f"{end_s - time.monotonic():.0f} s left", usage(pid))
                     time.sleep(KILL_PERIOD_S)  # the period of the kills
-            wait_until_up(system)
-            last = settled(lambda: usage(pid), first)
-            of_dashboard = usage(dashboard.process.pid)
-            print(f"seed {seed}", first, last, first_of_dashboard, of_dashboard)
-            assert set(first_codes + codes) <= {0, 1}
-            assert first_codes.count(0) > 0
-            assert codes.count(0) > 0
-            for before, after, memory_mb in (
-                (first, last, MEMORY_MB),
-                (first_of_dashboard, of_dashboard, DASHBOARD_MB),
-            ):
-                assert after.zombies == 0
-                assert (after.processes, after.descriptors) == (
-                    before.processes,
-                    before.descriptors,
-                )
-                assert after.threads <= before.threads + SPARE_THREADS
-                assert after.memory_mb - before.memory_mb < memory_mb
+
+        with lifecycle_client("talker") as first_codes, lifecycle_client("driver") as codes:
+            kill_some(KILLS)
+            first, first_of_dashboard = steady(pid, PROCESSES), steady(dashboard.process.pid, 1)
+            end_s = time.monotonic() + seconds
+            while time.monotonic() < end_s:
+                kill_some(KILLS)
+                print(f"{end_s - time.monotonic():.0f} s left", usage(pid), flush=True)
+        last, of_dashboard = steady(pid, PROCESSES), steady(dashboard.process.pid, 1)
+        print(f"seed {seed}", first, last, first_of_dashboard, of_dashboard, sep="\n")
+        assert set(first_codes + codes) <= {0, 1}
+        assert first_codes.count(0) > 0
+        assert codes.count(0) > 0
+        for before, after, memory_mb in (
+            (first, last, MEMORY_MB),
+            (first_of_dashboard, of_dashboard, DASHBOARD_MB),
+        ):
+            assert after.zombies == 0
+            assert after.descriptors <= before.descriptors
+            assert after.threads <= before.threads + SPARE_THREADS
+            assert after.memory_mb - before.memory_mb < memory_mb
         dashboard.process.send_signal(signal.SIGINT)
         assert dashboard.process.wait(timeout=PATIENCE_S) == 0
         system.stop()

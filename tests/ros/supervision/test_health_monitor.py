@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor, _ObservedCallback
 from composer.runtime.supervision.main_queue import SharedDesiredState
 from tests.ros.support.in_process import system_of
@@ -20,7 +21,7 @@ from tests.ros.support.in_process import system_of
 def test_a_late_check_counts_at_most_as_two(passed_s: float, counted_s: float) -> None:
     """Otherwise every callback would hang after a pause of the computer."""
     node_set: Any = SimpleNamespace(nodes={}, loops={}, hung=set())
-    monitor = HealthMonitor(node_set, SharedDesiredState(), print)
+    monitor = HealthMonitor(node_set, SharedDesiredState(), print, Reporter(None))
     assert monitor._period_s == 1.0
     now_s = time.monotonic()
     monitor._forgive_delay(now_s)
@@ -49,6 +50,6 @@ def test_silence_is_checked_where_it_can_be_known(tmp_path: Path) -> None:
     models = {node.name.value: node for node in system_of(WATCHED, tmp_path).nodes}
     nodes = {name: SimpleNamespace(model=model) for name, model in models.items()}
     node_set: Any = SimpleNamespace(nodes=nodes, loops={}, hung=set())
-    monitor = HealthMonitor(node_set, SharedDesiredState(), print)
+    monitor = HealthMonitor(node_set, SharedDesiredState(), print, Reporter(None))
     assert models.keys() == {"camera", "driver", "arm"}
     assert monitor._silences.keys() == {"arm"}

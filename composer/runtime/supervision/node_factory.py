@@ -1,0 +1,167 @@
+"""Creates the nodes of a system, and the loops that run them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+
+from composer.base.source import Located
+from composer.behavior import CallCancelled
+from composer.model import (
+    DEFAULT_EXECUTOR,
+    Executor,
+    ExecutorKind,
+    LogLevel,
+    Node,
+    System,
+)
+from composer.model.names import join
+from composer.runtime.callbacks.chains import Chains
+from composer.runtime.callbacks.log import Write
+from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.children.child_processes import ChildProcesses
+from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.loop import Loop
+from composer.runtime.host_options import HostOptions
+from composer.runtime.hosting.behavior_node import NodeOfBehavior
+from composer.runtime.hosting.hosted_node import HostedNode
+from composer.runtime.intra_process.router import LocalRouter, shared_channels
+from composer.runtime.members.node import MemberNode
+from composer.runtime.members.other_processes import OtherProcesses
+from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.managed_node import (
+    ManagedNode,
+    NodeListener,
+)
+from composer.runtime.node.node import RunningNode
+from composer.runtime.node.options import NodeOptions, ProcessContext
+from composer.runtime.outside_nodes.executable_node import ExecutableNode
+from composer.runtime.outside_nodes.external_node import ExternalNode
+from composer.runtime.outside_nodes.outside_node import OutsideContext
+
+#: The loop on which all nodes outside the process are driven.
+_OUTSIDE = "nodes outside the process"
+
+
+class NodeFactory:
+    """What the nodes of one system have in common. A loop is created with its first node."""
+
+    def __init__(
+        self,
+        system: System,
+        make_listener: Callable[[Node], NodeListener],
+        options: HostOptions,
+        write_log: Write,
+        together: Callable[[], AbstractContextManager[None]],
+    ) -> None:
+        """``make_listener(node)`` returns the listener of a node.
+
+        ``write_log`` receives what other processes of the system print. What their nodes report
+        within the context manager ``together`` is handled together.
+        """
+        self._system = system
+        self._make_listener = make_listener
+        self._options = options
+        self._seen_messages = MessageSnapshots() if options.check_mutation else None
+        self._router = LocalRouter({})
+        self._process: ProcessContext  # set by join()
+        self.executors = {executor.name.value: executor for executor in system.executors}
+        self.loops: dict[str, Loop] = {}
+        self.chains = Chains(system, tracing=options.tracing)
+        self.children = ChildProcesses()
+        namespace = join(system.namespace, system.name.value)
+        self.other_processes = OtherProcesses(
+            system, namespace, options.member_command, write_log, together
+        )
+
+    def join(self, process: ProcessContext) -> str | None:
+        """Create the nodes in this process, and let them share messages there.
+
+        Return why the middleware does not allow that, or None.
+        """
+        self._process = process
+        self._router = LocalRouter(shared_channels(self._system))
+        return self._router.refusal
+
+    def make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:
+        """Create a node; ``before`` is the one that it replaces, whose statistics it keeps.
+
+        Raises what its creation raises, such as ParameterError.
+        """
+        statistics = (
+            Statistics(tracing=self._options.tracing) if before is None else before.statistics
+        )
+        if not node.in_process:
+            return self._make_outside(node, statistics)
+        executor = self._executor_of(node)
+        options = NodeOptions(
+            chains=self.chains,
+            router=self._router,
+            process=self._process,
+            seen_messages=self._seen_messages,
+            log_level=self._log_level_of(node),
+            transition_timeout_s=self._timeout_s(node),
+            system_is_up=before is not None,
+            make_library_node=partial(
+                NodeOfBehavior, level=self._log_level_of(node), parameters={}
+            ),
+        )
+        loop = self._loop_of(executor)
+        kind = RunningNode if node.hosted_class is None else HostedNode
+        return kind(node, loop, options, self._make_listener(node), statistics)
+
+    def _make_outside(self, node: Node, statistics: Statistics) -> ManagedNode:
+        name = Located(_OUTSIDE, node.span)
+        context = OutsideContext(
+            loop=self._loop_of(Executor(name, ExecutorKind.EVENTS, node.span)),
+            manager=self._process.manager,
+            children=self.children,
+            listener=self._make_listener(node),
+            statistics=statistics,
+            timeout_s=self._timeout_s(node),
+            log_level=self._log_level_of(node),
+        )
+        if node.process is not None:
+            process = self.other_processes.process(
+                node.process.value, context.loop, self._process, self.children
+            )
+            return MemberNode(node, process, context)
+        if node.external is not None:
+            return ExternalNode(node, node.external, context)
+        if node.executable is not None:
+            return ExecutableNode(node, node.executable, context)
+        raise AssertionError(f"{node.full_name} runs in this process")
+
+    def _loop_of(self, executor: Executor) -> Loop:
+        name = executor.name.value
+        if name not in self.loops:
+            self.loops[name] = Loop(name, _log_exception, executor.kind, executor.threads)
+        return self.loops[name]
+
+    def _timeout_s(self, node: Node) -> float:
+        override_s = self._options.transition_timeout_s
+        return node.supervision.timeout_ms / 1000.0 if override_s is None else override_s
+
+    def _log_level_of(self, node: Node) -> LogLevel:
+        return self._options.log_level if node.log_level is None else node.log_level.value
+
+    def _executor_of(self, node: Node) -> Executor:
+        """Return the executor that runs the node: by default ``default``, an event loop.
+
+        A hosted class has an event loop of its own by default: its callbacks may block.
+        """
+        if node.executor is not None:
+            return self.executors[node.executor.value]
+        if node.hosted_class is not None:
+            name = Located(node.full_name, node.span)
+            return Executor(name, ExecutorKind.EVENTS, node.span)
+        return self.executors.get(DEFAULT_EXECUTOR) or Executor(
+            Located(DEFAULT_EXECUTOR, node.span), ExecutorKind.EVENTS, node.span
+        )
+
+
+def _log_exception(what: str, error: BaseException) -> None:
+    """Log an exception that leaves a callback, unless its node was only deactivated."""
+    if not isinstance(error, CallCancelled):
+        log_exception(what, error)
