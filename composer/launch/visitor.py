@@ -11,7 +11,7 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,19 +22,24 @@ from launch.actions import (
     ExecuteProcess,
     IncludeLaunchDescription,
     RegisterEventHandler,
+    Shutdown,
     TimerAction,
 )
+from launch.events import Shutdown as ShutdownEvent
 from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
+from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros.actions import LifecycleNode, LoadComposableNodes, Node
 
 from composer.base.source import shown_path
 from composer.launch.parameter_values import parameter_values
-from composer.launch.process_options import process_options, text_of
 
 _UNKNOWN_NAME = "<node_name_unspecified>"
 #: The name that launch gives to the module of each launch file.
 _LAUNCH_MODULE = "python_launch_file"
 _MAXIMUM_ENTITIES = 100_000
+#: What launch waits for after a signal by default, in seconds.
+_SIGNAL_TIMEOUT_S = 5.0
 
 
 class Visitor:
@@ -99,7 +104,7 @@ class Visitor:
             "environment": self._environment_of(node),
             "lifecycle": isinstance(node, LifecycleNode),
             "note": note,
-            "process": process_options(node, self._context),
+            "process": _process_options(node, self._context),
         }
         sources = [*self._global_parameters()]
         expanded = getattr(node, "_Node__expanded_parameter_arguments", None) or ()
@@ -135,7 +140,63 @@ class Visitor:
         return " ".join(self._text(word) for word in entity.cmd)
 
     def _text(self, value: Any) -> str:
-        return text_of(value, self._context)
+        return _text_of(value, self._context)
+
+
+def _process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
+    """Return the options that differ from the defaults, and whether they end the launch.
+
+    Times are in seconds. ``left_out`` are options that a system does not have.
+    """
+    given = _attribute(node, "on_exit")
+    on_exit = list(given) if isinstance(given, list | tuple) else [given] if given else []
+    found: dict[str, Any] = {
+        "cwd": _text_of(node.cwd, context) if node.cwd else None,
+        "ends_launch": any(map(_is_shutdown, on_exit)),
+        "left_out": list(_left_out_options(node, context, on_exit)),
+    }
+    retries = _attribute(node, "respawn_max_retries")
+    if retries != 0 and perform_typed_substitution(
+        context, _attribute(node, "respawn") or False, bool
+    ):
+        delay = _attribute(node, "respawn_delay")
+        found["respawn_delay"] = 0.0 if delay is None else float(_text_of(delay, context))
+        found["respawn_max_retries"] = -1 if retries is None else int(retries)
+    for name in ("sigterm_timeout", "sigkill_timeout"):
+        timeout_s = float(_text_of(_attribute(node, name), context) or _SIGNAL_TIMEOUT_S)
+        if timeout_s != _SIGNAL_TIMEOUT_S:
+            found[name] = timeout_s
+    return found
+
+
+def _text_of(value: Any, context: LaunchContext) -> str:
+    """Return a text, a number or substitutions as a text."""
+    if isinstance(value, int | float):
+        return str(value)
+    return str(perform_substitutions(context, normalize_to_list_of_substitutions(value or "")))
+
+
+def _attribute(node: Any, name: str) -> Any:
+    """Return what ExecuteLocal has been given; it has no public attribute for that."""
+    return getattr(node, f"_ExecuteLocal__{name}", None)
+
+
+def _left_out_options(node: Any, context: LaunchContext, on_exit: Iterable[Any]) -> Iterator[str]:
+    prefix = _text_of(node.process_description.prefix, context)
+    if prefix:
+        yield f"prefix: {prefix}"
+    if perform_typed_substitution(context, node.shell, bool):
+        yield "shell: the program runs without a shell"
+    if node.env:
+        yield "env: the variables are added to the others, and do not replace them"
+    for item in on_exit:
+        if not _is_shutdown(item):
+            yield f"on_exit: {getattr(item, '__name__', type(item).__name__)}"
+
+
+def _is_shutdown(item: Any) -> bool:
+    is_event = isinstance(item, EmitEvent) and isinstance(item.event, ShutdownEvent)
+    return is_event or isinstance(item, Shutdown)
 
 
 def _cause(error: BaseException) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.bridges.export.wheel import wheel as composer_wheel
+from composer.bridges.export.container_image import wheel as composer_wheel
 from tests.packaging.installation import Installation, with_this_ros, without_ros
 
 

@@ -13,7 +13,7 @@ from composer.bridges.export.deployment import (
     ros_variables,
     services,
 )
-from composer.bridges.export.yaml_text import yaml_text
+from composer.bridges.export.yaml_text import without_variables, yaml_text
 from composer.model import System
 
 _HEAD = """\
@@ -80,7 +80,7 @@ def compose_file(
             del found[service.label]["environment"]
     document = {"name": listed[0].label, "services": found}
     end = _END if len(listed) > 1 and not is_restarted(system) else ""
-    return _HEAD.format(system=system.name) + end + yaml_text(_escaped(document))
+    return _HEAD.format(system=system.name) + end + yaml_text(without_variables(document))
 
 
 def _conditional(system: System, service: Service, listed: tuple[Service, ...]) -> dict[str, Any]:
@@ -128,16 +128,3 @@ def _health(ask: list[str]) -> dict[str, Any]:
         "retries": 3,
         "start_period": "60s",
     }
-
-
-def _escaped(value: Any) -> Any:
-    """Return a value in which docker compose replaces no variables."""
-    match value:
-        case str():
-            return value.replace("$", "$$")
-        case dict():
-            return {key: _escaped(item) for key, item in value.items()}
-        case list():
-            return [_escaped(item) for item in value]
-        case _:
-            return value

@@ -17,7 +17,7 @@ from composer.bridges.export.deployment import (
     ros_variables,
     services,
 )
-from composer.bridges.export.yaml_text import yaml_text
+from composer.bridges.export.yaml_text import without_variables, yaml_text
 from composer.model import System
 from composer.model.discovery import is_loopback
 
@@ -181,7 +181,7 @@ def _container(
     alive = ready if service.is_server else ready[:-1]
     return {
         **({} if priority is None else {"#2": _PRIORITY.format(priority=priority)}),
-        "command": [_escaped(word) for word in ("compose", *service.command(file))],
+        "command": without_variables(["compose", *service.command(file)]),
         **({"env": _variables(variables)} if variables else {}),
         **({"resources": limits} if (limits := _limits(service)) else {}),
         **({} if service.is_server else {"#3": _PROBES}),
@@ -198,12 +198,9 @@ def _container(
 
 
 def _variables(environment: Mapping[str, str]) -> list[dict[str, str]]:
-    return [{"name": name, "value": _escaped(value)} for name, value in environment.items()]
-
-
-def _escaped(text: str) -> str:
-    """Return a text in which Kubernetes replaces no variables: ``$$`` becomes ``$``."""
-    return text.replace("$", "$$")
+    return [
+        {"name": name, "value": without_variables(value)} for name, value in environment.items()
+    ]
 
 
 def _limits(service: Service) -> dict[str, Any]:

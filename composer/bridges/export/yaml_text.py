@@ -53,3 +53,16 @@ def yaml_text(document: Mapping[str, Any]) -> str:
 def _comment(match: re.Match[str]) -> str:
     indent, value = match.groups()
     return "\n".join(f"{indent}# {line}" for line in str(yaml.safe_load(value)).splitlines())
+
+
+def without_variables(value: Any) -> Any:
+    """Return a value in which docker compose and Kubernetes replace no variables."""
+    match value:
+        case str():
+            return value.replace("$", "$$")
+        case dict():
+            return {key: without_variables(item) for key, item in value.items()}
+        case list():
+            return [without_variables(item) for item in value]
+        case _:
+            return value

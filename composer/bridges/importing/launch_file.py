@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
+from composer.bridges.importing.writing import free_name
 from composer.language.tree import Plain
 from composer.model import LogLevel
 from composer.model.names import join_node_name, parameter_name_problem
@@ -76,9 +77,9 @@ def _names(items: Iterable[Mapping[str, Any]], left_out: list[str]) -> list[str]
     for item in items:
         name = item["name"]
         if name is None:
-            name = _free(_identifier(Path(item["executable"]).name), taken)
+            name = free_name(_identifier(Path(item["executable"]).name), taken)
         elif join_node_name(item["namespace"], name) in full_names:
-            name = _free(name, taken)
+            name = free_name(name, taken)
             left_out.append(f"the name '{item['name']}' of a second node: it is '{name}' here")
         taken.add(name)
         full_names.add(join_node_name(item["namespace"], name))
@@ -90,13 +91,6 @@ def _identifier(program: str) -> str:
     stem = program.partition(".")[0]
     name = "".join(each if each.isalnum() and each.isascii() else "_" for each in stem)
     return f"_{name}" if not name or name[0].isdigit() else name
-
-
-def _free(name: str, taken: set[str]) -> str:
-    number, free = 2, name
-    while free in taken:
-        free, number = f"{name}_{number}", number + 1
-    return free
 
 
 def _executable(item: Mapping[str, Any]) -> Plain:

@@ -28,16 +28,12 @@ T = TypeVar("T")
 
 #: The classes that create endpoints: their kind, and their arguments in order.
 _ACTIONS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
-    "rclpy.action.ActionServer": (PortKind.ACTION_SERVER, ("node", "action_type", "action_name")),
-    "rclpy.action.server.ActionServer": (
-        PortKind.ACTION_SERVER,
-        ("node", "action_type", "action_name"),
-    ),
-    "rclpy.action.ActionClient": (PortKind.ACTION_CLIENT, ("node", "action_type", "action_name")),
-    "rclpy.action.client.ActionClient": (
-        PortKind.ACTION_CLIENT,
-        ("node", "action_type", "action_name"),
-    ),
+    f"rclpy.action.{name}": (kind, ("node", "action_type", "action_name"))
+    for kind, names in (
+        (PortKind.ACTION_SERVER, ("ActionServer", "server.ActionServer")),
+        (PortKind.ACTION_CLIENT, ("ActionClient", "client.ActionClient")),
+    )
+    for name in names
 }
 _TYPES = ("msg_type", "srv_type", "action_type")
 _NAMES = ("topic", "srv_name", "action_name")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 from composer.base.characters import escape_lines, is_safe
-from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
+from composer.bridges.importing.found import FoundSystem
 from composer.bridges.importing.writing import write_system
 from composer.language.document import parse_bytes
 from composer.language.document.limits import MAX_ENTRIES
@@ -64,35 +64,23 @@ def _escaped(value: Plain) -> Plain:
 
 def _smaller(found: FoundSystem, size: int) -> FoundSystem:
     """Leave out the largest parameters, at least ``size`` characters; without any, nodes."""
-    parameters = sorted(_parameters(found), key=lambda item: item[0], reverse=True)
-    removed: dict[tuple[str, str], int] = {}
-    for characters, node, item in parameters:
-        if sum(removed.values()) >= size:
-            break
-        removed[node.full_name, item.name] = characters
-    if removed:
-        nodes = tuple(
-            replace(
-                node,
-                parameters=tuple(
-                    item for item in node.parameters if (node.full_name, item.name) not in removed
-                ),
-            )
-            for node in found.nodes
-        )
-        left_out = [
-            f"parameter {name} of {node}: its value has about {characters:,} characters"
-            for (node, name), characters in removed.items()
-        ]
-    else:
-        count = max(1, int(len(found.nodes) * _PART), len(found.nodes) - MAX_ENTRIES)
-        nodes = found.nodes[:-count]
-        left_out = [f"node {node.full_name}: the file is full" for node in found.nodes[-count:]]
-    return replace(found, nodes=nodes, left_out=(*found.left_out, *left_out))
-
-
-def _parameters(found: FoundSystem) -> Iterator[tuple[int, FoundNode, FoundParameter]]:
-    """Yield each parameter with its size in characters."""
-    for node in found.nodes:
-        for item in node.parameters:
-            yield len(str(item.value)) + len(str(item.settings)), node, item
+    parameters = [
+        (len(str(item.value)) + len(str(item.settings)), number, item)
+        for number, node in enumerate(found.nodes)
+        for item in node.parameters
+    ]
+    if not parameters:
+        kept = min(MAX_ENTRIES, len(found.nodes) - max(1, int(len(found.nodes) * _PART)))
+        full = (f"node {node.full_name}: the file is full" for node in found.nodes[kept:])
+        return replace(found, nodes=found.nodes[:kept], left_out=(*found.left_out, *full))
+    parameters.sort(key=lambda item: -item[0])
+    sizes = itertools.accumulate(characters for characters, _, _ in parameters)
+    removed = parameters[: sum(total < size for total in sizes) + 1]
+    nodes, left_out = list(found.nodes), list(found.left_out)
+    for characters, number, item in removed:
+        node = nodes[number]
+        kept_parameters = tuple(other for other in node.parameters if other is not item)
+        nodes[number] = replace(node, parameters=kept_parameters)
+        what = f"parameter {item.name} of {node.full_name}"
+        left_out.append(f"{what}: its value has about {characters:,} characters")
+    return replace(found, nodes=tuple(nodes), left_out=tuple(left_out))

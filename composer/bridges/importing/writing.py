@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Container, Iterable
+from dataclasses import fields, replace
 
 from composer.base.source import SourceFile, Span
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
@@ -14,26 +15,8 @@ from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
 from composer.model import ChannelKind, PortKind
 from composer.model.qos import PRESETS, QosProfile
 
-_SECTIONS = {
-    PortKind.PUBLISHER: "publishers",
-    PortKind.SUBSCRIPTION: "subscriptions",
-    PortKind.SERVICE: "services",
-    PortKind.CLIENT: "clients",
-    PortKind.ACTION_SERVER: "action_servers",
-    PortKind.ACTION_CLIENT: "action_clients",
-}
 #: Presets that may describe a profile, the usual ones first.
 _PRESETS = ("command", "sensor_data", "state")
-_POLICIES = (
-    "history",
-    "depth",
-    "reliability",
-    "durability",
-    "deadline_ms",
-    "lifespan_ms",
-    "liveliness",
-    "liveliness_lease_duration_ms",
-)
 #: What was left out and is listed in a file.
 _MAX_LISTED = 200
 _NOWHERE = Span(SourceFile("", ""), 1, 1, 1)
@@ -89,7 +72,7 @@ def node_keys(nodes: Iterable[FoundNode]) -> dict[str, FoundNode]:
         key = node.name
         if names[node.name] > 1:
             key = _key(node.full_name)
-        found[_free(key, found)] = node
+        found[free_name(key, found)] = node
     return found
 
 
@@ -101,9 +84,9 @@ def qos_value(profile: QosProfile) -> Plain:
             return name
     default = QosProfile()
     return {
-        policy: _policy(getattr(profile, policy))
-        for policy in _POLICIES
-        if getattr(profile, policy) != getattr(default, policy)
+        policy.name: _policy(getattr(profile, policy.name))
+        for policy in fields(QosProfile)
+        if getattr(profile, policy.name) != getattr(default, policy.name)
     }
 
 
@@ -130,18 +113,17 @@ def _declarations(node: FoundNode, path: tuple[str, ...], comments: _Comments) -
             if item.comments:
                 comments[*path, "parameters", item.name] = item.comments
     keys: set[str] = set()  # a key is the name of one port of the node, whatever its kind
-    for kind, section in _SECTIONS.items():
-        ports = [port for port in node.ports if port.kind is kind]
+    for kind in PortKind:
         written: dict[str, Plain] = {}
-        for port in ports:
+        for port in (port for port in node.ports if port.kind is kind):
             relative = _relative(port.name, node) if path else port.name
-            key = _free(_key(_last_part(relative), relative), keys)
+            key = free_name(_key(relative.rpartition("/")[2] or "port", relative), keys)
             keys.add(key)
             written[key] = _port(port, relative, key)
             if port.comments:
-                comments[*path, section, key] = port.comments
+                comments[*path, kind.section, key] = port.comments
         if written:
-            content[section] = written
+            content[kind.section] = written
     return content
 
 
@@ -176,21 +158,16 @@ def _policy(value: object) -> Plain:
     return value if isinstance(value, bool | int | float) or value is None else str(value)
 
 
-def _last_part(name: str) -> str:
-    return name.rpartition("/")[2] or "port"
-
-
 def _key(text: str, whole: str = "") -> str:
     """Return ``text`` as the key of a port or node: a Python name."""
     key = _NOT_IN_KEYS.sub("_", text).strip("_") or _NOT_IN_KEYS.sub("_", whole).strip("_")
     return f"_{key}" if key[:1].isdigit() else key or "unnamed"
 
 
-def _free(key: str, taken: Iterable[str]) -> str:
-    number, free = 2, key
-    while free in taken:
-        free, number = f"{key}_{number}", number + 1
-    return free
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return the name, with a number if it is taken."""
+    numbered = (f"{name}_{number}" for number in itertools.count(2))
+    return next(free for free in itertools.chain([name], numbered) if free not in taken)
 
 
 def _map(content: dict[str, Plain], *, has_variables: bool = True) -> Mapping:

@@ -142,7 +142,7 @@ def export_sros2(
 
         write_output(policy(declared), output, replace=force)
         return
-    from composer.bridges.export.dds_permissions import permissions as dds_permissions
+    from composer.bridges.export.sros2 import permissions as dds_permissions
 
     texts = dds_permissions(declared, _domain_id())
     if output is None and len(texts) == 1:

@@ -195,8 +195,8 @@ def _write_image_and(
         IGNORED_FILES,
         containerfile,
         ignored_files,
+        wheel,
     )
-    from composer.bridges.export.wheel import wheel
 
     if folder is None:
         write_raw("".join(map(str, files.values())))

@@ -182,7 +182,7 @@ def _is_found(reference: str, output: Path) -> bool:
 def _constructed(reference: str, timeout_s: float) -> FoundNode:
     """Construct a class in a process of its own. Raises CommandError."""
     require_ros("compose import class --construct")
-    from composer.bridges.importing.constructed import describe_constructed
+    from composer.bridges.importing.live import describe_constructed
 
     module = "composer.client.constructed_class"
     what = f"constructing '{reference}'"

@@ -11,19 +11,25 @@ from composer.language.tree import Plain
 from composer.model import PortKind
 from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
 
-#: Services of every node for tools (rcl_interfaces, lifecycle_msgs, type_description).
-_TOOL_SERVICES = {
+#: Services of every node for tools, with their types.
+PARAMETER_SERVICES = {
     "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
     "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
     "get_parameters": "rcl_interfaces/srv/GetParameters",
     "list_parameters": "rcl_interfaces/srv/ListParameters",
     "set_parameters": "rcl_interfaces/srv/SetParameters",
     "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
+}
+LIFECYCLE_SERVICES = {
     "change_state": "lifecycle_msgs/srv/ChangeState",
     "get_state": "lifecycle_msgs/srv/GetState",
     "get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
     "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
     "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
+}
+_TOOL_SERVICES = {
+    **PARAMETER_SERVICES,
+    **LIFECYCLE_SERVICES,
     "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
     "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
     "get_type_description": "type_description_interfaces/srv/GetTypeDescription",

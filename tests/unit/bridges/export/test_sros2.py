@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.bridges.export.dds_permissions import permissions
-from composer.bridges.export.sros2 import enclaves, policy
+from composer.bridges.export.sros2 import enclaves, permissions, policy
 from composer.loading import load
 from composer.model import PortKind, System
 from tests.cli.compose import compose
