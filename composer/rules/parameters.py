@@ -34,6 +34,8 @@ UNMATCHED_PARAMETERS = warning("RC246", "unmatched-parameters")
 MISSING_PARAMETER = error("RC424", "missing-parameter")
 
 _UNKNOWN_PARAMETER_IF_PASSED_ON = replace(UNKNOWN_PARAMETER, severity=Severity.INFO)
+#: rclpy and rclcpp declare parameters without a value; reading them may fail.
+_MISSING_IF_PASSED_ON = replace(MISSING_PARAMETER, severity=Severity.WARNING)
 _SEVERAL = 2
 _SHOWN_VALUES = 3
 
@@ -151,7 +153,7 @@ def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
                 if nearest(parameter.name.value, unknown) is not None:
                     continue  # it is probably set, with a misspelled name
                 yield Diagnostic(
-                    MISSING_PARAMETER,
+                    _MISSING_IF_PASSED_ON if node.gets_undeclared else MISSING_PARAMETER,
                     f"node '{node.name}' needs a value for parameter '{parameter.name}'",
                     node.name.span,
                     (Label(parameter.name.span, "declared without a default"),),
