@@ -25,7 +25,7 @@ from composer.cli.support.terminal import lines, say
 from composer.model.names import node_name_problem
 
 if TYPE_CHECKING:
-    from composer.bridges.importing import FoundNode
+    from composer.bridges.importing.found import FoundNode
 
 #: The name of an exception of the composer at the end of a traceback; its text says it all.
 _OWN_EXCEPTION = re.compile(r"^composer\.[\w.]+: ")
@@ -102,7 +102,7 @@ def live(
         raise CommandError(
             f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
         )
-    from composer.bridges.importing import readable, write_system
+    from composer.bridges.importing.writing import readable, write_system
 
     found = readable(found)
     write_output(write_system(found), output)
@@ -143,8 +143,8 @@ def import_class(
     The module is searched for in this folder, among the node types of the project, and on
     Python's module search path.
     """
-    from composer.bridges.importing import write_node_type
     from composer.bridges.importing.python_class import ClassNotFound, describe_class
+    from composer.bridges.importing.writing import write_node_type
 
     if output is not None:
         _node_name(output.stem)
@@ -228,8 +228,8 @@ def import_launch(
     if not file.is_file():
         raise UsageError(f"there is no file '{file}'")
     require_launch("compose import launch")
-    from composer.bridges.importing import write_parameters, write_system
     from composer.bridges.importing.launch_file import describe_launch_file
+    from composer.bridges.importing.writing import write_parameters, write_system
 
     arguments_of_process = [str(file.absolute()), *given]
     what = f"evaluating '{file}'"

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from composer.base.diagnostics import Severity
-from composer.bridges.importing import write_parameters, write_system
 from composer.bridges.importing.launch_file import describe_launch_file
+from composer.bridges.importing.writing import write_parameters, write_system
 from composer.launch.parameter_values import parameter_values
 from composer.loading import load
 

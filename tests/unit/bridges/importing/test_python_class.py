@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Severity
-from composer.bridges.importing import write_node_type
 from composer.bridges.importing.python_class import ClassNotFound, describe_class
+from composer.bridges.importing.writing import write_node_type
 from composer.loading import load
 from composer.model import PortKind
 

@@ -7,16 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.bridges.importing import (
-    FoundNode,
-    FoundParameter,
-    FoundPort,
-    FoundSystem,
-    readable,
-    write_node_type,
-    write_system,
-)
+from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.bridges.importing.live import describe_graph
+from composer.bridges.importing.writing import readable, write_node_type, write_system
 from composer.interfaces import Interfaces
 from composer.language.tree import Plain
 from composer.loading import load
