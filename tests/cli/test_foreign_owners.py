@@ -16,7 +16,7 @@ from tests.cli.compose import Done, compose
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="only root can change owners")
 
-NOBODY = 65534
+OTHER_USER = 65534
 RUN = "log/compose/robot/2026-03-01-08-30-00-000-1"
 RECORD = Record(1, "info", "arm", "/arm", "moved").to_line()
 FILES = {
@@ -47,7 +47,7 @@ def make_project() -> Path:
 
 @pytest.fixture
 def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A project and a log that everybody can read, unlike the folders of pytest."""
+    """A project and a log that every user can read, unlike the folders of pytest."""
     path = make_project()
     monkeypatch.chdir(path)
     monkeypatch.setenv("ROS_LOG_DIR", str(path / "log"))
@@ -58,7 +58,7 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @contextmanager
 def other_user() -> Iterator[None]:
     """Be a user who owns nothing here."""
-    os.seteuid(NOBODY)
+    os.seteuid(OTHER_USER)
     try:
         yield
     finally:
@@ -117,6 +117,6 @@ def test_a_private_run_is_skipped(private: str, folder: Path) -> None:
 
 def test_files_of_others_that_root_reads(folder: Path) -> None:
     for path in folder.rglob("*"):
-        os.chown(path, NOBODY, NOBODY, follow_symlinks=False)
+        os.chown(path, OTHER_USER, OTHER_USER, follow_symlinks=False)
     assert compose(*VALIDATE).code == 0
     assert "moved" in compose("logs").out

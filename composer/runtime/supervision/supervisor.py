@@ -2,7 +2,7 @@
 
 :mod:`composer.plan` decides what to do. The supervisor does it, on the main thread, one event at a
 time, and owns the clock of the restarts. Nodes record external transitions in the desired state
-themselves, so every plan is based on all of them (see :mod:`.shared_desired_state`).
+themselves, so every plan is based on all of them (see :mod:`.main_queue`).
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ def end(process: subprocess.Popen[str]) -> str:
 
 @pytest.mark.usefixtures("talkative")
 @pytest.mark.parametrize("words", [("top", "--json"), ("logs", "-f")])
-def test_a_command_whose_output_nobody_reads(words: tuple[str, ...]) -> None:
+def test_a_command_whose_output_is_not_read(words: tuple[str, ...]) -> None:
     with started(*words) as process:
         wait_until_full(process)
         end(process)

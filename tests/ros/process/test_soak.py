@@ -26,7 +26,7 @@ KILL_PERIOD_S = 3.0
 KILLS = 10
 #: The system, its dashboard, the launcher, the executable and the other process.
 PROCESSES = 5
-#: Of the system, and of the dashboard beside it.
+#: Of the system, and of the dashboard next to it.
 MEMORY_MB, DASHBOARD_MB = 12.0, 8.0
 SPARE_THREADS = 2
 
