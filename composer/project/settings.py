@@ -14,7 +14,8 @@ from composer.base.source import Located, SourceFile, Span, shown_path
 from composer.language.document import read_document
 from composer.language.rules import UNREADABLE_FILE, YAML_SYNTAX
 from composer.language.schema import check_schema
-from composer.language.tree import Mapping, Scalar, Sequence
+from composer.language.tree import Mapping, Sequence
+from composer.language.tree_values import entries, flag, key, plain_text, texts
 
 BAD_SETTING = error("RC042", "bad-setting")
 FOREIGN_OWNER = warning("RC044", "foreign-owner")
@@ -73,14 +74,13 @@ def read_settings(written: SettingsSource) -> tuple[Settings, list[Diagnostic]]:
     if tree is None:
         return Settings(written.source), []
     diagnostics = check_schema(tree, _SCHEMA)
-    strict = tree.get("strict")
     settings = Settings(
         written.source,
         nodes=_folders(tree, "nodes", written.root, diagnostics),
         interfaces=_folders(tree, "interfaces", written.root, diagnostics),
-        strict=isinstance(strict, Scalar) and strict.value is True,
-        select=tuple(_texts(tree, "select")),
-        ignore=tuple(_texts(tree, "ignore")),
+        strict=flag(tree.get("strict"), default=False),
+        select=texts(tree.get("select")),
+        ignore=texts(tree.get("ignore")),
         severity=tuple(_severities(tree)),
     )
     return settings, diagnostics
@@ -122,7 +122,7 @@ def _folders(
     if not isinstance(tree.get(name), Sequence):
         return None
     found = []
-    for text in _texts(tree, name):
+    for text in texts(tree.get(name)):
         folder = root / text.value
         problem = _problem(folder, root)
         if problem is None:
@@ -142,28 +142,16 @@ def _problem(folder: Path, root: Path) -> str | None:
         if not folder.resolve().is_relative_to(root):
             return "is outside the project"
         return None if folder.is_dir() else "is not a folder"
-    except (
-        OSError,
-        RuntimeError,
-        ValueError,
-    ):  # too long, a symbolic link loop or not a valid path
+    except (OSError, RuntimeError, ValueError):  # too long, a loop of links or not a valid path
         return "is not a folder"
-
-
-def _texts(tree: Mapping, name: str) -> Iterator[Located[str]]:
-    items = tree.get(name)
-    for item in items.items if isinstance(items, Sequence) else ():
-        if isinstance(item, Scalar) and isinstance(item.value, str):
-            yield Located(item.value, item.span)
 
 
 def _severities(tree: Mapping) -> Iterator[tuple[Located[str], Severity]]:
     known = {severity.value: severity for severity in Severity}
-    chosen = tree.get("severity")
-    for entry in chosen if isinstance(chosen, Mapping) else ():
-        if isinstance(entry.value, Scalar) and entry.value.value in known:
-            severity = known[str(entry.value.value)]
-            yield Located(entry.name, entry.key.span), severity
+    for entry in entries(tree.get("severity")):
+        severity = known.get(plain_text(entry.value))
+        if severity is not None:
+            yield key(entry), severity
 
 
 def apply_rule_settings(diagnostics: Iterable[Diagnostic], settings: Settings) -> list[Diagnostic]:

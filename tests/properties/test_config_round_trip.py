@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.base.resources import systems_folder
-from composer.base.source import SourceFile, Span
+from composer.base.source import SourceFile
 from composer.language.document import parse_document
 from composer.language.document.writer import write_document
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, plain
+from composer.language.tree import Mapping, plain
 from composer.loading import LoadResult, gives_same_model, load
 from composer.model.assembly.canonical import canonical
 from tests.examples import examples
+from tests.properties.trees import maps, trees
 from tests.properties.validating import SHIPPED
 
-SPAN = Span(SourceFile("it"), 1, 1)
 #: Systems that can be included anywhere, with variables and nodes to override.
 PARTS: dict[str, dict[str, Any]] = {
     "robot.yaml": {"variables": {"start": [1.0, 2.5]}, "nodes": {"planner": {"executor": "slow"}}},
@@ -106,29 +106,12 @@ scalars = st.one_of(
     st.text(st.characters(exclude_categories=["Cc", "Cs", "Cf", "Co", "Cn"]), max_size=12),
     st.text("abz019_./~{}()[]'\"+-*% :#&!|>@`,?\t\n", max_size=8),
     st.sampled_from(["yes", "NO", "null", "~", "1e3", "0x1f", "08", "22:22", "- a", "a: b", "<<"]),
-).map(lambda value: Scalar(value, SPAN))
+)
 names = st.text("abz019_./~{} :#*-é\t", min_size=1, max_size=8)
 
 
-def maps(values: st.SearchStrategy[Tree]) -> st.SearchStrategy[Mapping]:
-    return st.dictionaries(names, values, max_size=5).map(
-        lambda items: Mapping(
-            tuple(Entry(Scalar(name, SPAN), value) for name, value in items.items()), SPAN
-        )
-    )
-
-
-trees = st.recursive(
-    scalars,
-    lambda inner: (
-        maps(inner) | st.lists(inner, max_size=5).map(lambda items: Sequence(tuple(items), SPAN))
-    ),
-    max_leaves=30,
-)
-
-
 @examples(200)
-@given(tree=maps(trees))
+@given(tree=maps(names, trees(names, scalars, 5, 30), 5))
 def test_any_tree_round_trips(tree: Mapping) -> None:
     if not tree.entries:
         return

@@ -7,17 +7,15 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.base.source import SourceFile, Span
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.tree import Entry, Mapping, Scalar
 from composer.model.dependencies import dependency_cycles
 from composer.model.resolve import OverrideOptions, read_overrides, resolve
 from composer.plan import bring_up, tear_down
 from composer.project import Project
 from composer.project.node_types import NodeTypes
 from tests.examples import examples
+from tests.properties.trees import SOURCE, SPAN, maps, trees
 
-SOURCE = SourceFile("robot.yaml", "")
-SPAN = Span(SOURCE, 1, 1)
 FOLDER = Path("/nowhere")
 
 KEYS = [
@@ -35,35 +33,21 @@ TEXTS = [
 ]  # fmt: skip
 
 numbers = st.integers(-(2**63), 2**64) | st.floats(allow_nan=False, allow_infinity=False)
-scalars = st.one_of(
-    st.none(), st.booleans(), numbers, st.sampled_from(TEXTS), st.text(max_size=8)
-).map(lambda value: Scalar(value, SPAN))
+scalars = st.one_of(st.none(), st.booleans(), numbers, st.sampled_from(TEXTS), st.text(max_size=8))
 
 
-def mappings(values: st.SearchStrategy[Tree]) -> st.SearchStrategy[Mapping]:
-    return st.dictionaries(st.sampled_from(KEYS), values, max_size=6).map(
-        lambda items: Mapping(
-            tuple(Entry(Scalar(name, SPAN), value) for name, value in items.items()), SPAN
-        )
-    )
-
-
-trees = st.recursive(
-    scalars,
-    lambda inner: (
-        mappings(inner)
-        | st.lists(inner, max_size=3).map(lambda items: Sequence(tuple(items), SPAN))
-    ),
-    max_leaves=25,
-)
+KEY = st.sampled_from(KEYS)
+VALUES = trees(KEY, scalars, 4, 25)
 
 
 @st.composite
 def files(draw: st.DrawFn) -> Mapping:
     """Draw a file whose first key makes it a system or a node type, with random content."""
-    first = Entry(Scalar(draw(st.sampled_from(["system", "node"])), SPAN), draw(scalars))
-    nodes = Entry(Scalar("nodes", SPAN), draw(mappings(mappings(trees))))
-    rest = draw(mappings(trees))
+    first = Entry(
+        Scalar(draw(st.sampled_from(["system", "node"])), SPAN), Scalar(draw(scalars), SPAN)
+    )
+    nodes = Entry(Scalar("nodes", SPAN), draw(maps(KEY, maps(KEY, VALUES, 6), 6)))
+    rest = draw(maps(KEY, VALUES, 6))
     kept = [entry for entry in rest if entry.name not in {"system", "node", "nodes"}]
     return Mapping((first, nodes, *kept), SPAN)
 

@@ -7,13 +7,13 @@ import json
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from composer.base.source import SourceFile
-from composer.language.document import parse_document
 from composer.language.document.limits import MAX_VALUES
 from composer.language.expand import expand, missing_variables
+from composer.language.expand.scope import measure
 from composer.language.schema import SCHEMAS, check_schema, schema
-from composer.language.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+from composer.language.tree import Mapping, Plain, plain
 from tests.examples import examples
+from tests.unit.support import resolving
 
 KEYS = sorted(
     {
@@ -45,20 +45,7 @@ def files(draw: st.DrawFn) -> Mapping:
 
 
 def tree_of(content: Plain) -> Mapping:
-    tree, diagnostics = parse_document(SourceFile("f", json.dumps(content)))
-    assert diagnostics == []
-    assert tree is not None
-    return tree
-
-
-def size(tree: Tree) -> int:
-    match tree:
-        case Scalar():
-            return 1
-        case Sequence():
-            return 1 + sum(size(item) for item in tree.items)
-        case Mapping():
-            return 1 + sum(1 + size(entry.value) for entry in tree)
+    return resolving.tree_of(json.dumps(content))
 
 
 @examples(150)
@@ -69,7 +56,7 @@ def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
     trees = {entry.name: entry for entry in tree_of(arguments)} if arguments else {}
     missing_variables(tree, trees)
     expanded, diagnostics = expand(tree, trees)
-    assert size(expanded) <= 2 * MAX_VALUES
+    assert measure(expanded).values <= 2 * MAX_VALUES
     for kind in SCHEMAS:
         diagnostics += check_schema(expanded, kind)
     for diagnostic in diagnostics:

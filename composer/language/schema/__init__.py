@@ -13,7 +13,6 @@ from typing import Any
 from composer.base.diagnostics import Diagnostic
 from composer.base.resources import schemas_folder
 from composer.language.schema.explanations import explain_errors
-from composer.language.schema.locations import TreeIndex
 from composer.language.schema.validation import schema_errors
 from composer.language.tree import Mapping, plain
 
@@ -36,7 +35,7 @@ def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:
 
     The tree has its variables expanded. A load-time variable without value is valid anywhere.
     """
-    return explain_errors(schema_errors(plain(tree), schema(kind)), TreeIndex(tree))
+    return explain_errors(schema_errors(plain(tree), schema(kind)), tree)
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import field
 from itertools import islice
 
 from composer.base.diagnostics import Diagnostic, Label, nearest, shown
@@ -10,10 +11,17 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language import rules
 from composer.language.document.limits import MAX_ERRORS, LimitedDiagnostics, TooManyErrors
-from composer.language.schema.hints import advice, expected, intended_key, type_hint, value_advice
-from composer.language.schema.locations import TreeIndex, TreeValue
+from composer.language.schema.hints import (
+    EXAMPLES,
+    advice,
+    expected,
+    intended_key,
+    type_hint,
+    value_advice,
+)
 from composer.language.schema.validation import Path, SchemaError
-from composer.language.tree import Entry, describe
+from composer.language.tree import Entry, Mapping, Scalar, Tree, describe
+from composer.language.tree_values import entries, items
 
 #: Keys that determine which other keys are valid, and the titles of schemas that have them.
 _DECIDING = frozenset({"type", "topic", "service", "action"})
@@ -26,30 +34,43 @@ _ENDS = {
     "action connection": ("server", "clients"),
 }
 
-#: Example values for missing keys, by the title of the schema.
-_EXAMPLES = {
-    **dict.fromkeys(
-        (("publisher", "type"), ("subscription", "type")),
-        "std_msgs/msg/String",
-    ),
-    **dict.fromkeys((("service", "type"), ("client", "type")), "std_srvs/srv/Trigger"),
-    **dict.fromkeys(
-        (("action server", "type"), ("action client", "type")),
-        "composer_interfaces/action/Navigate",
-    ),
-    ("parameter", "type"): "double",
-    ("feedback", "count"): "10",
-    ("feedback", "period_ms"): "100",
-    ("system", "nodes"): "{talker: {type: timer_source}}",
-}
+_WORDS_FOR_NOTHING = ("null", "~")
+
+
+@dataclass(slots=True)
+class _TreeIndex:
+    """Finds values by path, with an index of the keys of each map."""
+
+    root: Mapping
+    _entries: dict[int, dict[str, Entry]] = field(default_factory=dict)
+
+    def find(self, path: Path) -> tuple[Tree, Scalar | None]:
+        """Return the value at ``path``, which must exist, and its key."""
+        tree: Tree = self.root
+        key = None
+        for step in path:
+            if isinstance(step, str):
+                entry = self.entries(tree)[step]
+                tree, key = entry.value, entry.key
+            else:
+                tree, key = items(tree)[step], None
+        return tree, key
+
+    def entries(self, tree: Tree) -> dict[str, Entry]:
+        """Return the entries of a map by name; none for anything else."""
+        # By identity, since comparing trees is slow; the root keeps them all alive.
+        if id(tree) not in self._entries:
+            self._entries[id(tree)] = {entry.name: entry for entry in entries(tree)}
+        return self._entries[id(tree)]
 
 
 @dataclass(frozen=True, slots=True)
 class _LocatedError(SchemaError):
     """An error with its location in the tree."""
 
-    place: TreeValue
-    index: TreeIndex
+    tree: Tree
+    key: Scalar | None  # None for the root and for items of lists
+    index: _TreeIndex
 
     @property
     def owner(self) -> str:
@@ -68,7 +89,16 @@ class _LocatedError(SchemaError):
         first = next(iter(self.index.root), None)
         if not self.path and first is not None:
             return first.key.span
-        return self.place.owner_span
+        return self.key.span if self.key is not None else self.tree.span
+
+    @property
+    def value_span(self) -> Span:
+        """The location of the value, or of its key if the value is empty."""
+        span = self.tree.span
+        if self.key is None or not isinstance(self.tree, Scalar) or self.tree.value is not None:
+            return span
+        written = span.file.line(span.line)[span.column - 1 :]
+        return span if written.lower().startswith(_WORDS_FOR_NOTHING) else self.key.span
 
     @property
     def subject(self) -> str:
@@ -124,8 +154,9 @@ class _MisspelledKeys:
         )
 
 
-def explain_errors(errors: Iterable[SchemaError], index: TreeIndex) -> list[Diagnostic]:
-    """Return the diagnostics for ``errors``, without those that only follow from another."""
+def explain_errors(errors: Iterable[SchemaError], tree: Mapping) -> list[Diagnostic]:
+    """Return the diagnostics for ``errors`` of ``tree``, without those that follow from another."""
+    index = _TreeIndex(tree)
     located = [_located(error, index) for error in islice(errors, MAX_ERRORS + 1)]
     misspelled = _MisspelledKeys.among(located)
     diagnostics = LimitedDiagnostics()
@@ -138,14 +169,14 @@ def explain_errors(errors: Iterable[SchemaError], index: TreeIndex) -> list[Diag
     return list(dict.fromkeys(diagnostics))
 
 
-def _located(error: SchemaError, index: TreeIndex) -> _LocatedError:
+def _located(error: SchemaError, index: _TreeIndex) -> _LocatedError:
     return _LocatedError(
         error.path,
         error.keyword,
         error.required,
         error.instance,
         error.schema,
-        index.find(error.path),
+        *index.find(error.path),
         index,
     )
 
@@ -156,7 +187,7 @@ def _intended_key(error: _LocatedError, name: str) -> str | None:
 
 
 def _unknown_keys(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
-    entries = error.index.entries(error.place.tree)
+    entries = error.index.entries(error.tree)
     if _has_other_ends(error):
         yield _other_ends(error, entries)
         return
@@ -208,10 +239,7 @@ def _missing_keys(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator
         return
     for name in error.required:
         if name not in error.instance and (error.path, name) not in misspelled.keys:
-            message = f"{error.owner} needs the key '{name}'"
-            example = _EXAMPLES.get((error.schema.get("title", ""), name))
-            hint = f"for example '{name}: {example}'" if example is not None else None
-            yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
+            yield _needed(error, f"the key '{name}'", name)
 
 
 def _missing_choice(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator[Diagnostic]:
@@ -219,14 +247,19 @@ def _missing_choice(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterat
     if _has_other_ends(error):
         return
     if not any((error.path, name) in misspelled.keys for name in names):
-        message = f"{error.owner} needs {_any_of(names)}"
-        example = _EXAMPLES.get((error.schema.get("title", ""), names[0]))
-        hint = f"for example '{names[0]}: {example}'" if example is not None else None
-        yield Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
+        yield _needed(error, _any_of(names), names[0])
+
+
+def _needed(error: _LocatedError, what: str, name: str) -> Diagnostic:
+    """Return that a map needs ``what``, with an example for the key ``name``."""
+    example = EXAMPLES.get((error.schema.get("title", ""), name))
+    hint = f"for example '{name}: {example}'" if example is not None else None
+    message = f"{error.owner} needs {what}"
+    return Diagnostic(rules.MISSING_KEY, message, error.owner_span, hint=hint)
 
 
 def _excluding_keys(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
-    entries = error.index.entries(error.place.tree)
+    entries = error.index.entries(error.tree)
     first, second = sorted(
         (entries[name].key for name in error.required["required"]),
         key=lambda key: (key.span.line, key.span.column),
@@ -239,10 +272,10 @@ def _excluding_keys(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagno
 
 def _wrong_type(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     required = expected(error.schema)
-    found = describe(error.place.tree)
+    found = describe(error.tree)
     message = f"expected {required}{error.subject}, found {found}"
     hint = value_advice(error.path, error.instance) or type_hint(error.schema, error.instance)
-    yield Diagnostic(rules.WRONG_TYPE, message, error.place.value_span, hint=hint)
+    yield Diagnostic(rules.WRONG_TYPE, message, error.value_span, hint=hint)
 
 
 def _unknown_word(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
@@ -255,11 +288,11 @@ def _no_word_or_variable(error: _LocatedError, _: _MisspelledKeys) -> Iterator[D
 
 
 def _no_word_of(error: _LocatedError, words: list[str]) -> Iterator[Diagnostic]:
-    found = describe(error.place.tree)
+    found = describe(error.tree)
     message = f"expected {_any_of(words)}{error.subject}, found {found}"
     close = nearest(error.instance, words) if isinstance(error.instance, str) else None
     hint = f"did you mean '{close}'?" if close is not None else None
-    yield Diagnostic(rules.UNKNOWN_WORD, message, error.place.value_span, hint=hint)
+    yield Diagnostic(rules.UNKNOWN_WORD, message, error.value_span, hint=hint)
 
 
 _LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
@@ -268,7 +301,7 @@ _LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a n
 def _out_of_range(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:
     limit = f"{_LIMITS[error.keyword]} {error.required}"
     message = f"expected {limit}{error.subject}, found {shown(error.instance)}"
-    yield Diagnostic(rules.OUT_OF_RANGE, message, error.place.value_span)
+    yield Diagnostic(rules.OUT_OF_RANGE, message, error.value_span)
 
 
 def _empty_collection(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:

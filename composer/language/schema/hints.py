@@ -71,6 +71,24 @@ _ADVICE: dict[tuple[str, str], str] = {
 }
 
 
+#: Example values for missing keys, by the title of the schema.
+EXAMPLES = {
+    **dict.fromkeys(
+        (("publisher", "type"), ("subscription", "type")),
+        "std_msgs/msg/String",
+    ),
+    **dict.fromkeys((("service", "type"), ("client", "type")), "std_srvs/srv/Trigger"),
+    **dict.fromkeys(
+        (("action server", "type"), ("action client", "type")),
+        "composer_interfaces/action/Navigate",
+    ),
+    ("parameter", "type"): "double",
+    ("feedback", "count"): "10",
+    ("feedback", "period_ms"): "100",
+    ("system", "nodes"): "{talker: {type: timer_source}}",
+}
+
+
 def intended_key(name: str, valid: Iterable[str]) -> str | None:
     """Return the key among ``valid`` that ``name`` is most likely meant to be, or None."""
     return _intended_key(name, frozenset(valid))

@@ -103,7 +103,10 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     """Return the node of an entry in ``nodes``."""
     tree = mapping(entry)
     type_entry = tree.entry("type")
-    made = _inline(tree, context) if type_entry is None else _typed(type_entry, tree, context)
+    if type_entry is None:
+        made = _Declared(declare(tree, context.folders, context.qos, context.diagnostics))
+    else:
+        made = _typed(type_entry, tree, context)
     declared = made.declaration
     external = read_external(tree.entry("external"))
     is_passed_on = external is not None and not declared.only_declared
@@ -240,10 +243,6 @@ def _place_port(
         delivery=connection.delivery,
         isolation=connection.isolation or port.isolation,
     )
-
-
-def _inline(tree: Mapping, context: SystemContext) -> _Declared:
-    return _Declared(declare(tree, context.folders, context.qos, context.diagnostics))
 
 
 def _typed(type_entry: Entry, tree: Mapping, context: SystemContext) -> _Declared:

@@ -145,12 +145,6 @@ class ExternalNode:
                 raise AssertionError(f"condition not met within {timeout_s:g} s")
             self.executor.spin_once(timeout_sec=0.05)
 
-    def spin_for(self, seconds: float) -> None:
-        """Spin for a fixed time, to verify that nothing is received."""
-        end_s = time.monotonic() + seconds
-        while (left_s := end_s - time.monotonic()) > 0:
-            self.executor.spin_once(timeout_sec=min(left_s, 0.05))
-
     def listen(self, message_type: Any, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
         """Subscribe to a topic and return the list to which its messages are appended."""
         received: list[Any] = []

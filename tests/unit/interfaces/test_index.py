@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.interfaces import Action, FieldType, Interfaces, Message, Service
+from composer.interfaces import Action, FieldType, Interfaces, Message, Service, parts
 from composer.interfaces.share_json import read_description
 from composer.interfaces.sources import Bundle, Prefix, find_packages, installed_prefixes
 
@@ -52,19 +52,9 @@ def test_every_definition_of_the_snapshot_can_be_read_and_is_complete() -> None:
         for name in BUNDLED.names(folder):
             found = BUNDLED.find(name)
             assert found is not None, BUNDLED.problem(name)
-            for message in parts(found):
+            for message in parts(found).values():
                 for field in message.fields:
                     assert field.type.is_primitive or BUNDLED.message(field.type.name), field
-
-
-def parts(interface: Message | Service | Action) -> tuple[Message, ...]:
-    match interface:
-        case Message():
-            return (interface,)
-        case Service():
-            return (interface.request, interface.response)
-        case Action():
-            return (interface.goal, interface.result, interface.feedback)
 
 
 def test_constants_are_known() -> None:

@@ -10,12 +10,21 @@ from composer.base.diagnostics import Diagnostic
 from composer.base.source import SourceFile, Span
 from composer.language.document import parse_document
 from composer.language.expand import expand
+from composer.language.tree import Mapping
 from composer.model import System
 from composer.model.resolve import OverrideOptions, read_overrides, resolve
 from composer.project import Project
 from composer.project.node_types import NodeTypes
 
 NOWHERE = Path("/nowhere")
+
+
+def tree_of(text: str, name: str = "f") -> Mapping:
+    """Parse a text that has nothing wrong in it, as the file ``name``."""
+    tree, diagnostics = parse_document(SourceFile(name, dedent(text)))
+    assert [diagnostic.message for diagnostic in diagnostics] == []
+    assert tree is not None
+    return tree
 
 
 def resolve_text(
@@ -25,9 +34,8 @@ def resolve_text(
     namespace: str | None = None,
 ) -> tuple[System, list[Diagnostic]]:
     """Resolve a text; node types are looked for in ``folder``."""
-    source = SourceFile("robot.yaml", dedent(text))
-    tree, diagnostics = parse_document(source)
-    assert tree is not None, [diagnostic.message for diagnostic in diagnostics]
+    tree = tree_of(text, "robot.yaml")
+    source = tree.span.file
     expanded, _ = expand(tree, {})
     overrides, found = read_overrides(OverrideOptions(tuple(settings), namespace))
     system, more = resolve(

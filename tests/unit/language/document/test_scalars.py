@@ -7,6 +7,7 @@ import pytest
 from composer.base.source import SourceFile
 from composer.language.document import parse_document
 from composer.language.tree import ScalarValue, plain
+from tests.unit.support.resolving import tree_of
 
 
 @pytest.mark.parametrize(
@@ -63,10 +64,7 @@ from composer.language.tree import ScalarValue, plain
     ],
 )
 def test_scalar(text: str, value: ScalarValue) -> None:
-    tree, diagnostics = parse_document(SourceFile("f", f"a: {text}"))
-    assert diagnostics == []
-    assert tree is not None
-    found = tree.get("a")
+    found = tree_of(f"a: {text}").get("a")
     assert found is not None
     assert repr(plain(found)) == repr(value)
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from composer.base.source import SourceFile
-from composer.language.document import parse_bytes, parse_document
+from composer.language.document import parse_bytes
 from composer.language.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
+from tests.unit.support.resolving import quoted, tree_of
 
 
 def parsed(text: str) -> Mapping:
-    tree, diagnostics = parse_document(SourceFile("robot.yaml", text))
-    assert [diagnostic.message for diagnostic in diagnostics] == []
-    assert tree is not None
-    return tree
+    return tree_of(text, "robot.yaml")
 
 
 def value_at(tree: Tree, *path: str | int) -> Tree:
@@ -27,12 +24,6 @@ def value_at(tree: Tree, *path: str | int) -> Tree:
             assert found is not None
             tree = found
     return tree
-
-
-def covered(tree: Tree) -> str:
-    """Return the text that the span of ``tree`` covers."""
-    span = tree.span
-    return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
 
 
 @pytest.mark.parametrize(
@@ -63,7 +54,7 @@ def test_values(text: str, value: Plain) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "path", "place", "quoted"),
+    ("text", "path", "place", "covered"),
     [
         ("a: 1", ("a",), "robot.yaml:1:4", "1"),
         ("a:\n  - 10\n  - {b: xyz}", ("a", 1, "b"), "robot.yaml:3:9", "xyz"),
@@ -87,10 +78,10 @@ def test_values(text: str, value: Plain) -> None:
         ("a:\n  - xyz\n\n\nx: 1", ("a",), "robot.yaml:2:5", "xyz"),
     ],
 )
-def test_places(text: str, path: tuple[str | int, ...], place: str, quoted: str) -> None:
+def test_places(text: str, path: tuple[str | int, ...], place: str, covered: str) -> None:
     found = value_at(parsed(text), *path)
     assert str(found.span) == place
-    assert covered(found) == quoted
+    assert quoted(found.span) == covered
 
 
 def test_place_of_nothing_is_behind_the_colon() -> None:
@@ -102,7 +93,7 @@ def test_place_of_key() -> None:
     nodes = tree.get("nodes")
     assert isinstance(nodes, Mapping)
     key = nodes.entries[0].key
-    assert (str(key.span), key.span.length, covered(key)) == ("robot.yaml:2:3", 9, "'my node'")
+    assert (str(key.span), key.span.length, quoted(key.span)) == ("robot.yaml:2:3", 9, "'my node'")
 
 
 @pytest.mark.parametrize(
@@ -127,7 +118,7 @@ def test_verbatim(text: str, verbatim: bool, offset: int) -> None:
 def test_part_of_a_verbatim_scalar(text: str) -> None:
     scalar = value_at(parsed(text), "a")
     assert isinstance(scalar, Scalar)
-    assert covered(Scalar("", scalar.part(2, 3))) == "{b}"
+    assert quoted(scalar.part(2, 3)) == "{b}"
 
 
 def test_alias_has_the_place_of_what_it_repeats() -> None:

@@ -7,19 +7,15 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Diagnostic
-from composer.base.source import SourceFile
-from composer.language.document import parse_document
 from composer.language.document.limits import MAX_COPIES
 from composer.language.expand import expand
 from composer.language.tree import Mapping, Plain, plain
 from tests.unit.support.checking import diagnostics_in
+from tests.unit.support.resolving import tree_of
 
 
 def expanded(text: str) -> tuple[Mapping, list[Diagnostic]]:
-    tree, diagnostics = parse_document(SourceFile("f", text))
-    assert diagnostics == []
-    assert tree is not None
-    return expand(tree, {})
+    return expand(tree_of(text), {})
 
 
 def nodes(written: str, variables: str = "{}") -> Plain:

@@ -7,20 +7,12 @@ import time
 import pytest
 
 from composer.base.diagnostics import Diagnostic
-from composer.base.source import SourceFile
-from composer.language.document import parse_document
 from composer.language.document.limits import MAX_DEPTH
 from composer.language.expand import expand, missing_variables
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
+from tests.unit.support.resolving import tree_of
 
 SECONDS_ALLOWED = 15.0
-
-
-def tree_of(text: str, name: str = "f") -> Mapping:
-    tree, diagnostics = parse_document(SourceFile(name, text))
-    assert diagnostics == []
-    assert tree is not None
-    return tree
 
 
 def arguments(text: str) -> dict[str, Entry]:

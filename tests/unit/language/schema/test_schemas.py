@@ -12,12 +12,12 @@ import pytest
 from jsonschema import Draft7Validator
 
 from composer.base.resources import nodes_folder, schemas_folder, systems_folder
-from composer.base.source import SourceFile
-from composer.language.document import parse_document, read_document
+from composer.language.document import read_document
 from composer.language.schema import SCHEMAS, check_schema, kind_of, schema
 from composer.language.schema.explanations import KEYWORDS
 from composer.language.tree import plain
 from tests.unit.support.growth import assert_linear
+from tests.unit.support.resolving import tree_of
 
 SHIPPED = sorted([*systems_folder().glob("*.yaml"), *nodes_folder().glob("*.yaml")])
 ANNOTATIONS = {"$schema", "title", "description", "default", "examples", "definitions"}
@@ -145,13 +145,10 @@ def check_of(sizes: tuple[int, int], *mistakes: tuple[str, str]) -> Callable[[in
         text = large_system(nodes)
         for right, wrong in mistakes:
             text = text.replace(right, wrong)
-        trees[nodes], diagnostics = parse_document(SourceFile("f", text))
-        assert diagnostics == []
+        trees[nodes] = tree_of(text)
 
     def check(nodes: int) -> bool:
-        tree = trees[nodes]
-        assert tree is not None
-        return not check_schema(tree, "system")
+        return not check_schema(trees[nodes], "system")
 
     return check
 

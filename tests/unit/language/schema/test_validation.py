@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from textwrap import dedent
-
 import pytest
 
 from composer.base.diagnostics import Diagnostic
-from composer.base.source import SourceFile
-from composer.language.document import parse_document
 from composer.language.schema import check_schema, kind_of
-from composer.language.tree import Mapping
-
-
-def tree_of(text: str) -> Mapping:
-    tree, diagnostics = parse_document(SourceFile("f", dedent(text)))
-    assert diagnostics == []
-    assert tree is not None
-    return tree
+from tests.unit.support.resolving import quoted, tree_of
 
 
 def diagnostics_in(text: str) -> list[Diagnostic]:
     tree = tree_of(text)
     return check_schema(tree, str(kind_of(tree)))
-
-
-def marked(diagnostic: Diagnostic) -> str:
-    """Return the text that the diagnostic underlines."""
-    span = diagnostic.primary
-    return span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
 
 
 def node(text: str) -> str:
@@ -290,7 +273,7 @@ def profile(text: str) -> str:
 )  # fmt: skip
 def test_diagnostic(text: str, rule: str, mark: str, message: str, hint: str) -> None:
     (diagnostic,) = diagnostics_in(text)
-    assert (diagnostic.rule.name, marked(diagnostic)) == (rule, mark)
+    assert (diagnostic.rule.name, quoted(diagnostic.primary)) == (rule, mark)
     assert diagnostic.message.startswith(message)
     assert hint in (diagnostic.hint or "")
 
