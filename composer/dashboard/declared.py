@@ -80,7 +80,7 @@ def _excerpt(span: Span) -> dict[str, Any] | None:
         end += 1
     shown = lines[span.line - 1 : min(end, span.line - 1 + _MAX_LINES)]
     text = "\n".join(shown).rstrip()
-    return {"file": span.file.path, "line": span.line, "first_line": span.line, "text": text}
+    return {"file": span.file.path, "line": span.line, "text": text}
 
 
 def _indent(line: str) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 from composer.dashboard.protocol.messages import RequestError
@@ -22,10 +23,9 @@ from composer.interfaces.index import similar_interface
 from composer.interfaces.parser import SEPARATOR, parse_line
 
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-_FOLDERS = {"message": "msg", "service": "srv", "action": "action"}
+_NUMBERS = (*INTEGER_RANGES, *FLOATS, "bool")
 _MAX_DEPTH = 12
 _MAX_PATHS = 500
-_MAX_NAMES = 50
 #: The name of a part of a service or an action, and its number in the definition.
 _PART = re.compile(r"_(Request|Response|Goal|Result|Feedback)$", re.ASCII)
 _PART_NUMBERS = {"Request": 0, "Response": 1, "Goal": 0, "Result": 1, "Feedback": 2}
@@ -43,24 +43,10 @@ class Forms:
         """Return the fields of each part of an interface. Raises RequestError."""
         return {part: self._fields(message, ()) for part, message in self._parts(name).items()}
 
-    def names(self, kind: str, prefix: str) -> list[str]:
-        """Return names of interfaces of a kind that contain a text, those that begin with it first.
-
-        At most 50.
-        """
-        known = self._interfaces.names(_FOLDERS[kind])
-        wanted = prefix.lower()
-        found = [name for name in known if wanted in name.lower()]
-        return sorted(found, key=lambda name: not name.lower().startswith(wanted))[:_MAX_NAMES]
-
-    def paths(self, name: str) -> dict[str, list[str]]:
-        """Return the paths of all fields of a message, and of those that are numbers."""
+    def numeric_paths(self, name: str) -> list[str]:
+        """Return the paths of all fields of a message that are numbers. Raises RequestError."""
         (message,) = self._parts(name).values()
-        found = list(self._paths(message, "", ()))[:_MAX_PATHS]
-        return {
-            "all": [path for path, _ in found],
-            "numeric": [path for path, is_number in found if is_number],
-        }
+        return list(islice(self._numbers(message, "", ()), _MAX_PATHS))
 
     def from_json(self, values: Mapping[str, Any], name: str, part: str) -> dict[str, Any]:
         """Return values of a form as :mod:`composer.client.messages.values` takes them.
@@ -113,20 +99,15 @@ class Forms:
         fields = [] if inner is None or is_endless else self._fields(inner, above)
         return described | {"kind": "message", "fields": fields}
 
-    def _paths(
-        self, message: Message, prefix: str, above: tuple[str, ...]
-    ) -> Iterator[tuple[str, bool]]:
-        """Yield the path of each field, the first item for arrays, and whether it is a number."""
+    def _numbers(self, message: Message, prefix: str, above: tuple[str, ...]) -> Iterator[str]:
+        """Yield the path of each number, of the first item for arrays."""
         for field in message.fields:
-            path = f"{prefix}{field.name}"
-            index = "[0]" if field.type.is_array else ""
-            is_number = field.type.name in INTEGER_RANGES or field.type.name in (*FLOATS, "bool")
-            if index:
-                yield path, False
-            yield f"{path}{index}", is_number
+            path = f"{prefix}{field.name}{'[0]' if field.type.is_array else ''}"
+            if field.type.name in _NUMBERS:
+                yield path
             inner = None if field.type.is_primitive else self._interfaces.message(field.type.name)
             if inner is not None and field.type.name not in above and len(above) < _MAX_DEPTH:
-                yield from self._paths(inner, f"{path}{index}.", (*above, field.type.name))
+                yield from self._numbers(inner, f"{path}.", (*above, field.type.name))
 
     def _record(self, values: Mapping[str, Any], message: Message) -> dict[str, Any]:
         converted = {}

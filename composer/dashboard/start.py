@@ -6,7 +6,6 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
-from composer import version
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.access import Access, is_loopback, new_token, read_token
 from composer.dashboard.context import Dashboard, Options
@@ -20,7 +19,6 @@ from composer.interfaces import Interfaces
 from composer.project import Project
 from composer.project.node_types import interface_folders
 
-PROTOCOL_VERSION = 1
 #: On a busy computer. A participant that does not leave stays in the graph of others for 20 s.
 _LEAVES_WITHIN_S = 5.0
 
@@ -42,7 +40,6 @@ def run_dashboard(
     address: Address,
     options: Options,
     declared: Declared | None,
-    domain_id: int,
     on_ready: Callable[[str], None],
 ) -> None:
     """Serve until a signal; ``on_ready`` gets the URL with the token.
@@ -65,15 +62,9 @@ def run_dashboard(
         feeds=feeds,
         interfaces=interfaces,
         hello={
-            "protocol": PROTOCOL_VERSION,
-            "version": version(),
-            "read_only": options.read_only,
-            "foxglove": options.foxglove,
             "title": _title(options, declared),
-            "system": None if declared is None else declared.system.name.value,
             "file": None if declared is None else declared.file,
-            "domain_id": domain_id,
-            "host": socket.gethostname(),
+            "read_only": options.read_only,
         },
     )
     url = f"http://{_in_url(address.host)}:{port}/?token={token}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -117,7 +116,6 @@ def dashboard(
             Address(host, port, token_file),
             Options(system or "", read_only, foxglove),
             declared,
-            int(os.environ.get("ROS_DOMAIN_ID") or 0),
             on_ready,
         )
     except NotPrivateError as error:

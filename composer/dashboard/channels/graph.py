@@ -41,9 +41,7 @@ class DiagramFeed(Feed):
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
         self._view = values.choice("view", VIEWS, "nodes")
-        source = "declared" if self._view in _DECLARED_ONLY else "live"
-        self._is_live = values.choice("source", ("live", "declared"), source) == "live"
-        self._is_live = self._is_live and self._view not in _DECLARED_ONLY
+        self._is_live = self._view not in _DECLARED_ONLY
         self._declared = None if self._is_live else required(declared, f"the view {self._view}")
         self._drawn: tuple[int, frozenset[str]] | None = None
         self._is_drawing = False
@@ -79,7 +77,7 @@ class DiagramFeed(Feed):
         key = (self._drawn, self._view, self._is_live)
         try:
             diagram = self.ros.diagrams.of(key, lambda: self._laid_out(topology, states))
-            self._finished.extend(self._updates(diagram, topology.revision))
+            self._finished.extend(self._updates(diagram))
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
         finally:
@@ -94,9 +92,8 @@ class DiagramFeed(Feed):
             return Diagram(declared_scene(self._declared), View(self._view))
         return Diagram(live_scene(topology.snapshot(states)), View(self._view))
 
-    def _updates(self, diagram: Diagram, revision: int) -> Iterable[Update]:
+    def _updates(self, _: Diagram) -> Iterable[Update]:
         """Return what to send of a diagram."""
-        del diagram, revision
         return ()
 
 
@@ -109,10 +106,10 @@ class PictureFeed(DiagramFeed):
         self._page = (width, height)
         super().__init__(values, declared)
 
-    def _updates(self, diagram: Diagram, revision: int) -> Iterable[Update]:
+    def _updates(self, diagram: Diagram) -> Iterable[Update]:
         from composer.graph.layout import Size
 
-        yield Update(to_json({"revision": revision, **diagram.on(Size(*self._page))}))
+        yield Update(to_json(diagram.on(Size(*self._page))))
 
 
 class LiveFeed(Feed):

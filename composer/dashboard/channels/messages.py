@@ -23,7 +23,6 @@ _ECHO_PERIOD_S = 0.1
 _DROPS_PERIOD_S = 1.0
 _ECHO_DEPTH = 200
 _MAX_TAKEN = 400
-_MAX_FIELDS = 32
 _PLOT_DEPTH = 1000
 _MAX_SERIES = 16
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
@@ -44,8 +43,6 @@ class EchoFeed(Feed):
 
     def __init__(self, values: Values, _: Declared | None) -> None:
         self._topic = values.text("topic")
-        self._type = values.optional_text("type")
-        self._fields = values.texts("fields", _MAX_FIELDS)
         self._max_hz = values.number("max_hz", 10.0, 0.1, 100.0)
         self._max_items = int(values.number("max_items", 64, 1, 1024))
         self._allowed = 1.0
@@ -55,7 +52,7 @@ class EchoFeed(Feed):
 
     def start(self) -> None:
         """Prepare to read the topic."""
-        self._reader = self.ros.reader(self._topic, self._type, _ECHO_DEPTH)
+        self._reader = self.ros.reader(self._topic, None, _ECHO_DEPTH)
         self.resources.callback(self._reader.close)
 
     def poll(self) -> Iterator[Update]:
@@ -79,15 +76,10 @@ class EchoFeed(Feed):
         yield Update(to_json(data), count=count, dropped=dropped)
 
     def _shown(self, message: Any) -> Any:
-        """Return a message, or the requested fields of it, as plain data."""
-        from composer.client.messages.values import part, to_short_plain
+        """Return a message as plain data."""
+        from composer.client.messages.values import to_short_plain
 
-        if not self._fields:
-            return json_safe(to_short_plain(message, self._max_items))
-        return {
-            path: json_safe(to_short_plain(part(message, path), self._max_items))
-            for path in self._fields
-        }
+        return json_safe(to_short_plain(message, self._max_items))
 
 
 class PlotFeed(Feed):

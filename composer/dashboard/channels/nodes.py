@@ -183,8 +183,7 @@ class ProcessMonitor:
 class TimingFeed(Feed):
     """Timings once a second."""
 
-    def __init__(self, _: Values, declared: Declared | None) -> None:
-        self._declared = declared
+    def __init__(self, _: Values, __: Declared | None) -> None:
         self._pairs = ReportPairs(lambda report: report.callbacks_at_s)
 
     def start(self) -> None:
@@ -209,31 +208,19 @@ class TimingFeed(Feed):
             "name": pair.now.name,
             "time": pair.now.callbacks_at_s,
             "chains": [asdict(chain) for chain in pair.now.chains],
-            "callbacks": [
-                self._callback(item, has_rates=pair.before is not None) for item in found
-            ],
+            "callbacks": [_callback(item, has_rates=pair.before is not None) for item in found],
         }
 
-    def _callback(self, item: CallbackRates, *, has_rates: bool) -> dict[str, Any]:
-        from composer.runtime.metrics.statistics import parse_buckets
 
-        return {
-            **asdict(item.figures),
-            "calls_hz": item.calls_hz if has_rates else None,
-            "busy": item.busy if has_rates else None,
-            "budget_ms": self._budget_ms(item.figures.node, item.figures.name),
-            "histogram": [
-                [round(bound_s * _MS, 7), count]
-                for bound_s, count in parse_buckets(item.figures.histogram)
-            ],
-        }
+def _callback(item: CallbackRates, *, has_rates: bool) -> dict[str, Any]:
+    from composer.runtime.metrics.statistics import parse_buckets
 
-    def _budget_ms(self, node: str, name: str) -> float | None:
-        """Return the declared time limit of a callback."""
-        found = None if self._declared is None else self._declared.nodes.get(node)
-        if found is None:
-            return None
-        budgets = {timer.name.value: timer.budget_ms for timer in found.timers}
-        budgets |= {port.name.value: port.budget_ms for port in found.ports}
-        budget = budgets.get(name)
-        return None if budget is None else budget.value
+    return {
+        **asdict(item.figures),
+        "calls_hz": item.calls_hz if has_rates else None,
+        "busy": item.busy if has_rates else None,
+        "histogram": [
+            [round(bound_s * _MS, 7), count]
+            for bound_s, count in parse_buckets(item.figures.histogram)
+        ],
+    }

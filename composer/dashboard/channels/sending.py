@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from composer.dashboard.observing.ros_graph import RosGraph
     from composer.plan.drift import ObservedEndpoint
 
-_PRESETS = ("command", "sensor_data", "state")
 _REPORT_PERIOD_S = 0.5
 _ACCEPTED_WITHIN_S = 5.0
 _MAX_ITEMS = 256
@@ -31,11 +30,10 @@ _SLOTS = threading.BoundedSemaphore(16)
 class Outgoing:
     """A message with its publisher, once it is open."""
 
-    def __init__(self, topic: str, type_name: str, values: Any, qos: str | None) -> None:
+    def __init__(self, topic: str, type_name: str, values: Any) -> None:
         self.topic = topic
         self.type_name = type_name
         self._values = values
-        self._qos = qos
         self._ros: RosGraph
         self._publisher: Any = None
         self._message: Any = None
@@ -52,7 +50,7 @@ class Outgoing:
         self._message = build_message(values, message_class, "the message")
         topic = self.topic = full_name("topic", self.topic)
         self._publisher = ros.session.node.create_publisher(
-            message_class, topic, rclpy_profile(self._profile())
+            message_class, topic, rclpy_profile(suitable_profile(ros, topic))
         )
 
     @property
@@ -62,7 +60,7 @@ class Outgoing:
 
     def expected(self) -> int:
         """Return the number of known subscriptions that the publisher will match."""
-        profile = self._profile()
+        profile = suitable_profile(self._ros, self.topic)
         ends = _subscriptions(self._ros, self.topic)
         return sum(end.qos is None or not incompatibilities(profile, end.qos) for end in ends)
 
@@ -82,9 +80,6 @@ class Outgoing:
             self._ros.session.node.destroy_publisher(self._publisher)
             self._publisher = None
 
-    def _profile(self) -> QosProfile:
-        return suitable_profile(self._ros, self.topic) if self._qos is None else PRESETS[self._qos]
-
 
 def suitable_profile(ros: RosGraph, topic: str) -> QosProfile:
     """Return a profile for a publisher: latched if a subscription to the topic requests that."""
@@ -103,10 +98,7 @@ def _subscriptions(ros: RosGraph, topic: str) -> list[ObservedEndpoint]:
 def read_outgoing(values: Values) -> Outgoing:
     """Return the message that a request describes. Raises RequestError."""
     topic, type_name = values.text("topic"), values.text("type")
-    message, qos = values.mapping("message"), values.optional_text("qos")
-    if qos is not None and qos not in _PRESETS:
-        raise RequestError("bad_request", f"'qos' must be one of {', '.join(_PRESETS)}")
-    return Outgoing(topic, type_name, message, qos)
+    return Outgoing(topic, type_name, values.mapping("message"))
 
 
 class PublishingFeed(Feed):
@@ -147,7 +139,7 @@ class GoalFeed(Feed):
 
     def __init__(self, values: Values, _: Declared | None) -> None:
         self._action = values.text("action")
-        self._type = values.optional_text("type")
+        self._type = values.text("type")
         self._goal = values.mapping("goal")
         self._thread: threading.Thread | None = None
         self._is_open = True
@@ -200,18 +192,16 @@ class GoalFeed(Feed):
     def _observe(self) -> FinishedGoal | None:
         """Send the goal and wait for its end; None if nothing observes it any more."""
         from composer.client.calls import GoalRequest, send_goal
-        from composer.client.graph_names import GraphNames
         from composer.client.name_matching import full_name
         from composer.client.session import Deadline
 
         deadline = Deadline(_ACCEPTED_WITHIN_S)
         session = self.ros.session
         action = full_name("action", self._action)
-        type_name = self._type or GraphNames(session, deadline).only_type("action", action)
         request = GoalRequest(
             action,
-            type_name,
-            self.ros.forms.from_json(self._goal, type_name, "goal"),
+            self._type,
+            self.ros.forms.from_json(self._goal, self._type, "goal"),
             self._on_feedback,
             lambda: False,
         )

@@ -18,26 +18,21 @@ _MAX_TIMEOUT_S = 120.0
 #: How long to wait for known subscriptions to match a new publisher.
 _MATCHED_WITHIN_S = 2.0
 _MAX_ITEMS = 1000
-_KINDS = ("message", "service", "action")
-_CHANNELS = ("topic", "service", "action")
 _DESCRIBED_WITHIN_S = 5.0
 
 
 def call(values: Values, _: Dashboard) -> Prepared:
     """Call a service."""
-    name, given_type = values.text("service"), values.optional_text("type")
+    name, type_name = values.text("service"), values.text("type")
     request = values.mapping("request")
     timeout_s = values.number("timeout_s", 5.0, 0.1, _MAX_TIMEOUT_S)
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.calls import ServiceRequest, call_service
-        from composer.client.graph_names import GraphNames
         from composer.client.messages.values import to_short_plain
         from composer.client.name_matching import full_name
 
         service = full_name("service", name)
-        names = GraphNames(ros.session, deadline)
-        type_name = given_type or names.only_type("service", service)
         content = ros.forms.from_json(request, type_name, "request")
         started_s = time.monotonic()
         responses = call_service(ros.session, deadline, ServiceRequest(service, type_name, content))
@@ -85,7 +80,6 @@ def set_parameter(values: Values, _: Dashboard) -> Prepared:
 def form(values: Values, _: Dashboard) -> Prepared:
     """Return the fields of each part of a type."""
     type_name = values.text("type")
-    values.optional_text("kind")  # the type says it, too
 
     def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
         return {"type": type_name, "parts": ros.forms.form(type_name)}
@@ -93,33 +87,11 @@ def form(values: Values, _: Dashboard) -> Prepared:
     return run, _DESCRIBED_WITHIN_S
 
 
-def types(values: Values, _: Dashboard) -> Prepared:
-    """Return names of types that contain a text."""
-    kind, prefix = values.choice("kind", _KINDS), values.text("prefix", "")
-
-    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
-        return {"names": ros.forms.names(kind, prefix)}
-
-    return run, _DESCRIBED_WITHIN_S
-
-
 def fields(values: Values, _: Dashboard) -> Prepared:
-    """Return the paths of the fields of a message."""
+    """Return the paths of the fields of a message that are numbers."""
     type_name = values.text("type")
 
     def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
-        return ros.forms.paths(type_name)
-
-    return run, _DESCRIBED_WITHIN_S
-
-
-def type_of(values: Values, _: Dashboard) -> Prepared:
-    """Return the types of a topic, service or action."""
-    kind, name = values.choice("kind", _CHANNELS), values.text("name")
-
-    def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        from composer.client.graph_names import GraphNames
-
-        return {"types": list(GraphNames(ros.session, deadline).types(kind, name))}
+        return {"numeric": ros.forms.numeric_paths(type_name)}
 
     return run, _DESCRIBED_WITHIN_S

@@ -36,7 +36,6 @@ def node(values: Values, dashboard: Dashboard) -> Prepared:
             raise RequestError("not_found", f"there is no node '{name:.200}'")
         return {
             "name": name,
-            "is_running": name in topology.nodes,
             "count": topology.counts.get(name, 0),
             "endpoints": [
                 {
@@ -124,10 +123,7 @@ def transition(values: Values, _: Dashboard) -> Prepared:
 
         batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
         outcomes = batch.run(dependents=dependents)
-        return {
-            "outcomes": _completed(ros, outcomes),
-            "active_dependents": [] if dependents else list(batch.active_dependents),
-        }
+        return {"outcomes": _completed(ros, outcomes)}
 
     return run, _CHANGE_S
 

@@ -167,7 +167,7 @@ def test_a_read_only_dashboard_changes_nothing(server: Dashboard) -> None:
             ("call", {"service": "/a", "request": {}}),
             ("publish", {"topic": "/a", "type": "std_msgs/msg/String", "message": {}}),
             ("set_parameter", {"node": "/a", "name": "b", "value": 1}),
-            ("subscribe", {"channel": "goal", "params": {"action": "/a", "goal": {}}}),
+            ("subscribe", {"channel": "goal", "params": {"action": "/a", "type": "t", "goal": {}}}),
             (
                 "subscribe",
                 {

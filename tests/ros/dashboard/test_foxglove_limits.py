@@ -256,7 +256,7 @@ def test_messages_of_any_type_are_skipped_if_they_have_too_many_bytes(server: Da
         )
         assert client.is_served()
         # What is skipped for the page is counted there, and only the dashboard has not read it.
-        echo = page.subscribe("echo", topic="/large", fields=["data"], max_hz=100)
+        echo = page.subscribe("echo", topic="/large", max_hz=100)
         page.until(echo, lambda data: data["messages"])
         page.wait(lambda: any(each["dropped"] > 5 for each in page.updates if each["sub"] == echo))
         topics = page.subscribe("topics", measure=["/large"])

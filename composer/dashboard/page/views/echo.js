@@ -39,7 +39,7 @@ export function createEcho(app, topic, { onplot, isPlotted }) {
   );
 
   function params() {
-    return { topic: topic.name, type: null, fields: [], max_hz: Number(rate.value), max_items: 64 };
+    return { topic: topic.name, max_hz: Number(rate.value), max_items: 64 };
   }
 
   function receive(data, { dropped }) {

@@ -10,7 +10,7 @@ export function createPublish(app, topic) {
 
   async function load() {
     try {
-      const { parts } = await app.connection.request("form", { kind: "message", type });
+      const { parts } = await app.connection.request("form", { type });
       build(parts.message);
     } catch (error) {
       element.replaceChildren(empty("There is no form for this type.", error.message));
@@ -36,7 +36,7 @@ export function createPublish(app, topic) {
     function start() {
       const message = form.value();
       if (!message || !rate.reportValidity()) return;
-      const params = { topic: topic.name, type, message, rate_hz: Number(rate.value), qos: null };
+      const params = { topic: topic.name, type, message, rate_hz: Number(rate.value) };
       repeating = app.connection.subscribe("publishing", params, ({ count, subscriptions }) => {
         setText(status, `${count} published to ${counted(subscriptions)}`);
       }, {

@@ -99,7 +99,7 @@ export function createView(app) {
   async function load(entry, content) {
     const [type] = entry.types;
     try {
-      const { parts } = await app.connection.request("form", { kind: entry.kind, type });
+      const { parts } = await app.connection.request("form", { type });
       const part = entry.kind === "service" ? servicePart(entry, type, parts.request) : actionPart(entry, type, parts.goal);
       content.replaceChildren(...part);
     } catch (error) {
