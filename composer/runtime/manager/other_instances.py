@@ -30,7 +30,7 @@ from composer.runtime.ros_graph.graph import participant, servers_of
 
 #: Discovery of another participant takes up to three seconds; later, this system is not refused.
 START_S = 5.0
-_CHECK_PERIOD_S = 0.2
+_CHECK_PERIOD_S = 0.5
 _RESPONSE_WITHIN_S = 2.0
 #: The number of services that are called at the same time: other nodes cannot cause more.
 _MAX_CALLS = 4
