@@ -141,10 +141,16 @@ class _Failure:
             self.report(self.error)
 
 
-def wrap_future(foreign: Any, report: Callable[[BaseException], None] | None = None) -> Future[Any]:
+def wrap_future(
+    foreign: Any,
+    report: Callable[[BaseException], None] | None = None,
+    *,
+    cancels: bool = True,
+) -> Future[Any]:
     """Return a future with the outcome of another, which may be an ``rclpy.task.Future``.
 
-    Canceling one cancels the other. ``report`` is as for :class:`Future`.
+    Canceling one cancels the other; without ``cancels``, canceling the returned one does not.
+    ``report`` is as for :class:`Future`.
     """
     future: Future[Any] = Future(report)
 
@@ -157,7 +163,8 @@ def wrap_future(foreign: Any, report: Callable[[BaseException], None] | None = N
             future.set_result(foreign.result())
 
     foreign.add_done_callback(copy_outcome)
-    future.add_done_callback(lambda done: foreign.cancel() if done.cancelled() else None)
+    if cancels:
+        future.add_done_callback(lambda done: foreign.cancel() if done.cancelled() else None)
     return future
 
 

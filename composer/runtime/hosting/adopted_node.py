@@ -28,8 +28,12 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.sources import Taken, rclpy_callback
 from composer.runtime.hosting.declared_ports import HostingError
 from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.ports.actions import HostedActionClient, HostedActionServer
-from composer.runtime.hosting.ports.services import ClientPort, HostedService
+from composer.runtime.hosting.ports.calls import (
+    ClientPort,
+    HostedActionClient,
+    HostedActionServer,
+    HostedService,
+)
 from composer.runtime.hosting.ports.timers import HostedGuardCondition, HostedTimerPort
 from composer.runtime.hosting.ports.topics import (
     HostedPublisher,

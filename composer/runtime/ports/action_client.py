@@ -14,7 +14,7 @@ from composer.behavior import CallError, GoalRejected
 from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
-from composer.runtime.executors.futures import Future
+from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.ports.client import CallingPort, CallLimit
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -109,10 +109,8 @@ class ActionClientPort(CallingPort):
 
     def follow(self, outcome: Future[GoalOutcome], timeout_ms: float | None) -> Future[GoalOutcome]:
         """Wait for ``outcome`` for up to ``timeout_ms``, without canceling it."""
-        view: Future[GoalOutcome] = Future()
-        outcome.add_done_callback(lambda done: _copy(done, view))
         limit = CallLimit(self._context, self._what, timeout_ms)
-        return self._context.spawn(limit.wait_for_response(view))
+        return self._context.spawn(limit.wait_for_response(wrap_future(outcome, cancels=False)))
 
     def cancel(self, handle: Any) -> Future[bool]:
         """Request the cancellation of a goal; true if the server accepts."""
@@ -198,13 +196,3 @@ class ActionClientPort(CallingPort):
         if on_feedback is None:
             return None
         return self._context.call(f"feedback of '{self._name}'", on_feedback, feedback)
-
-
-def _copy(done: Future[GoalOutcome], view: Future[GoalOutcome]) -> None:
-    error = done.exception()
-    if error is not None:
-        view.set_exception(error)
-    elif done.cancelled():
-        view.cancel()
-    else:
-        view.set_result(done.result())

@@ -18,7 +18,7 @@ from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.actions import GoalServer
 from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
-from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.futures import Cancelled, Future, wrap_future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.intra_process.servers import LocalActionServer
@@ -169,7 +169,9 @@ class ActionServerPort(RunningPort):
         """Wait until the handlers have ended their goals; after a time limit, cancel them."""
         for goal in tuple(self._goals.values()):
             try:
-                await within(self._context.loop, _view(goal.ended), CANCEL_LIMIT_S)
+                await within(
+                    self._context.loop, wrap_future(goal.ended, cancels=False), CANCEL_LIMIT_S
+                )
             except TimeoutError:
                 self._context.log.warn(
                     f"{self._callback}: a goal did not end within {CANCEL_LIMIT_S:g} s, canceled"
@@ -341,13 +343,6 @@ def _compile_feedback(steps: FeedbackSteps | None, action_type: Any) -> Build | 
     if steps is None or steps.content is None:
         return None
     return compile_message(steps.content, action_type.Feedback, "'feedback'")
-
-
-def _view(future: Future[None]) -> Future[None]:
-    """Return a future that is done with ``future`` and can be canceled without canceling it."""
-    view: Future[None] = Future()
-    future.add_done_callback(lambda _: view.set_result(None))
-    return view
 
 
 def _unused_execute_callback(_: Any) -> None:
