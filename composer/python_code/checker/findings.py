@@ -152,6 +152,8 @@ class Reader:
         if failed is None:
             return None
         self._is_meant(failed.part)
+        if failed.home is not None:  # one report for all names that are there
+            self.about.append(f"line {node.lineno} {failed.home}")
         place = re.search(rf"\b{re.escape(failed.part)}\b", self.span.text)
         self.span = self.span.part(place.start() if place else 0, len(failed.part))
         return Problem(failed.family, failed.message, self.span, failed.hint, failed.is_certain)

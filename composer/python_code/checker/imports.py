@@ -31,13 +31,17 @@ _LONG_NAME = 8  # letters, of which two may be wrong
 
 @dataclass(frozen=True, slots=True)
 class FailedImport:
-    """What cannot be imported: the wrong part of the name, and what is wrong with it."""
+    """What cannot be imported: the wrong part of the name, and what is wrong with it.
+
+    ``home`` is the only module that has the name.
+    """
 
     part: str
     message: str
     hint: str | None = None
     family: Family = Family.IMPORT
     is_certain: bool = True
+    home: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +91,11 @@ class Imports:
             prefix = f"{package}/{folder}/"
             listed = self.interfaces.names(folder) if folder else ()
             others = [item.removeprefix(prefix) for item in listed if item.startswith(prefix)]
-            hint = self._home(package, folder, name) or suggestion(name, others)
-            return self._failed(name, message, hint) if hint or folder else None
+            home = self._home(package, folder, name)
+            if name in others or not (folder or home):
+                return None  # its definition cannot be read, or it may be another module
+            hint = suggestion(name, others) if home is None else f"import it from '{home}'"
+            return self._failed(name, message, hint, home)
         last = module.rpartition(".")[2]
         files = [item for item in self.source.own_modules if item.path.stem == last]
         packages = [item for item in self.source.own_modules if item.path.parent.name == last]
@@ -113,14 +120,14 @@ class Imports:
         return [*homes, *reference.node_folders, LIBRARIES]
 
     def _home(self, package: str, folder: str, name: str) -> str | None:
-        """Return the hint with the only module that has an interface: in a package, or any."""
+        """Return the only module that has an interface: in a package, or any."""
         own = [f"{package}.{part}" for part in sorted(FOLDERS)]
         others = [f"{other}.{folder}" for other in self.interfaces.packages() if folder]
         for modules in (own, others):
             paths = {home: f"{home.replace('.', '/')}/{name}" for home in modules}
             homes = [home for home, path in paths.items() if self.interfaces.find(path)]
             if homes:
-                return f"import it from '{homes[0]}'" if len(homes) == 1 else None
+                return homes[0] if len(homes) == 1 else None
         return None
 
     def _misspelled(
@@ -138,12 +145,14 @@ class Imports:
         hint = "install it, or correct the name"
         return FailedImport(name, f"{message}{where}", hint, Family.NOT_INSTALLED)
 
-    def _failed(self, part: str, message: str, hint: str | None = None) -> FailedImport:
+    def _failed(
+        self, part: str, message: str, hint: str | None = None, home: str | None = None
+    ) -> FailedImport:
         """Return an error, unless the file searches for modules itself."""
         if any(text in self.module.source.text for text in _AT_RUN_TIME):
             hint = "the file searches for modules itself"
             return FailedImport(part, message, hint, Family.NOT_INSTALLED)
-        return FailedImport(part, message, hint)
+        return FailedImport(part, message, hint, home=home)
 
 
 def _is_installed(name: str) -> bool:
