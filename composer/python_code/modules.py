@@ -145,11 +145,6 @@ def _installed(parts: list[str]) -> Path | None:
     return next(filter(None, files), None)
 
 
-def is_installed(module: str) -> bool:
-    """Return whether the first part of ``module`` can be imported, without importing it."""
-    return module_spec(module.partition(".")[0]) is not None
-
-
 def module_spec(name: str) -> importlib.machinery.ModuleSpec | None:
     """Return the spec of a top-level module, without importing it."""
     try:

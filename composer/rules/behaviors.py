@@ -30,9 +30,8 @@ from composer.python_code.trees import (
     start_span,
     walk,
 )
-from composer.rules.analysis.context import Context
+from composer.rules.analysis.context import Context, behaviors, distinct_behaviors
 from composer.rules.analysis.formatting import a
-from composer.rules.analysis.python_nodes import behaviors, distinct_behaviors
 from composer.rules.analysis.subjects import wiring
 from composer.rules.python import CLASS_MISSING, as_warning, missing, unnamed
 

@@ -11,8 +11,7 @@ from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, 
 from composer.model.qos import incompatibilities
 from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
 from composer.rules.analysis.class_ports import CreatedPort, all_created_ports, created_ports
-from composer.rules.analysis.context import Context
-from composer.rules.analysis.python_nodes import hosted_classes
+from composer.rules.analysis.context import Context, hosted_classes
 from composer.rules.analysis.subjects import type_subject
 from composer.rules.python import as_warning
 

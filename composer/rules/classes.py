@@ -12,8 +12,7 @@ from composer.python_code.nodes import ClassOfNode
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method
 from composer.python_code.trees import SCOPES, is_none, span_of, walk
-from composer.rules.analysis.context import Context
-from composer.rules.analysis.python_nodes import hosted_classes
+from composer.rules.analysis.context import Context, hosted_classes
 from composer.rules.behaviors import BLOCKING_CALL, WRONG_CLASS
 from composer.rules.python import NOT_INSTALLED, as_warning, missing, unnamed
 

@@ -9,9 +9,8 @@ from composer.base.diagnostics import Diagnostic, Label, error, warning
 from composer.base.source import Span
 from composer.model import ImplementationKind, Isolation, Node, Port, PortKind, System
 from composer.python_code.nodes import handlers
-from composer.rules.analysis.context import Context
+from composer.rules.analysis.context import Context, hosted_classes
 from composer.rules.analysis.earlier_errors import earlier_errors
-from composer.rules.analysis.python_nodes import hosted_classes
 
 IDLE_PORT = warning("RC438", "idle-port")
 SEVERAL_IMPLEMENTATIONS = error("RC470", "several-implementations")

@@ -22,11 +22,9 @@ from composer.base.spelling import is_typo
 from composer.model import Node, Parameter, UnmatchedParameters
 from composer.model.names import namespace_problem, split_node_name
 from composer.model.resolve.parameter_files import PARAMETER_FILES
-from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.context import Context, behaviors, is_unresolved, part_of_path
 from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.expressions import expression_sites
-from composer.rules.analysis.python_nodes import behaviors
-from composer.rules.analysis.spans import part_of_path
 
 UNKNOWN_PARAMETER = error("RC206", "unknown-parameter")
 SIMILAR_PARAMETER = warning("RC216", "similar-parameter")

@@ -29,9 +29,13 @@ from composer.python_code.modules import nearby_modules
 from composer.python_code.problems import Family, Problem
 from composer.python_code.syntax import Method
 from composer.python_code.trees import start_span, walk
-from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.analysis.python_nodes import distinct_behaviors, distinct_classes
-from composer.rules.analysis.spans import class_name_hint, part_of
+from composer.rules.analysis.context import (
+    Context,
+    distinct_behaviors,
+    distinct_classes,
+    is_unresolved,
+    part_of,
+)
 from composer.rules.analysis.subjects import package_subjects
 
 CLASS_MISSING = error("RC460", "class-missing")
@@ -179,7 +183,7 @@ def unnamed(reference: BehaviorReference, what: str) -> Iterator[Diagnostic]:
     text = reference.text
     if not ((reference.module and reference.class_name) or is_unresolved(text.value)):
         message = f"{what} '{text}' is not 'module:Class'"
-        yield Diagnostic(CLASS_MISSING, message, text.span, hint=class_name_hint(text.value))
+        yield Diagnostic(CLASS_MISSING, message, text.span, hint=_class_name_hint(text.value))
 
 
 def missing(source: BehaviorSource, not_installed: Rule) -> Iterator[Diagnostic]:
@@ -210,3 +214,10 @@ def missing(source: BehaviorSource, not_installed: Rule) -> Iterator[Diagnostic]
         message = f"module '{module}' has no class '{name}'"
         span = part_of(reference.text, len(module) + 1, len(name))
         yield Diagnostic(CLASS_MISSING, message, span, hint=suggestion(name, source.class_names))
+
+
+def _class_name_hint(text: str) -> str:
+    """Return the hint for ``text`` in place of ``module:Class``."""
+    module, _, name = text.rstrip(":").rpartition(".")
+    is_dotted = bool(module) and name[:1].isupper()
+    return f"did you mean '{module}:{name}'?" if is_dotted else "write 'module:Class'"

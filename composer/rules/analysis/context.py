@@ -1,4 +1,4 @@
-"""The input of the rules, with a cache for what several rules compute."""
+"""The input of the rules: a system, its Python classes, places, and what several rules compute."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from dataclasses import field
 from typing import Any, TypeVar
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import Span
+from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
+from composer.language.expressions import Expression, FieldPath
 from composer.model import Channel, ChannelKind, Port, System, channels
 from composer.project.node_types import NodeTypes
+from composer.python_code.nodes import ClassOfNode, NodeClass, node_classes, use_of
 
 T = TypeVar("T")
 
@@ -82,3 +84,69 @@ def _all_channels(context: Context) -> tuple[Channel, ...]:
 
 def _known(found: Iterable[Channel]) -> tuple[Channel, ...]:
     return tuple(channel for channel in found if not is_unresolved(channel.name))
+
+
+def behaviors(context: Context) -> tuple[NodeClass, ...]:
+    """Return every node that names a behavior, with its source."""
+    return tuple(item for item in context.once(_classes) if item[0].behavior is not None)
+
+
+def distinct_behaviors(context: Context) -> tuple[NodeClass, ...]:
+    """Return one node for each behavior and each set of ports, timers and parameters."""
+    first: dict[object, NodeClass] = {}
+    for node, source in behaviors(context):
+        first.setdefault(use_of(node, source), (node, source))
+    return tuple(first.values())
+
+
+def hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:
+    """Return every node with a class, and the source of the class."""
+    return tuple(
+        ClassOfNode(node, node.hosted_class, source)
+        for node, source in context.once(_classes)
+        if node.hosted_class is not None and node.behavior is None
+    )
+
+
+def distinct_classes(context: Context) -> tuple[ClassOfNode, ...]:
+    """Return the first node of each class."""
+    first: dict[int, ClassOfNode] = {}
+    for item in hosted_classes(context):
+        first.setdefault(id(item.source), item)
+    return tuple(first.values())
+
+
+def _classes(context: Context) -> tuple[NodeClass, ...]:
+    return node_classes(context.system)
+
+
+def part_of(text: Located[str], start: int, length: int) -> Span:
+    """Return the span of ``length`` characters of ``text`` from ``start``.
+
+    If the file does not contain the text literally, because of variables or escapes, return the
+    span of the whole text.
+    """
+    span = text.span
+    part = text.value[start : start + length]
+    source_text = span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
+    found = source_text.find(part, start)
+    if found < 0 and start + length == len(text.value):  # a variable or an escape precedes it
+        end = len(source_text.rstrip("'\""))
+        found = end - length if source_text[:end].endswith(part) else -1
+    return span.part(found, len(part)) if part and found >= 0 else span
+
+
+def part_of_path(span: Span, expression: Expression, path: FieldPath, index: int = 0) -> Span:
+    """Return the span of part ``index`` of a path within an expression at ``span``.
+
+    If the file does not contain the expression literally, return the span of all of it.
+    """
+    source = expression.source
+    offset = path.offset
+    for part in path.parts[: index + 1]:
+        found = source.find(str(part), offset, path.offset + path.length)
+        if found < 0:
+            return span
+        start, offset = found, found + len(str(part))
+    source_text = span.file.line(span.line)[span.column - 1 : span.column - 1 + span.length]
+    return span.part(start, len(str(path.parts[index]))) if source_text == source else span

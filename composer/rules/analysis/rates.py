@@ -27,8 +27,7 @@ from composer.python_code.nodes import (
     reached_methods,
 )
 from composer.python_code.scopes import Call
-from composer.rules.analysis.context import Context
-from composer.rules.analysis.python_nodes import behaviors
+from composer.rules.analysis.context import Context, behaviors
 
 _ENTRIES = ("on_", "accept_")
 
