@@ -12,7 +12,7 @@ from composer.plan import Decision, DesiredState, Fault, FaultKind, Plan, Restar
 from composer.runtime.node.managed_node import FINALIZED
 from composer.runtime.supervision.events import NodeFailed
 from composer.runtime.supervision.main_queue import LoopRecovered
-from composer.runtime.supervision.plan_executor import ExecutionOptions
+from composer.runtime.supervision.phases import ExecutionOptions
 from composer.runtime.supervision.reconciler import Reconciler
 
 _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)

@@ -5,21 +5,24 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import field, replace
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.base.fast_dataclass import dataclass
 from composer.plan import Plan, Step
-from composer.runtime.executors.futures import Future
-from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision.main_queue import (
     Item,
     MainQueue,
     NodeMoved,
     SharedDesiredState,
     StepEnded,
+)
+from composer.runtime.supervision.phases import (
+    ExecutionOptions,
+    Phase,
+    RunningStep,
+    StepFailed,
+    wait_for_step,
 )
 
 if TYPE_CHECKING:  # this module and its tests need no ROS
@@ -29,162 +32,6 @@ if TYPE_CHECKING:  # this module and its tests need no ROS
 _STUCK_AFTER_S = 1.0
 #: How long an interrupted callback may take to return.
 _INTERRUPTED_WITHIN_S = 0.4
-#: A wait in slices shows in which of them this process did not run.
-_SLICE_S = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class StepFailed:
-    """A step that failed, and the state that the node is in.
-
-    ``stuck`` is true if the step was abandoned, or a callback was interrupted that blocked it;
-    ``stack`` is where that callback was. ``outdated`` is true if it was not run because an external
-    transition came first.
-    """
-
-    step: Step
-    reason: str
-    state: str
-    stuck: bool = False
-    stack: str = ""
-    outdated: bool = False
-
-    def __str__(self) -> str:
-        return f"{self.step.full_name}: {self.text}"
-
-    @property
-    def text(self) -> str:
-        """What failed and why, without the name of the node."""
-        return f"{self.step.transition} failed: {self.reason}"
-
-
-@dataclass(frozen=True, slots=True)
-class ExecutionOptions:
-    """How a plan is executed.
-
-    With ``best_effort``, failures do not end the plan: every step that the states allow is run, and
-    steps start in the order of the plan. If ``stoppable``, a request to stop the system ends the
-    plan. Steps that have not ended at ``end_s`` (monotonic) have failed; no step gets longer than
-    ``step_limit_s``. With ``detaches``, steps that no other node waits for may run on after the
-    plan; their ends are in the main queue. With ``are_faults``, the caller reports the failures.
-
-    ``serial`` is that of the desired state that the plan is based on. Nodes that have been moved
-    externally since then are not moved; None moves them as well.
-    """
-
-    best_effort: bool = False
-    detaches: bool = False
-    are_faults: bool = False
-    stoppable: bool = True
-    end_s: float = math.inf
-    step_limit_s: float = math.inf
-    serial: int | None = None
-
-
-@dataclass(slots=True)
-class _RunningStep:
-    """A step that runs, and its time limits.
-
-    A loop runs the transitions of its nodes one after the other: ``started_s`` is when it last
-    started one, and the step is late if the loop then starts nothing for ``limit_s``.
-    """
-
-    step: Step
-    loop: str
-    future: Future[TransitionOutcome]
-    started_s: float
-    limit_s: float
-    end_s: float
-    is_reported: bool = False  # as stuck
-
-    @property
-    def late_s(self) -> float:
-        """When the step is late."""
-        return self.started_s + self.limit_s
-
-    @property
-    def until_s(self) -> float:
-        """When the step has to end."""
-        return min(self.late_s, self.end_s)
-
-
-@dataclass(slots=True)
-class _Phase:
-    """A phase that is being executed.
-
-    ``processes`` are the other processes of the system, by the nodes that they run. ``done`` are
-    the numbers of steps that nothing waits for any more, ``unreached`` of those upward steps among
-    them after which the node is not where others need it. All phases of a plan share both.
-    ``ended`` are the numbers of steps that have ended by themselves; until ``check_s``, no other
-    one has to be looked at.
-    """
-
-    waiting: deque[Step]
-    options: ExecutionOptions
-    processes: Mapping[str, str]
-    done: set[int] = field(default_factory=set)
-    unreached: set[int] = field(default_factory=set)
-    running: dict[int, _RunningStep] = field(default_factory=dict)
-    failures: list[StepFailed] = field(default_factory=list)
-    ended: deque[int] = field(default_factory=deque)
-    check_s: float = math.inf
-
-    @property
-    def is_awaited(self) -> bool:
-        """Whether a step runs that the plan has to wait for."""
-        running = (item.step for item in self.running.values())
-        return any(step.is_awaited or not self.options.detaches for step in running)
-
-    @property
-    def has_failed(self) -> bool:
-        """Whether a failure ends the phase."""
-        return bool(self.failures) and not self.options.best_effort
-
-    def postpone(self, lost_s: float) -> None:
-        """Move all time limits: the process did not run for ``lost_s``, and no step could."""
-        self.options = replace(self.options, end_s=self.options.end_s + lost_s)
-        self.check_s += lost_s
-        for item in self.running.values():
-            item.limit_s += lost_s
-            item.end_s += lost_s
-
-    def finish(self, step: Step, *, is_reached: bool) -> None:
-        """Let nothing wait for a step any more; others do not go up without its node."""
-        self.done.add(step.number)
-        if step.is_upward and not is_reached:
-            self.unreached.add(step.number)
-
-    def take_ready(self) -> list[tuple[Step, tuple[Step, ...]]]:
-        """Remove and return the steps that can start now, each with those that it waits for.
-
-        On the way down, it may wait for steps of its own process, which keeps the order by itself.
-        """
-        if self.has_failed:
-            return []
-        started = {number: item.step for number, item in self.running.items()}
-        ready: list[tuple[Step, tuple[Step, ...]]] = []
-        waiting: deque[Step] = deque()
-        for step in self.waiting:
-            keeps_order = step.is_upward or not (waiting and self.options.best_effort)
-            if not self.unreached.isdisjoint(step.after):
-                self.finish(step, is_reached=False)
-            elif keeps_order and self._can_start(step, started):
-                after = (started[number] for number in step.after if number not in self.done)
-                ready.append((step, tuple(after)))
-                started[step.number] = step
-            else:
-                waiting.append(step)
-        self.waiting = waiting
-        return ready
-
-    def _can_start(self, step: Step, started: Mapping[int, Step]) -> bool:
-        if self.done.issuperset(step.after):
-            return True
-        process = self.processes.get(step.node)
-        if process is None or step.is_upward or not self.options.best_effort:
-            return False
-        left = (started.get(number) for number in step.after if number not in self.done)
-        return all(other and self.processes.get(other.node) == process for other in left)
 
 
 class PlanExecutor:
@@ -202,7 +49,7 @@ class PlanExecutor:
         self._desired = desired
         self._main_queue = main_queue
         self._report_failure = report_failure
-        self._detached: dict[str, _RunningStep] = {}
+        self._detached: dict[str, RunningStep] = {}
 
     @property
     def moving(self) -> Collection[str]:
@@ -223,7 +70,7 @@ class PlanExecutor:
         done: set[int] = set()
         unreached: set[int] = set()
         for steps in plan.phases:
-            phase = _Phase(deque(steps), options, self._node_set.process_of, done, unreached)
+            phase = Phase(deque(steps), options, self._node_set.process_of, done, unreached)
             self._execute(phase)
             options = phase.options  # the time limit may have moved
             failures += phase.failures
@@ -233,7 +80,7 @@ class PlanExecutor:
                 break
         return tuple(failures)
 
-    def _execute(self, phase: _Phase) -> None:
+    def _execute(self, phase: Phase) -> None:
         while self._start_ready(phase):
             wait_for_step(phase, self._main_queue)
             if self._is_stopped(phase.options):
@@ -245,7 +92,7 @@ class PlanExecutor:
         for item in phase.running.values():
             self._detach(item)
 
-    def _start_ready(self, phase: _Phase) -> bool:
+    def _start_ready(self, phase: Phase) -> bool:
         """Start every step that can start; return whether one was started that is awaited."""
         while ready := phase.take_ready():
             with self._node_set.other_processes.requests_together():
@@ -253,12 +100,12 @@ class PlanExecutor:
                     self._start(step, after, phase)
         return phase.is_awaited
 
-    def _detach(self, item: _RunningStep) -> None:
+    def _detach(self, item: RunningStep) -> None:
         name = item.step.node
         self._detached[name] = item
         item.future.add_done_callback(lambda _: self._main_queue.put(StepEnded(name)))
 
-    def _end_late(self, phase: _Phase) -> None:
+    def _end_late(self, phase: Phase) -> None:
         """End the steps that have no time left."""
         self._update_start_times(phase.running.values())
         for number, item in tuple(phase.running.items()):
@@ -266,7 +113,7 @@ class PlanExecutor:
                 self._end(number, phase)
         phase.check_s = min((item.until_s for item in phase.running.values()), default=math.inf)
 
-    def _update_start_times(self, running: Iterable[_RunningStep]) -> None:
+    def _update_start_times(self, running: Iterable[RunningStep]) -> None:
         """Restart the time limit of each step with the last transition that its loop started."""
         starts_s: dict[str, float] = {}
         for node in self._node_set.nodes.values():
@@ -278,7 +125,7 @@ class PlanExecutor:
     def _is_stopped(self, options: ExecutionOptions) -> bool:
         return self._main_queue.stopping and options.stoppable
 
-    def _start(self, step: Step, after: Sequence[Step], phase: _Phase) -> None:
+    def _start(self, step: Step, after: Sequence[Step], phase: Phase) -> None:
         node = self._node_set.nodes[step.node]
         options = phase.options
         now_s = time.monotonic()
@@ -297,12 +144,12 @@ class PlanExecutor:
         others = tuple(other.full_name for other in after)
         future = self._node_set.run_step(step.node, step.transition, is_outdated, others)
         name = node.loop.name
-        item = _RunningStep(step, name, future, now_s, limit_s, options.end_s)
+        item = RunningStep(step, name, future, now_s, limit_s, options.end_s)
         phase.running[step.number] = item
         phase.check_s = min(phase.check_s, item.until_s)
         future.add_done_callback(partial(self._on_done, phase, step.number))
 
-    def _on_done(self, phase: _Phase, number: int, _: object) -> None:
+    def _on_done(self, phase: Phase, number: int, _: object) -> None:
         phase.ended.append(number)
         self._main_queue.wakeup.wake()
 
@@ -318,7 +165,7 @@ class PlanExecutor:
         node = self._node_set.nodes[step.node]
         return options.best_effort and step.transition not in node.lifecycle.available
 
-    def _end(self, number: int, phase: _Phase) -> None:
+    def _end(self, number: int, phase: Phase) -> None:
         item = phase.running.pop(number, None)
         if item is None:
             return  # it had no time left before
@@ -332,7 +179,7 @@ class PlanExecutor:
             if not item.is_reported and (failure.stuck or not phase.options.are_faults):
                 self._report_failure(failure)
 
-    def _failure(self, item: _RunningStep) -> StepFailed | None:
+    def _failure(self, item: RunningStep) -> StepFailed | None:
         """Return why a step failed that is done or out of time."""
         node = self._node_set.nodes[item.step.node]
         stack = ""
@@ -359,7 +206,7 @@ class PlanExecutor:
             outdated=result.outdated,
         )
 
-    def _unblock(self, item: _RunningStep) -> str:
+    def _unblock(self, item: RunningStep) -> str:
         """Interrupt the callback that a step hangs in or waits for; return the stack of it.
 
         Until the step is late, only callbacks of the node itself are interrupted.
@@ -382,21 +229,3 @@ class PlanExecutor:
             until_s = time.monotonic() + _INTERRUPTED_WITHIN_S
             self._main_queue.wait(item.future.done, until_s, stoppable=False)
         return stack
-
-
-def wait_for_step(phase: _Phase, main_queue: MainQueue[Item]) -> None:
-    """Wait until a step has ended or has no time left, or a request to stop ends the plan.
-
-    On a busy machine, or if it is suspended, this process does not run for a while.
-    """
-    while True:
-        until_s = min(phase.check_s, time.monotonic() + _SLICE_S)
-        ended = main_queue.wait(
-            lambda: bool(phase.ended), until_s, stoppable=phase.options.stoppable
-        )
-        lost_s = time.monotonic() - until_s
-        if lost_s > _SLICE_S:
-            phase.postpone(lost_s)
-        is_stopped = main_queue.urgent or (main_queue.stopping and phase.options.stoppable)
-        if ended or is_stopped or time.monotonic() >= phase.check_s:
-            return

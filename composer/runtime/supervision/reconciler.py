@@ -29,7 +29,8 @@ from composer.runtime.supervision.events import (
     Stuck,
 )
 from composer.runtime.supervision.main_queue import Item, MainQueue, SharedDesiredState
-from composer.runtime.supervision.plan_executor import ExecutionOptions, PlanExecutor, StepFailed
+from composer.runtime.supervision.phases import ExecutionOptions, StepFailed
+from composer.runtime.supervision.plan_executor import PlanExecutor
 from composer.runtime.supervision.status import Status
 
 if TYPE_CHECKING:  # this module and its tests need no ROS

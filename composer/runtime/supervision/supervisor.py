@@ -32,7 +32,7 @@ from composer.runtime.supervision.main_queue import (
     SharedDesiredState,
     StepEnded,
 )
-from composer.runtime.supervision.plan_executor import ExecutionOptions, StepFailed
+from composer.runtime.supervision.phases import ExecutionOptions, StepFailed
 from composer.runtime.supervision.reconciler import Reconciler
 
 #: In the cause of a plan that moves of several nodes have caused.

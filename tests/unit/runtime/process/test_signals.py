@@ -1,11 +1,15 @@
-"""Signals end the wait of the main thread whenever they arrive."""
+"""Signals end the wait of the main thread whenever they arrive; messages to the service manager."""
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from composer.runtime.process.signals import READY, ServiceManager
 
 ROUNDS = 20_000
 SENDER = """
@@ -39,3 +43,22 @@ def test_a_signal_just_before_a_wait_ends_it() -> None:
         [sys.executable, "-c", RECEIVER], capture_output=True, text=True, timeout=60.0, check=False
     )
     assert (ended.stdout, ended.stderr) == ("SIGTERM\n" * ROUNDS, "")
+
+
+@pytest.mark.parametrize("address", ["notify", "\0composer-test"])
+def test_messages_arrive_at_its_socket(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as service_manager:
+        service_manager.bind(address)
+        environment = {"NOTIFY_SOCKET": address.replace("\0", "@"), "HOME": "/"}
+        service = ServiceManager(environment)
+        assert environment == {"HOME": "/"}  # children do not inherit it
+        service.send(READY, "STATUS=all nodes are up")
+        assert service_manager.recv(1000) == b"READY=1\nSTATUS=all nodes are up"
+    service.send(READY)  # it is gone
+
+
+def test_without_one_messages_go_nowhere() -> None:
+    ServiceManager({}).send(READY)

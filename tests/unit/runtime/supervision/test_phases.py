@@ -9,12 +9,12 @@ import pytest
 
 from composer.plan import Step
 from composer.runtime.executors.futures import Future
-from composer.runtime.supervision import plan_executor
+from composer.runtime.supervision import phases
 from composer.runtime.supervision.main_queue import Item, MainQueue
-from composer.runtime.supervision.plan_executor import (
+from composer.runtime.supervision.phases import (
     ExecutionOptions,
-    _Phase,
-    _RunningStep,
+    Phase,
+    RunningStep,
     wait_for_step,
 )
 
@@ -28,16 +28,16 @@ def steps(*after: tuple[int, ...]) -> deque[Step]:
     )
 
 
-def started(phase: _Phase) -> list[tuple[int, tuple[int, ...]]]:
+def started(phase: Phase) -> list[tuple[int, tuple[int, ...]]]:
     """Start what can start; return the numbers, each with what its process waits for before it."""
     ready = phase.take_ready()
     for step, _ in ready:
-        phase.running[step.number] = _RunningStep(step, "", None, 0.0, 0.0, 0.0)
+        phase.running[step.number] = RunningStep(step, "", None, 0.0, 0.0, 0.0)
     return [(step.number, tuple(other.number for other in after)) for step, after in ready]
 
 
-def phase_of(waiting: deque[Step], processes: Mapping[str, str], *, down: bool = True) -> _Phase:
-    return _Phase(waiting, ExecutionOptions(best_effort=down), processes)
+def phase_of(waiting: deque[Step], processes: Mapping[str, str], *, down: bool = True) -> Phase:
+    return Phase(waiting, ExecutionOptions(best_effort=down), processes)
 
 
 def test_a_process_gets_a_chain_of_its_nodes_at_once() -> None:
@@ -96,13 +96,13 @@ def test_a_suspended_process_has_as_much_time_as_any(
     suspended_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock(suspended_s)
-    monkeypatch.setattr(plan_executor, "time", clock)
+    monkeypatch.setattr(phases, "time", clock)
     main_queue: MainQueue[Item] = MainQueue()
     monkeypatch.setattr(main_queue, "wait", clock.wait)
     (step,) = steps(())
     options = ExecutionOptions(best_effort=True, stoppable=False, end_s=101.7)
-    phase = _Phase(deque(), options, {})
-    item = _RunningStep(step, "", Future(), 100.0, 1.0, options.end_s)
+    phase = Phase(deque(), options, {})
+    item = RunningStep(step, "", Future(), 100.0, 1.0, options.end_s)
     phase.running[1] = item
     phase.check_s = item.until_s
     wait_for_step(phase, main_queue)
