@@ -14,20 +14,6 @@ import pytest
 from tests.packaging.installation import without_ros
 
 ROOT = Path(__file__).parents[2]
-PUBLISHED = (
-    ".pre-commit-hooks.yaml",
-    "LICENSE",
-    "README.md",
-    "THIRD_PARTY.md",
-    "composer",
-    "docs",
-    "interfaces",
-    "nodes",
-    "pyproject.toml",
-    "schemas",
-    "systems",
-    "tools",
-)
 HAS_PRE_COMMIT = importlib.util.find_spec("pre_commit") is not None
 pytestmark = pytest.mark.skipif(
     not HAS_PRE_COMMIT and os.environ.get("CI") != "true", reason="pre-commit is not installed"
@@ -54,11 +40,9 @@ def committed(folder: Path) -> str:
 def user(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A repository that uses the hook of this working tree."""
     published = tmp_path_factory.mktemp("published")
-    ignore = shutil.ignore_patterns("__pycache__", "*.egg-info", "build")
-    for name in PUBLISHED:
-        if (ROOT / name).is_dir():
-            shutil.copytree(ROOT / name, published / name, ignore=ignore)
-        else:
+    for name in git(ROOT, "ls-files", "--cached", "--others", "--exclude-standard").splitlines():
+        if (ROOT / name).is_file() and not name.startswith(("tests/", "benchmarks/")):
+            (published / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, published / name)
     revision = committed(published)
     folder = tmp_path_factory.mktemp("user")

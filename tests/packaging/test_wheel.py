@@ -51,48 +51,25 @@ def test_the_wheel_of_images_is_the_same(wheel: Path, tmp_path: Path) -> None:
             assert packed.read(path) == built.read(path), path
 
 
-def test_the_command_prints_its_version(installation: Installation) -> None:
-    done = installation.run("compose", "--version", variables=without_ros())
-
-    assert done.returncode == 0, done.stderr
-    assert version("ros2-composer") in done.stdout
-
-
-def test_the_empty_environment_has_no_ros(installation: Installation) -> None:
-    done = installation.run("python", "-c", "import rclpy", variables=without_ros())
-
-    assert "No module named 'rclpy'" in done.stderr
-
-
-def test_the_shipped_files_are_valid_from_another_folder_and_without_ros(
-    installation: Installation,
+@pytest.mark.parametrize(
+    ("command", "code", "shown"),
+    [
+        ("compose --version", 0, version("ros2-composer")),
+        ("python -m rclpy", 1, "No module named rclpy"),
+        ("compose validate SHARE/systems SHARE/nodes", 0, ""),
+        ("compose validate broken.yaml", 1, "did you mean 'planner'?"),
+        ("compose graph SHARE/systems/pipeline.yaml", 0, "motor_controller"),
+    ],
+)
+def test_commands_without_ros(
+    command: str, code: int, shown: str, installation: Installation
 ) -> None:
-    share = installation.package / "share"
-
-    done = installation.run(
-        "compose", "validate", share / "systems", share / "nodes", variables=without_ros()
-    )
-
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_an_error_is_reported_without_ros(installation: Installation) -> None:
     broken = installation.elsewhere / "broken.yaml"
     broken.write_text("system: broken\nnodes:\n  planner: {type: planer}\n", "utf-8")
-
-    done = installation.run("compose", "validate", broken.name, variables=without_ros())
-
-    assert done.returncode == 1
-    assert "did you mean 'planner'?" in done.stdout + done.stderr
-
-
-def test_a_diagram_is_drawn_without_ros(installation: Installation) -> None:
-    system = installation.package / "share" / "systems" / "pipeline.yaml"
-
-    done = installation.run("compose", "graph", system, variables=without_ros())
-
-    assert done.returncode == 0, done.stderr
-    assert "motor_controller" in done.stdout
+    words = command.replace("SHARE", str(installation.package / "share")).split()
+    done = installation.run(*words, variables=without_ros())
+    assert done.returncode == code, done.stdout + done.stderr
+    assert shown in done.stdout + done.stderr
 
 
 @pytest.mark.ros
