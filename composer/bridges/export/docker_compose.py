@@ -74,7 +74,13 @@ def compose_file(
             **_conditional(system, service, listed),
             **_limits(service),
             "environment": ros_variables(environment, service) | service.environment,
-            "healthcheck": _health(service.readiness(str(contents.file))),
+            "healthcheck": {
+                "test": ["CMD", "compose", *service.readiness(str(contents.file))],
+                "interval": "10s",
+                "timeout": "8s",
+                "retries": 3,
+                "start_period": "60s",
+            },
         }
         if not found[service.label]["environment"]:
             del found[service.label]["environment"]
@@ -118,13 +124,3 @@ def _limits(service: Service) -> dict[str, Any]:
     if service.priority is not None:
         found["ulimits"] = {"rtprio": service.priority}
     return found
-
-
-def _health(ask: list[str]) -> dict[str, Any]:
-    return {
-        "test": ["CMD", "compose", *ask],
-        "interval": "10s",
-        "timeout": "8s",
-        "retries": 3,
-        "start_period": "60s",
-    }

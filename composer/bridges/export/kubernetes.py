@@ -73,7 +73,7 @@ def _workload(system: System, first: Service, pod: dict[str, Any]) -> dict[str, 
     """Return the object that keeps a pod running."""
     labels = {
         "app.kubernetes.io/name": first.label,
-        "app.kubernetes.io/part-of": _label_value(system.name.value),
+        "app.kubernetes.io/part-of": system.name.value[:63].strip("_.-"),
     }
     template = {"metadata": {"labels": labels}, "spec": pod}
     metadata = {"name": first.label, "labels": labels}
@@ -98,10 +98,6 @@ def _workload(system: System, first: Service, pod: dict[str, Any]) -> dict[str, 
             "template": template,
         },
     }
-
-
-def _label_value(name: str) -> str:
-    return name[:63].strip("_.-")
 
 
 def _place(system: System, here: Sequence[Service]) -> dict[str, Any]:
@@ -171,7 +167,10 @@ def _container(
     *,
     shares_memory: bool,
 ) -> dict[str, Any]:
-    variables = ros_variables(environment, service) | service.environment
+    variables = [
+        {"name": name, "value": without_variables(value)}
+        for name, value in (ros_variables(environment, service) | service.environment).items()
+    ]
     priority = service.priority
     mounts = [{"name": _TEMPORARY, "mountPath": WRITABLE}]
     if shares_memory:
@@ -182,7 +181,7 @@ def _container(
     return {
         **({} if priority is None else {"#2": _PRIORITY.format(priority=priority)}),
         "command": without_variables(["compose", *service.command(file)]),
-        **({"env": _variables(variables)} if variables else {}),
+        **({"env": variables} if variables else {}),
         **({"resources": limits} if (limits := _limits(service)) else {}),
         **({} if service.is_server else {"#3": _PROBES}),
         "startupProbe": _probe(alive, period_s=2, failures=60),
@@ -195,12 +194,6 @@ def _container(
         },
         "volumeMounts": mounts,
     }
-
-
-def _variables(environment: Mapping[str, str]) -> list[dict[str, str]]:
-    return [
-        {"name": name, "value": without_variables(value)} for name, value in environment.items()
-    ]
 
 
 def _limits(service: Service) -> dict[str, Any]:
