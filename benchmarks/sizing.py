@@ -19,14 +19,18 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import String
 
 from benchmarks.processes import RESULT_MARK
-from composer.runtime.manager.status_messages import status_message
-from composer.runtime.members.report import parse_report
-from composer.runtime.ros.diagnostic_arrays import write_array
-from composer.runtime.supervision.status import NodeStatus, SystemStatus
+from composer.runtime.protocol.codec import decode, encode
+from composer.runtime.protocol.reports import (
+    NodeReport,
+    SystemReport,
+    is_signed,
+    signed,
+    split_signature,
+)
 from tests.ros.network.namespaces import Computer, network
 
 _SIZES = (10, 50)
@@ -37,6 +41,7 @@ _POLL_S = 0.2
 _TIMEOUT_S = 120.0
 _LEAN = dict.fromkeys(("parameters", "rosout", "type_description", "lifecycle_services"), False)
 _REPORTS = 200
+_KEY = "00" * 32
 _PORT = 11811
 _SERVER = {"ROS_DISCOVERY_SERVER": f"10.77.0.1:{_PORT}"}
 _SERVER_COMMAND = (str(Path(sys.executable).with_name("fast-discovery-server")), "-i", "0")
@@ -157,12 +162,14 @@ def _received(computer: Computer) -> int:
 
 def _reports() -> tuple[float, float]:
     """Return the size (KB) of a report of a process, and the CPU time (ms) to read it."""
-    nodes = tuple(NodeStatus(f"/lab/node_{number}", "active") for number in range(_SIZES[0]))
-    status = SystemStatus("lab/part", "running", nodes, "host", 1, 1.0)
-    data = write_array(0, status_message(status, 1.0, (), 1))
+    nodes = tuple(NodeReport(f"/lab/node_{number}", "active") for number in range(_SIZES[0]))
+    text = signed(encode(SystemReport("lab/part", "running", nodes, "host", "1")), _KEY)
+    data = serialize_message(String(data=text))
     began_s = time.process_time()
     for _ in range(_REPORTS):
-        parse_report(deserialize_message(data, DiagnosticArray))
+        message = deserialize_message(data, String)
+        assert is_signed(message.data, _KEY)
+        decode(split_signature(message.data)[1], SystemReport)
     return len(data) / 1000.0, 1000.0 * (time.process_time() - began_s) / _REPORTS
 
 

@@ -8,8 +8,13 @@ from typing import TypeVar
 from composer.client.name_matching import find_node, full_name, not_found_error
 from composer.client.session import Deadline, RosError, Session
 from composer.model.names import is_hidden
-from composer.runtime.process.query_socket import NameAndTypes, visible
-from composer.runtime.ros_graph.node_endpoints import ActionInfo, NodeInfo, action_info, node_info
+from composer.runtime.protocol.requests import (
+    ActionInfo,
+    NameAndTypes,
+    NodeInfo,
+    visible_names,
+)
+from composer.runtime.ros_graph.node_endpoints import action_info, node_info
 
 T = TypeVar("T")
 
@@ -30,7 +35,7 @@ class GraphNames:
         found = self._settled(lambda: self._graph.names(kind))
         if kind == "topic" and not self._session.others():
             return ()  # they are those of this session
-        return found if hidden else visible(found)
+        return found if hidden else visible_names(found)
 
     def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
         """Return the endpoints of a node. Raises NotFoundError."""

@@ -10,7 +10,7 @@ from rcl_interfaces.srv import DescribeParameters
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, Session
 from composer.language.tree import Plain
-from composer.runtime.ros.parameter_description import ParameterDescription
+from composer.runtime.protocol.requests import ParameterDescription
 from composer.runtime.ros.parameter_values import description
 
 #: How long to wait for the responses of nodes; the parameters of later ones have no description.

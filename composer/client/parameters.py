@@ -24,8 +24,7 @@ from composer.client.requests import (
 )
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.systems.proxies import PARAMETERS, Proxies
-from composer.runtime.ros.manager_protocol import full_parameter_name
-from composer.runtime.ros.parameter_description import ParameterDescription
+from composer.runtime.protocol.requests import ParameterDescription, full_parameter_name
 from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value
 
 T = TypeVar("T")

@@ -26,7 +26,7 @@ from composer.runtime.middleware.dds_participants import count_participants, enl
 from composer.runtime.middleware.environment import ROS_ARGUMENTS
 from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.manager_protocol import NAME
+from composer.runtime.protocol.requests import NAME
 from composer.runtime.ros_graph.graph import (
     COMMAND_PREFIX,
     SETTLE_S,

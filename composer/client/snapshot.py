@@ -17,7 +17,7 @@ from composer.language.tree import Plain
 from composer.model import PortKind
 from composer.model.names import is_hidden
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
-from composer.runtime.ros.manager_protocol import full_parameter_name
+from composer.runtime.protocol.requests import full_parameter_name
 from composer.runtime.ros.parameter_values import plain_value
 from composer.runtime.ros_graph.node_endpoints import endpoints, node_names, visible_topics
 

@@ -29,7 +29,6 @@ from composer.plan.transitions import (
     STOPPED,
     SystemGoals,
     bring_up,
-    parse_goals,
     plan_transitions,
     start_causes,
     start_goals,

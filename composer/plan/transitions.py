@@ -196,26 +196,11 @@ class SystemGoals:
     limit: PrimaryState = PrimaryState.ACTIVE
     others: Mapping[str, PrimaryState] = field(default_factory=dict)
 
-    def __str__(self) -> str:
-        others = (f"{name}={state}" for name, state in self.others.items())
-        return " ".join((str(self.serial), self.activity, self.limit, *others))
-
     def states(self, system: System) -> Mapping[str, PrimaryState]:
         """Return the goal of each node of the system, by its key."""
         names = {node.name.value: node.full_name for node in system.nodes}
         goals = start_goals(system, self.limit)
         return {name: self.others.get(names[name], goal) for name, goal in goals.items()}
-
-
-def parse_goals(text: str) -> SystemGoals | None:
-    """Return the goals in a text; None if it has none, or those of another version."""
-    try:
-        serial, activity, limit, *others = text.split()
-        pairs = (item.split("=") for item in others)
-        states = {name: PrimaryState(state) for name, state in pairs}
-        return SystemGoals(int(serial), activity, PrimaryState(limit), states)
-    except ValueError:
-        return None
 
 
 def system_goals(

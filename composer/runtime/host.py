@@ -43,7 +43,6 @@ from composer.runtime.executors.placement import (
 )
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
-from composer.runtime.manager.other_instances import Instance
 from composer.runtime.metrics.figures import merged_chains
 from composer.runtime.middleware.dds_profiles import use_large_system_profile
 from composer.runtime.middleware.environment import (
@@ -57,6 +56,7 @@ from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.libraries import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.signals import stop_signals
+from composer.runtime.protocol.requests import Instance
 from composer.runtime.ros.message_sizes import sends_large_messages
 from composer.runtime.supervision import events
 from composer.runtime.supervision.commands import Commands, SystemStart

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from composer.client.parameters import ParameterClient
     from composer.client.systems.local_queries import LocalParameters
     from composer.model.resolve.parameter_files import ParameterFiles
-    from composer.runtime.ros.parameter_description import ParameterDescription
+    from composer.runtime.protocol.requests import ParameterDescription
 
 param_app = command_group("List, get and set parameters of running nodes.")
 

@@ -17,7 +17,8 @@ from composer.cli.support.system_arguments import AnyRunningSystem, running_syst
 from composer.cli.support.terminal import columns, lines, write
 
 if TYPE_CHECKING:
-    from composer.client.systems.system_reports import NodeReport, PartialReport, SystemReport
+    from composer.runtime.protocol.codec import OtherVersionError
+    from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 EPILOG = examples(
     "compose ps                 all running systems and other lifecycle nodes",
@@ -27,7 +28,7 @@ EPILOG = examples(
 )
 
 #: None stands for a system that did not respond.
-_Systems: TypeAlias = "Mapping[str, SystemReport | PartialReport | None]"
+_Systems: TypeAlias = "Mapping[str, SystemReport | OtherVersionError | None]"
 #: The reports of systems by their names, and the states of other lifecycle nodes. None stands for a
 #: node that did not respond.
 _Listed: TypeAlias = "tuple[_Systems, Mapping[str, str | None]]"
@@ -52,8 +53,8 @@ def ps(
     For each node, the list has the state and its duration, the number of restarts and errors, the
     message rates of the last seconds (- if they are not known), and the last error. Nodes of other
     processes of a system are listed there, with the process. Lifecycle nodes that do not belong to
-    a system are listed with their states. If a system is of another version of ros2-composer, only
-    the states of its nodes are listed. With --json, the output includes callback timings, which
+    a system are listed with their states, and so are those of a system of another version of
+    ros2-composer. With --json, the output includes callback timings, which
     'compose top' shows as a table.
 
     With --ready, the exit code is 1 if a system is being started or shut down, or is paused, if a
@@ -64,7 +65,7 @@ def ps(
     listed = _ask(name, timeout, callbacks=json) or _discover(name, timeout, callbacks=json)
     write(_as_json(*listed) if json else _as_text(*listed))
     reports = listed[0].values()
-    if ready and not (reports and all(report and report.is_ready for report in reports)):
+    if ready and not (reports and all(getattr(item, "is_ready", False) for item in reports)):
         raise typer.Exit(FAILED)
 
 
@@ -102,29 +103,25 @@ def _as_json(systems: _Systems, others: Mapping[str, str | None]) -> str:
     return as_json(content, indent=2)
 
 
-def _report(report: SystemReport | PartialReport) -> dict[str, Any]:
+def _report(report: SystemReport | OtherVersionError) -> dict[str, Any]:
     """Return the report with the callbacks below their nodes."""
-    from composer.client.systems.system_reports import PartialReport
-
-    content = asdict(report)
-    if isinstance(report, PartialReport):
-        states = content.pop("states").items()
-        nodes = [{"node": node, "state": state} for node, state in states]
-        return content | {"another_version": True, "nodes": nodes}
-    for time_of_report in ("at_s", "callbacks_at_s", "processes_at_s"):
-        content.pop(time_of_report)
-    callbacks = content.pop("callbacks")
-    for node in content["nodes"]:
+    if isinstance(report, Exception):
+        return {"another_version": True, "message": str(report)}
+    names = ("activity", "message", "host", "pid", "is_ready")
+    content = {name: getattr(report, name) for name in names}
+    content["nodes"] = nodes = [asdict(node) for node in report.nodes]
+    content["chains"] = [asdict(chain) for chain in report.chains]
+    for node in nodes:
         node["callbacks"] = [
-            {key: callback[key] for key in callback if key not in ("node", "histogram")}
-            for callback in callbacks
-            if callback["node"] == node["node"]
+            {key: value for key, value in asdict(item).items() if key not in ("node", "histogram")}
+            for item in report.callbacks
+            if item.node == node["node"]
         ]
     return content
 
 
 def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
-    from composer.client.systems.system_reports import SystemReport
+    from composer.runtime.protocol.reports import SystemReport
 
     known = [report for report in systems.values() if isinstance(report, SystemReport)]
     processes = {name for report in known for name in report.processes.values()}
@@ -137,17 +134,14 @@ def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
 
 
 def _system(
-    name: str, report: SystemReport | PartialReport | None, *, is_listed: bool = False
+    name: str, report: SystemReport | OtherVersionError | None, *, is_listed: bool = False
 ) -> str:
     """Return the part of a system; ``is_listed`` is whether another one has its nodes."""
-    from composer.client.systems.system_reports import PartialReport
-
     if report is None:
         return lines([f"{name}: no response, its process may be busy or gone"])
+    if isinstance(report, Exception):
+        return lines([f"{name}: {report}"])
     where = f"host {report.host}, process {report.pid}"
-    if isinstance(report, PartialReport):
-        title = lines([f"{name}: of another version of ros2-composer, only states known ({where})"])
-        return f"{title}\n{columns([_HEAD[:2], *report.states.items()])}"
     title = lines([f"{name}: {report.activity}, {report.message} ({where})"])
     if is_listed:
         return title

@@ -103,7 +103,7 @@ def _add_verb(app: typer.Typer, name: str, verb: _Verb) -> None:
         all_or_nothing: AllOrNothing = False,
         timeout: Timeout = CHANGE_TIMEOUT_S,
     ) -> None:
-        from composer.runtime.ros.manager_protocol import ALL_OR_NOTHING
+        from composer.runtime.protocol.requests import ALL_OR_NOTHING
 
         service = f"{name}{ALL_OR_NOTHING}" if all_or_nothing else name
         _change_system(service, system, timeout, verb.failure)

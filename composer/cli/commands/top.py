@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from composer.cli.support.callback_tables import SortKey
     from composer.client.session import Session
     from composer.client.systems.managers import Systems
-    from composer.client.systems.system_reports import SystemReport
+    from composer.runtime.protocol.reports import SystemReport
 
 EPILOG = examples(
     "compose top                   show the running system; press q to quit",

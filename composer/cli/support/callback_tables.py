@@ -8,10 +8,11 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from composer.cli.support.terminal import columns, lines
-from composer.runtime.metrics.figures import CallbackFigures, CallbackRates, rates
+from composer.runtime.metrics.figures import CallbackRates, rates
+from composer.runtime.protocol.reports import CallbackFigures
 
 if TYPE_CHECKING:
-    from composer.client.systems.system_reports import SystemReport
+    from composer.runtime.protocol.reports import SystemReport
 
 _DURATION_COLUMNS = ("mean ms", "p99 ms", "max ms", "late ms", "over", "dropped")
 _SUMMARY_HEAD = ("node", "callback", "calls", *_DURATION_COLUMNS)

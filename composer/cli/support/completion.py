@@ -69,7 +69,7 @@ def complete_interface_package(incomplete: str) -> list[str]:
 
 def _graph_names(kind: str, incomplete: str) -> list[str]:
     """Return the names of one kind, hidden ones only if they are asked for."""
-    from composer.client.systems.local_graph import local_names
+    from composer.client.systems.local_queries import local_names
 
     found = local_names(kind, _WITHIN_S, hidden="/_" in incomplete) or ()
     return [name for name, _ in found]

@@ -16,7 +16,7 @@ from composer.cli.support.terminal import keep_stdout_for_data, say
 if TYPE_CHECKING:
     from composer.client.session import Deadline, Session
     from composer.model import System
-    from composer.runtime.process.query_socket import NameAndTypes
+    from composer.runtime.protocol.requests import NameAndTypes
 
 
 def require_ros(command: str, system: System | None = None) -> None:
@@ -153,7 +153,7 @@ def graph_names(
     A running system on this computer answers at once; without one, join the ROS graph.
     """
     require_ros(command)
-    from composer.client.systems.local_graph import local_names
+    from composer.client.systems.local_queries import local_names
 
     found = local_names(kind, timeout_s, hidden=hidden)
     if found is not None:

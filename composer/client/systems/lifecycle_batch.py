@@ -10,8 +10,8 @@ from composer.client.lifecycle import CompletedTransition, LifecycleClient
 from composer.client.session import Deadline, RosError, Session
 from composer.client.systems.dependents import active_dependents, inactive_dependents, lowered
 from composer.client.systems.managers import Systems
-from composer.client.systems.system_reports import NodeReport, SystemReport
 from composer.runtime.process.instance_lock import local_systems
+from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 _UPWARD = ("configure", "activate")
 #: The goal of each transition, by the state in which it is available.

@@ -6,55 +6,49 @@ graph then, which also produces the errors.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
-from dataclasses import replace
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.client.systems.local_graph import RESPONSE_S, local_view
 from composer.client.systems.system_reports import (
-    InvalidReportError,
-    SystemReport,
-    system_report,
+    of_system,
     with_callbacks_of_processes,
     with_processes,
 )
 from composer.model.names import is_hidden
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.process.query_socket import (
-    ACTION,
-    NODE,
-    NODES,
-    PARAMETERS,
-    STATUS,
-    TOPIC,
+from composer.runtime.process.query_socket import ask
+from composer.runtime.protocol.reports import SystemReport
+from composer.runtime.protocol.requests import (
+    ActionQuery,
+    EndpointsAnswer,
+    EndpointsQuery,
+    GraphAnswer,
+    GraphQuery,
     GraphView,
-    ask,
-    visible,
+    NameAndTypes,
+    NodeInfo,
+    NodeQuery,
+    NodesAnswer,
+    NodesQuery,
+    ParameterDescription,
+    ParametersAnswer,
+    ParametersQuery,
+    StatusQuery,
+    TopicAnswer,
+    TopicQuery,
+    visible_names,
 )
-from composer.runtime.ros.parameter_description import ParameterDescription
 
-P = ParamSpec("P")
-T = TypeVar("T")
-
+#: Longer than a manager waits for its view to become complete.
+RESPONSE_S = 0.6
+#: The endpoints of the largest systems: discovering the graph takes longer.
+_ENDPOINTS_S = 1.0
 _STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
 _LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
 _MANAGER_SERVICE = "/manager/is_active"
-
-
-def _none_for_other_versions(function: Callable[P, T | None]) -> Callable[P, T | None]:
-    """Return None if an answer has another shape: the system may be of another version."""
-
-    @wraps(function)
-    def call(*arguments: P.args, **options: P.kwargs) -> T | None:
-        with suppress(ValueError, KeyError, TypeError, AttributeError):
-            return function(*arguments, **options)
-        return None
-
-    return call
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,58 +71,65 @@ class LocalParameters:
         return tuple(self.described[name][0] for name in names)
 
 
-@_none_for_other_versions
+def local_names(
+    kind: str, timeout_s: float, *, hidden: bool = False
+) -> tuple[NameAndTypes, ...] | None:
+    """Return the names that :meth:`composer.client.graph_names.GraphNames.names` would return."""
+    view = local_view(timeout_s)
+    if view is None:
+        return None
+    return view[kind] if hidden else visible_names(view[kind])
+
+
+def local_view(timeout_s: float) -> GraphView | None:
+    """Return the whole graph."""
+    answer: GraphAnswer | None = _ask_any(GraphQuery(), timeout_s)
+    return None if answer is None else answer.names
+
+
+def local_endpoints() -> tuple[Mapping[str, tuple[ObservedEndpoint, ...]], list[str]] | None:
+    """Return the endpoints by node, and the names of all nodes.
+
+    A name that two nodes share is listed twice.
+    """
+    answer: EndpointsAnswer | None = _ask_any(EndpointsQuery(), _ENDPOINTS_S, _ENDPOINTS_S)
+    return None if answer is None else (answer.endpoints, list(answer.nodes))
+
+
 def local_node(name: str, timeout_s: float, *, hidden: bool) -> dict[str, Any] | None:
     """Return the endpoints of a node, by the names of the fields of NodeInfo."""
     full_name = _find(name, timeout_s)
     if full_name is None:
         return None
-    found: dict[str, Any] | None = _ask_any(NODE, full_name, timeout_s)
-    if found is None or hidden:
-        return found
+    found: NodeInfo | None = _ask_any(NodeQuery(full_name), timeout_s)
+    if found is None:
+        return None
     return {
-        key: visible(map(tuple, value)) if isinstance(value, list) else value
-        for key, value in found.items()
+        key: value if hidden or isinstance(value, str) else visible_names(value)
+        for key, value in asdict(found).items()
     }
 
 
-@_none_for_other_versions
 def local_topic(name: str, timeout_s: float) -> dict[str, Any] | None:
     """Return the endpoints of a topic, as :meth:`TopicInfo.plain` does."""
-    found = _ask_any(TOPIC, name, timeout_s)
-    if found is None:
-        return None
-    endpoints = {
-        key: [
-            {fact: end[fact] for fact in ("node", "type", "type_hash", "gid")}
-            | {"qos": dict(end["qos"])}
-            for end in found[key]
-        ]
-        for key in ("publishers", "subscriptions")
-    }
-    return {"name": found["name"], "types": list(map(str, found["types"]))} | endpoints
+    answer: TopicAnswer | None = _ask_any(TopicQuery(_absolute(name)), timeout_s)
+    return None if answer is None else dict(answer.topic)
 
 
-@_none_for_other_versions
 def local_action(name: str, timeout_s: float) -> dict[str, Any] | None:
     """Return the nodes with servers and clients of an action, by the names of ActionInfo."""
-    found = _ask_any(ACTION, name, timeout_s)
-    if found is None:
-        return None
-    lists = {key: list(map(str, found[key])) for key in ("types", "servers", "clients")}
-    return {"name": found["name"]} | lists
+    found = _ask_any(ActionQuery(_absolute(name)), timeout_s)
+    return None if found is None else asdict(found)
 
 
-@_none_for_other_versions
 def local_parameters(name: str, timeout_s: float) -> LocalParameters | None:
     """Return the parameters of a node of a system on this computer."""
     full_name = _find(name, timeout_s)
     if full_name is None:
         return None
-    return _ask_parameters([full_name], timeout_s).get(full_name)
+    return _ask_parameters((full_name,), timeout_s).get(full_name)
 
 
-@_none_for_other_versions
 def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParameters] | None:
     """Return the parameters of all nodes in the graph, if systems on this computer have them all.
 
@@ -144,7 +145,6 @@ def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParamet
     return [known[node] for node in sorted(known) if hidden or not is_hidden(node)]
 
 
-@_none_for_other_versions
 def local_report(name: str, timeout_s: float, *, callbacks: bool = False) -> SystemReport | None:
     """Return the report of a running system, by its full name or the last part."""
     systems = [system for system in local_systems() if f"/{system}".endswith(f"/{name}")]
@@ -161,7 +161,6 @@ def local_report(name: str, timeout_s: float, *, callbacks: bool = False) -> Sys
     return with_processes(report, found) if len(found) == len(others) else None
 
 
-@_none_for_other_versions
 def local_reports(timeout_s: float, *, callbacks: bool = False) -> dict[str, SystemReport] | None:
     """Return the reports of all systems, if no others and no other lifecycle nodes run."""
     view = local_view(timeout_s)
@@ -183,7 +182,6 @@ def local_reports(timeout_s: float, *, callbacks: bool = False) -> dict[str, Sys
     return with_callbacks_of_processes(found) if complete else None
 
 
-@_none_for_other_versions
 def local_states(timeout_s: float) -> dict[str, str] | None:
     """Return the state of each lifecycle node, if systems on this computer have them all."""
     reports = local_reports(timeout_s)
@@ -193,7 +191,6 @@ def local_states(timeout_s: float) -> dict[str, str] | None:
     return dict(sorted(states.items()))
 
 
-@_none_for_other_versions
 def local_state(name: str, timeout_s: float) -> str | None:
     """Return the state of a node of a system on this computer."""
     full_name = _find(name, timeout_s)
@@ -204,49 +201,38 @@ def local_state(name: str, timeout_s: float) -> str | None:
     return next((node.state for node in nodes if node.node == full_name), None)
 
 
-def _ask_any(query: str, name: str, timeout_s: float) -> Any:
-    """Return what the first system that is certain knows of a name; None if there is none."""
-    absolute = name if name.startswith("/") else f"/{name}"
-    limit_s = min(RESPONSE_S, timeout_s)
-    answers = (ask(system, query, absolute, limit_s) for system in local_systems())
-    return next((answer for answer in answers if answer), None)
+def _absolute(name: str) -> str:
+    return name if name.startswith("/") else f"/{name}"
+
+
+def _ask_any(query: Any, timeout_s: float, response_s: float = RESPONSE_S) -> Any:
+    """Return the answer of the first system that is certain; None if there is none."""
+    limit_s = min(response_s, timeout_s)
+    answers = (ask(system, query, limit_s) for system in local_systems())
+    return next((answer for answer in answers if answer is not None), None)
 
 
 def _ask_report(system: str, timeout_s: float, *, callbacks: bool = False) -> SystemReport | None:
-    answer = ask(system, STATUS, callbacks, min(RESPONSE_S, timeout_s))
-    if answer is None:
-        return None
-    try:
-        report = system_report(system, answer["status"])
-    except InvalidReportError:
-        return None
-    return replace(
-        report,
-        callbacks=tuple(CallbackFigures(**figures) for figures in answer["callbacks"]),
-        chains=tuple(ChainFigures(**figures) for figures in answer["chains"]),
-    )
+    report: SystemReport | None = ask(system, StatusQuery(callbacks), min(RESPONSE_S, timeout_s))
+    return None if report is None else of_system(system, report)
 
 
-def _ask_parameters(nodes: list[str] | None, timeout_s: float) -> dict[str, LocalParameters]:
+def _ask_parameters(nodes: tuple[str, ...] | None, timeout_s: float) -> dict[str, LocalParameters]:
     known: dict[str, LocalParameters] = {}
     for system in local_systems():
-        answer = ask(system, PARAMETERS, nodes, min(RESPONSE_S, timeout_s)) or {}
-        for node, parameters in answer.items():
-            known[node] = LocalParameters(
-                node,
-                {
-                    facts["name"]: (ParameterDescription(**facts), value)
-                    for facts, value in parameters
-                },
-            )
+        answer: ParametersAnswer | None = ask(
+            system, ParametersQuery(nodes), min(RESPONSE_S, timeout_s)
+        )
+        for node, parameters in ({} if answer is None else answer.nodes).items():
+            described = {item.name: (item, value) for item, value in parameters}
+            known[node] = LocalParameters(node, described)
     return known
 
 
 def _find(name: str, timeout_s: float) -> str | None:
     """Return the full name of the only node that ``name`` refers to."""
-    limit_s = min(RESPONSE_S, timeout_s)
-    answers = (ask(system, NODES, None, limit_s) for system in local_systems())
-    nodes: list[str] = next((answer for answer in answers if answer), [])
+    answer: NodesAnswer | None = _ask_any(NodesQuery(), timeout_s)
+    nodes = () if answer is None else answer.nodes
     if name in nodes:
         return name if nodes.count(name) == 1 else None
     matches = [] if name.startswith("/") else [node for node in nodes if node.endswith(f"/{name}")]

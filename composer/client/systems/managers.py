@@ -9,35 +9,34 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from composer.base.characters import visible
 from composer.client.name_matching import NotFoundError, not_found_error
 from composer.client.requests import call_once
 from composer.client.session import Deadline, NoResponseError, Session
-from composer.client.systems.callback_reports import CallbackReport, parse_callbacks
-from composer.client.systems.system_reports import (
-    InvalidReportError,
-    PartialReport,
-    SystemReport,
-    parse_state,
-    partial_report,
-    with_processes,
-)
+from composer.client.systems.system_reports import parse_state, with_processes
 from composer.runtime.process.instance_lock import is_held, local_systems
-from composer.runtime.ros.manager_protocol import (
-    CALLBACKS_QOS,
+from composer.runtime.protocol.codec import OtherVersionError, ProtocolError, decode
+from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.requests import (
     CALLBACKS_TOPIC,
     IS_ACTIVE,
     NAME,
-    RESTART,
-    RESTART_NODES,
-    STATE_QOS,
+    REQUEST,
     STATE_TOPIC,
+    Done,
+    Restart,
+)
+from composer.runtime.ros.manager_interface import (
+    CALLBACKS_QOS,
+    STATE_QOS,
+    RequestService,
+    read_answer,
+    request_message,
 )
 
 T = TypeVar("T")
@@ -73,8 +72,8 @@ class Systems:
         self._with_callbacks = callbacks
         self._on_report = on_report
         self._states: dict[str, SystemReport] = {}
-        self._partial: dict[str, PartialReport] = {}
-        self._callbacks: dict[str, CallbackReport] = {}
+        self._other_versions: dict[str, OtherVersionError] = {}
+        self._callbacks: dict[str, TimingReport] = {}
         self._arrivals_s: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=2))
         self._subscriptions: dict[str, list[Subscription]] = {}
 
@@ -155,9 +154,9 @@ class Systems:
         self._session.wait_for(lambda: all(map(self._is_fresh, requested)) or None, deadline)
         return {name: self._report(name) if name in self._states else None for name in requested}
 
-    def partial_report(self, name: str) -> PartialReport | None:
-        """Return what a system of another version has reported."""
-        return self._partial.get(name)
+    def other_version(self, name: str) -> OtherVersionError | None:
+        """Return the error of a system of another version, which says what to update."""
+        return self._other_versions.get(name)
 
     def current(self) -> dict[str, SystemReport | None]:
         """Return the last report of each system that is subscribed to, None before the first."""
@@ -171,7 +170,7 @@ class Systems:
         for name in names:
             for subscription in self._subscriptions.pop(name, ()):
                 self._session.unsubscribe(subscription)
-            for reports in (self._states, self._partial, self._callbacks, self._arrivals_s):
+            for reports in (self._states, self._other_versions, self._callbacks, self._arrivals_s):
                 reports.pop(name, None)
 
     def close(self) -> None:
@@ -190,7 +189,7 @@ class Systems:
         ``command`` is a service of :class:`composer.runtime.manager.node.ManagerNode`. Raises
         NoResponseError.
         """
-        response = self._call(name, command, Trigger, Trigger.Request())
+        response = self._call(name, command, Trigger, Trigger.Request(), command)
         return bool(response.success), str(response.message)
 
     def restart(self, name: str, nodes: Iterable[str]) -> tuple[bool, str]:
@@ -198,14 +197,15 @@ class Systems:
 
         ``nodes`` are full names. Raises NoResponseError.
         """
-        value = ParameterValue(
-            type=ParameterType.PARAMETER_STRING_ARRAY, string_array_value=list(nodes)
-        )
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter(name=RESTART_NODES, value=value)]
-        )
-        result = self._call(name, RESTART, SetParametersAtomically, request).result
-        return bool(result.successful), str(result.reason)
+        request = Restart(tuple(nodes))
+        message = request_message(request)
+        try:
+            done: Done = read_answer(
+                self._call(name, REQUEST, RequestService, message, "restart"), request
+            )
+        except ProtocolError as error:
+            raise NoResponseError(f"{name} refused the request: {error}") from error
+        return done.success, done.message
 
     def shut_down(self, name: str) -> str:
         """Shut down a system and its process; return its message. Raises NoResponseError."""
@@ -215,7 +215,7 @@ class Systems:
             self._session.wait_for(lambda: not is_held(name) or None, self._deadline)
         return message
 
-    def _call(self, name: str, command: str, kind: Any, request: Any) -> Any:
+    def _call(self, name: str, service: str, kind: Any, request: Any, command: str) -> Any:
         """Return the response of a service of a manager. Raises NoResponseError."""
         limit = _ProcessDeadline(name, self._deadline)
         # A report proves that the process is alive: the services of a killed process remain in the
@@ -223,9 +223,9 @@ class Systems:
         discovery = _ProcessDeadline(name, Deadline(min(DISCOVERY_S, limit.left_s)))
         if not self._wait_for_reports((name,), discovery):
             raise self._no_response_error(name)
-        service = f"{name}/{NAME}/{command}"
+        full_name = f"{name}/{NAME}/{service}"
         try:
-            return call_once(self._session, kind, service, request, limit)
+            return call_once(self._session, kind, full_name, request, limit)
         except NoResponseError as error:
             if limit.has_process_ended:
                 raise NoResponseError(f"{name} did not {command}: its process has ended") from error
@@ -242,6 +242,8 @@ class Systems:
         )
 
     def _no_response_error(self, name: str) -> NoResponseError:
+        if name in self._other_versions:
+            return NoResponseError(f"{name}/{NAME}: {self._other_versions[name]}")
         pid = local_systems().get(name)
         where = "its process may be busy or gone" if pid is None else f"its process is {pid}"
         return NoResponseError(
@@ -276,7 +278,7 @@ class Systems:
         if self._with_callbacks:
             subscriptions.append(
                 self._stored_in(
-                    self._callbacks, name, CALLBACKS_TOPIC, CALLBACKS_QOS, parse_callbacks
+                    self._callbacks, name, CALLBACKS_TOPIC, CALLBACKS_QOS, _parse_timings
                 )
             )
         return subscriptions
@@ -287,26 +289,26 @@ class Systems:
         name: str,
         topic: str,
         qos: QoSProfile,
-        parse: Callable[[bytes], T],
+        parse: Callable[[str], T],
     ) -> Subscription:
         """Return a subscription that keeps the last valid report of a system in ``reports``."""
         full_topic = f"{name}/{NAME}/{topic}"
         is_state = topic == STATE_TOPIC
 
-        def on_message(content: bytes) -> None:
+        def on_message(message: String) -> None:
             if is_state:
                 self._arrivals_s[name].append(time.monotonic())
             try:
-                reports[name] = parse(content)
-            except InvalidReportError as error:
-                self._session.graph.skipped.add(str(error), f"a message on {full_topic}")
-                known = partial_report(name, content) if is_state else None
-                if known is not None:
-                    self._partial[name] = known
+                reports[name] = parse(message.data)
+            except OtherVersionError as error:
+                self._other_versions[name] = error
+            except ProtocolError as error:
+                reason = f"it is not a report of this version: {error}"
+                self._session.graph.skipped.add(reason, f"a message on {full_topic}")
             if self._on_report is not None and is_state:
                 self._on_report()
 
-        return self._session.subscribe(DiagnosticArray, full_topic, on_message, qos, raw=True)
+        return self._session.subscribe(String, full_topic, on_message, qos)
 
 
 class _ProcessDeadline(Deadline):
@@ -329,6 +331,10 @@ class _ProcessDeadline(Deadline):
     def has_process_ended(self) -> bool:
         """Whether the process has ended."""
         return self._is_local and not is_held(self._system)
+
+
+def _parse_timings(text: str) -> TimingReport:
+    return decode(text, TimingReport, clean=visible)
 
 
 def without_members(systems: Iterable[str]) -> list[str]:

@@ -9,14 +9,12 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.lifecycle import LifecycleClient
 from composer.client.session import Deadline, Session
 from composer.client.systems.managers import DISCOVERY_S, Systems
-from composer.client.systems.system_reports import (
-    PartialReport,
-    SystemReport,
-    with_callbacks_of_processes,
-)
+from composer.client.systems.system_reports import with_callbacks_of_processes
 from composer.plan.drift import ObservedProcess
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros.manager_protocol import NAME
+from composer.runtime.protocol.codec import OtherVersionError
+from composer.runtime.protocol.reports import SystemReport
+from composer.runtime.protocol.requests import NAME
 
 #: How long to wait for the responses of other nodes after discovery.
 _RESPONSE_S = 2.0
@@ -26,11 +24,10 @@ _RESPONSE_S = 2.0
 class ProcessList:
     """Systems by the namespaces of their managers, and the states of other lifecycle nodes.
 
-    A partial report is that of a system of another version. None stands for a system or node that
-    did not respond.
+    An error stands for a system of another version, None for a system or node that did not respond.
     """
 
-    systems: dict[str, SystemReport | PartialReport | None]
+    systems: dict[str, SystemReport | OtherVersionError | None]
     others: dict[str, str | None] = field(default_factory=dict)
 
 
@@ -46,14 +43,13 @@ def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> 
     )
     reports = systems.reports({*local, *names}, discovery)
     managed = {node.node for report in reports.values() if report for node in report.nodes}
-    partial = {
-        name: systems.partial_report(name) for name, report in reports.items() if report is None
+    unread = {
+        name: systems.other_version(name) for name, report in reports.items() if report is None
     }
-    managed |= {node for known in partial.values() if known for node in known.states}
     others = [node for node in nodes if node not in managed]
     limited = LifecycleClient(session, Deadline(min(_RESPONSE_S, deadline.left_s)))
     whole = with_callbacks_of_processes({name: item for name, item in reports.items() if item})
-    return ProcessList({**reports, **whole, **partial}, limited.states(others) if others else {})
+    return ProcessList({**reports, **whole, **unread}, limited.states(others) if others else {})
 
 
 def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> ProcessList:
@@ -63,15 +59,15 @@ def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool
     discovery = Deadline(min(DISCOVERY_S, deadline.left_s))
     report = systems.reports([found], discovery)[found]
     if report is None:
-        partial = systems.partial_report(found)
-        if partial is not None:
-            return ProcessList({found: partial})
+        error = systems.other_version(found)
+        if error is not None:
+            return ProcessList({found: error})
         report = systems.report(found)
     return ProcessList({found: systems.whole(report) if callbacks else report})
 
 
 def observed_processes(
-    reports: Mapping[str, SystemReport | PartialReport | None],
+    reports: Mapping[str, SystemReport | OtherVersionError | None],
 ) -> tuple[ObservedProcess, ...]:
     """Return the processes of systems, with their nodes and managers, by the reports of all."""
     known = {name: report for name, report in reports.items() if isinstance(report, SystemReport)}

@@ -5,21 +5,19 @@ See :mod:`composer.runtime.manager.proxy_services` for the server side.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from functools import partial
 from typing import TypeAlias
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.subscription import Subscription
+from std_msgs.msg import String
 
 from composer.client.session import Deadline, Session
-from composer.client.systems.system_reports import (
-    InvalidReportError,
-    reported_node,
-    reported_statuses,
-)
-from composer.runtime.ros.manager_protocol import CHANGE_STATE, NAME, STATE_QOS, STATE_TOPIC
+from composer.client.systems.system_reports import parse_state
+from composer.runtime.protocol.codec import ProtocolError
+from composer.runtime.protocol.reports import NodeReport
+from composer.runtime.protocol.requests import CHANGE_STATE, NAME, STATE_TOPIC
+from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.ros_graph.graph import is_valid_name
 
 LIFECYCLE, PARAMETERS = "lifecycle", "parameters"
@@ -29,8 +27,8 @@ _SERVICE_TYPE = "lifecycle_msgs/srv/ChangeState"
 _REPORT_WITHIN_S = 2.0
 _PRIMARY_STATES = frozenset(("unconfigured", "inactive", "active", "finalized"))
 
-#: The last report of a manager: the values of each node without services of its own.
-_Report: TypeAlias = dict[str, Mapping[str, str]]
+#: The last report of a manager: the nodes without services of their own.
+_Report: TypeAlias = dict[str, NodeReport]
 
 
 class Proxies:
@@ -66,13 +64,13 @@ class Proxies:
         return {
             node: manager
             for manager, report in self._reports.items()
-            for node, values in report.items()
-            if service in values["left_to_manager"].split()
+            for node, reported in report.items()
+            if service in reported.left_to_manager
         }
 
     def state(self, node: str) -> str:
         """Return the label of the lifecycle state of a node of :meth:`nodes`."""
-        return next(report[node]["state"] for report in self._reports.values() if node in report)
+        return next(report[node].state for report in self._reports.values() if node in report)
 
     def wait_for_state(self, node: str, before: str | None, deadline: Deadline) -> str:
         """Return the next primary state other than ``before`` that the manager reports."""
@@ -89,21 +87,18 @@ class Proxies:
 
     def _subscribe(self, manager: str) -> None:
         self._subscriptions[manager] = self._session.subscribe(
-            DiagnosticArray,
+            String,
             f"{manager}/{STATE_TOPIC}",
             partial(self._on_report, manager),
             STATE_QOS,
-            raw=True,
         )
 
-    def _on_report(self, manager: str, content: bytes) -> None:
+    def _on_report(self, manager: str, message: String) -> None:
         self._report_counts[manager] = self._report_counts.get(manager, 0) + 1
-        with suppress(InvalidReportError):
-            _, statuses = reported_statuses(content)
+        with suppress(ProtocolError):
+            nodes = parse_state(manager, message.data).nodes
             self._reports[manager] = {
-                node: values
-                for name, _, values in statuses
-                if values.get("left_to_manager")
-                and "state" in values
-                and is_valid_name(node := reported_node(name))
+                node.node: node
+                for node in nodes
+                if node.left_to_manager and is_valid_name(node.node)
             }

@@ -15,9 +15,9 @@ from composer.dashboard.protocol.outbox import Update
 from composer.runtime.metrics.message_rate import CountedRate
 
 if TYPE_CHECKING:
-    from composer.client.systems.system_reports import NodeReport
     from composer.dashboard.observing.diagrams import Diagram
     from composer.dashboard.observing.topology import Topology
+    from composer.runtime.protocol.reports import NodeReport
 
 VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")
 #: The size of the page in pixels, unless a subscription says it.

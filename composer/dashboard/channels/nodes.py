@@ -16,8 +16,8 @@ from composer.dashboard.protocol.outbox import Update
 from composer.runtime.process.computer import ProcessUsage, process_usage
 
 if TYPE_CHECKING:
-    from composer.client.systems.system_reports import NodeReport, SystemReport
     from composer.runtime.metrics.figures import CallbackRates
+    from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 _PERIOD_S = 1.0
 #: While nodes are being discovered.

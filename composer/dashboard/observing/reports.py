@@ -12,8 +12,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.session import Deadline
 from composer.client.systems.local_queries import local_report
 from composer.client.systems.managers import Systems
-from composer.client.systems.system_reports import SystemReport
 from composer.runtime.process.instance_lock import LocalSystems
+from composer.runtime.protocol.reports import SystemReport
 
 if TYPE_CHECKING:
     from composer.client.shared_session import SharedSession

@@ -13,7 +13,6 @@ from composer.plan.drift.snapshot import (
     ObservedNode,
     ObservedProcess,
     Snapshot,
-    parse_endpoint,
 )
 
 __all__ = [
@@ -26,5 +25,4 @@ __all__ = [
     "ObservedProcess",
     "Snapshot",
     "compare",
-    "parse_endpoint",
 ]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import field, fields
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import field
 
 from composer.base.fast_dataclass import dataclass
 from composer.language.tree import Plain
 from composer.model import PortKind
-from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.model.qos import QosProfile
 
 #: Services of every node for tools, with their types.
 PARAMETER_SERVICES = {
@@ -40,13 +39,6 @@ _TOOL_TOPICS = {
     "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
 }
 _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
-_POLICIES = tuple(field.name for field in fields(QosProfile))
-_PARSERS = {
-    "history": History,
-    "reliability": Reliability,
-    "durability": Durability,
-    "liveliness": Liveliness,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,21 +64,6 @@ class ObservedEndpoint:
             known = _TOOL_TOPICS.get(self.name) == self.type
             return known or (last == "transition_event" and self.type == _TRANSITION_EVENT)
         return False
-
-    def plain(self) -> list[Plain]:
-        """Return the endpoint as plain data, for :func:`parse_endpoint`."""
-        policies = None if self.qos is None else [getattr(self.qos, name) for name in _POLICIES]
-        return [self.kind.value, self.name, self.type, policies]
-
-
-def parse_endpoint(plain: Sequence[Any]) -> ObservedEndpoint:
-    """Return an endpoint from plain data. Raises ValueError or TypeError for any other data."""
-    kind, name, type_name, policies = plain
-    qos = None
-    if policies is not None:
-        values = dict(zip(_POLICIES, policies, strict=True))
-        qos = QosProfile(**values | {key: make(values[key]) for key, make in _PARSERS.items()})
-    return ObservedEndpoint(PortKind(kind), str(name), str(type_name), qos)
 
 
 @dataclass(frozen=True, slots=True)

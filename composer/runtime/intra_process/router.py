@@ -26,7 +26,7 @@ from composer.runtime.intra_process.topic import (
     Topic,
     local_publisher_for,
 )
-from composer.runtime.ros.manager_protocol import CALLBACKS_TOPIC, NAME, STATE_TOPIC
+from composer.runtime.protocol.requests import CALLBACKS_TOPIC, NAME, STATE_TOPIC
 
 #: Topics that the runtime and rclpy publish themselves, without ports.
 _NOT_BY_PORTS = frozenset({"/rosout", "/parameter_events", "/diagnostics"})

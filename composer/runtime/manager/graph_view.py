@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import asdict
-from typing import Any
 
 from composer.runtime.middleware.dds_participants import count_participants
-from composer.runtime.process.query_socket import KINDS, GraphView
+from composer.runtime.protocol.requests import (
+    KINDS,
+    ActionInfo,
+    EndpointsAnswer,
+    GraphAnswer,
+    GraphView,
+    NodeInfo,
+    NodesAnswer,
+    TopicAnswer,
+)
 from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.ros_graph.graph import SETTLE_S, RosGraph
 from composer.runtime.ros_graph.node_endpoints import action_info, endpoints, node_info, node_names
@@ -39,7 +45,7 @@ class GraphObserver:
         self._settled: frozenset[bytes] = frozenset()
         self._changes = changes
         #: The last answer about all endpoints, and the change of the graph before it.
-        self._endpoints: dict[str, Any] | None = None
+        self._endpoints: EndpointsAnswer | None = None
         self._change = -1
         self._noted_change = -1
 
@@ -54,7 +60,7 @@ class GraphObserver:
             self._noted_change = change
             self._recent = RosGraph(self._node).participants()
 
-    def view(self) -> GraphView | None:
+    def view(self) -> GraphAnswer | None:
         """Return the graph, None if it may be incomplete. Any thread may call."""
         end_s = time.monotonic() + _COMPLETE_WITHIN_S
         last: GraphView | None = None
@@ -70,12 +76,12 @@ class GraphObserver:
                 last, changed_s = view, now_s
             is_settled = known <= self._settled or now_s >= changed_s + SETTLE_S
             if is_settled and self._are_all_known(graph, known):
-                return view
+                return GraphAnswer(view)
             if now_s > end_s:
                 return None
             time.sleep(_POLL_S)
 
-    def nodes(self) -> list[str] | None:
+    def nodes(self) -> NodesAnswer | None:
         """Return the nodes that can be meant by a name; None if some may be missing.
 
         Those of a process that was just killed may be among them.
@@ -83,32 +89,34 @@ class GraphObserver:
         end_s = time.monotonic() + _COMPLETE_WITHIN_S
         while True:
             graph = RosGraph(self._node)
-            names = [name for name, _ in graph.names("node")]
+            names = tuple(name for name, _ in graph.names("node"))
             if self._has_all_participants(graph) and graph.are_nodes_known():
-                return names
+                return NodesAnswer(names)
             if time.monotonic() > end_s:
                 return None
             time.sleep(_POLL_S)
 
-    def node(self, name: str) -> Mapping[str, Any]:
+    def node(self, name: str) -> NodeInfo:
         """Return the endpoints of a node, including hidden ones."""
-        return asdict(node_info(RosGraph(self._node), name, hidden=True))
+        return node_info(RosGraph(self._node), name, hidden=True)
 
-    def topic(self, name: str) -> Mapping[str, Any] | None:
+    def topic(self, name: str) -> TopicAnswer | None:
         """Return the endpoints of a topic; None as for `view`, or if there is no such topic."""
         types = self._types("topic", name)
-        return None if types is None else RosGraph(self._node).topic(name, types).plain()
+        if types is None:
+            return None
+        return TopicAnswer(RosGraph(self._node).topic(name, types).plain())
 
-    def action(self, name: str) -> Mapping[str, Any] | None:
+    def action(self, name: str) -> ActionInfo | None:
         """Return the nodes of an action; None as for `view`, or if there is no such action."""
         types = self._types("action", name)
-        return None if types is None else asdict(action_info(RosGraph(self._node), name, types))
+        return None if types is None else action_info(RosGraph(self._node), name, types)
 
     def _types(self, kind: str, name: str) -> tuple[str, ...] | None:
         view = self.view()
-        return None if view is None else dict(view[kind]).get(name)
+        return None if view is None else dict(view.names[kind]).get(name)
 
-    def endpoints(self) -> dict[str, Any] | None:
+    def endpoints(self) -> EndpointsAnswer | None:
         """Return the endpoints of all nodes, and the names of all nodes; None as for `nodes`.
 
         Some of the endpoints of a process that has just started may be missing. The answer takes
@@ -120,17 +128,14 @@ class GraphObserver:
             self._endpoints, self._change = self._new_endpoints(), change
         return self._endpoints
 
-    def _new_endpoints(self) -> dict[str, Any] | None:
+    def _new_endpoints(self) -> EndpointsAnswer | None:
         if self.nodes() is None:
             return None
         graph = RosGraph(self._node)
         found = endpoints(graph)
         if sum(len(ends) for _, ends in found) > _MAX_ENDPOINTS:
             return None
-        return {
-            "endpoints": {name: [end.plain() for end in ends] for name, ends in found},
-            "nodes": node_names(graph),
-        }
+        return EndpointsAnswer(dict(found), tuple(node_names(graph)))
 
     def _are_all_known(self, graph: RosGraph, known: frozenset[bytes]) -> bool:
         """Say whether every process on this computer is known, and no ended one is."""

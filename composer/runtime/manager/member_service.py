@@ -1,38 +1,32 @@
-"""The service by which the coordinating process of a system moves the nodes of another one."""
+"""What the coordinating process of a system requests of another one: to move its nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from itertools import zip_longest
+from dataclasses import replace
 from time import monotonic
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParameters
-from rclpy.node import Node
-
 from composer.base.fast_dataclass import dataclass
+from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.manager.proxy_services import Nodes
-from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
+from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import FINALIZED, ManagedNode, TransitionOutcome
 from composer.runtime.outside_nodes.remote_node import DONE_IN
-from composer.runtime.ros.limited_requests import TooLarge, limited
-from composer.runtime.ros.manager_protocol import (
-    CHANGE_STATES,
+from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.requests import (
     CREATE,
-    FIGURES,
-    GOALS,
-    LAST_STEPS,
-    NUMBERS,
-    PARTICIPANT,
-    REPORT_KEY,
-    SEEN_REPORT,
-    SENDER,
+    AskReportKey,
+    ChangeStates,
+    KeepGoals,
+    ReportKey,
+    Step,
+    StepResult,
+    StepResults,
 )
 
 _MAX_LISTED = 3
@@ -49,9 +43,9 @@ class MemberCallbacks:
     None. ``report_number()`` returns the number of the last report of the states.
     ``publish_states()`` is called once nodes are shut down: the coordinating process waits for
     their last counters. ``expect_end()`` is called if the process ends after the steps of a
-    request. ``keep_goals(text)`` receives the goals of the whole system. ``figures()`` returns the
-    timings of callbacks and chains as text. ``report_key`` answers processes that ask for it,
-    unless it is empty.
+    request. ``keep_goals(goals)`` receives those of the whole system. ``timings()`` returns the
+    timings of callbacks and chains. ``report_key`` answers processes that ask for it, unless it is
+    empty.
     """
 
     nodes: Nodes
@@ -59,25 +53,24 @@ class MemberCallbacks:
     report_number: Callable[[], int]
     publish_states: Callable[[], None]
     expect_end: Callable[[], None]
-    keep_goals: Callable[[str], None]
-    figures: Callable[[], str]
+    keep_goals: Callable[[SystemGoals], None]
+    timings: Callable[[], TimingReport]
     report_key: str
 
 
 @dataclass(slots=True)
-class _Step:
+class _RunningStep:
     """A step that runs, or has ended with ``result``."""
 
     change: Future[TransitionOutcome]
-    result: SetParametersResult | None = None
+    result: StepResult | None = None
 
 
 class MemberService:
-    """The service ``change_states``."""
+    """Answers the requests of the coordinating process."""
 
     def __init__(
         self,
-        node: Node,
         loop: Loop,
         callbacks: MemberCallbacks,
         participant: str,
@@ -88,101 +81,82 @@ class MemberService:
         self._callbacks = callbacks
         self._participant = participant
         self._log = log
-        self._received = ReceivedSteps[_Step]()
+        self._received = ReceivedSteps[_RunningStep]()
         self._reports = ReportTimes()
         self._repeats = RepeatLimit()
-        service = node.create_service(limited(SetParameters), f"~/{CHANGE_STATES}", unused_callback)
-        loop.add_service(service, self._on_request)
 
-    @property
-    def reported(self) -> Mapping[str, str]:
-        """What reports say for the coordinating process."""
-        return {"participant": self._participant, "last_step": self._received.last_text}
+    def completed(self, report: SystemReport) -> SystemReport:
+        """Return a report with what the coordinating process needs to know."""
+        sender, number = self._received.last
+        return replace(report, participant=self._participant, last_sender=sender, last_step=number)
 
     def on_report(self, number: int) -> None:
         """Receive that a report is the current one now."""
         self._reports.note(number, monotonic())
 
-    def _on_request(self, request: Any, reply: Reply) -> None:
-        if isinstance(request, TooLarge):
-            reply(SetParameters.Response())
+    def on_request(
+        self, request: ChangeStates | KeepGoals | AskReportKey, reply: Callable[[Any], None]
+    ) -> None:
+        """Answer a request, now or later."""
+        if isinstance(request, AskReportKey):
+            if self._callbacks.report_key:
+                reply(ReportKey(self._callbacks.report_key))
             return
-        values = {item.name: item.value for item in request.parameters}
-        if PARTICIPANT in values and values[PARTICIPANT].string_value != self._participant:
+        if request.participant and request.participant != self._participant:
             return  # for another process of the same name
-        if REPORT_KEY in values:
-            self._answer_report_key(reply)
-            return
-        if GOALS in values:
-            self._callbacks.keep_goals(values[GOALS].string_value)
-        if self._is_outdated(values):
-            self._log_late(values)
-            return
-        if LAST_STEPS in values:
-            self._callbacks.expect_end()
-        self._loop.run_task(self._change_states(values, reply))
+        if isinstance(request, KeepGoals):
+            if request.goals is not None:
+                self._callbacks.keep_goals(request.goals)
+            reply(self._callbacks.timings() if request.wants_timings else TimingReport())
+        elif self._reports.is_outdated(request.seen_report, monotonic()):
+            self._log_late(request.steps)
+        else:
+            if request.are_last:
+                self._callbacks.expect_end()
+            self._loop.run_task(self._change_states(request, reply))
 
-    def _answer_report_key(self, reply: Reply) -> None:
-        key = self._callbacks.report_key
-        if key:
-            result = SetParametersResult(successful=True, reason=key)
-            reply(SetParameters.Response(results=[result]))
-
-    def _is_outdated(self, values: Mapping[str, Any]) -> bool:
-        seen = values.get(SEEN_REPORT)
-        return seen is not None and self._reports.is_outdated(seen.integer_value, monotonic())
-
-    def _log_late(self, values: Mapping[str, Any]) -> None:
+    def _log_late(self, steps: Sequence[Step]) -> None:
         admission = self._repeats.admit("late")
         if admission is None:
             return
         nodes = self._callbacks.nodes()
-        steps = [text.split()[:2] for text in _steps(values) if text.split()]
-        known = [step for step in steps if step[0] in _TRANSITIONS and step[-1] in nodes]
-        listed = ", ".join(" ".join(step) for step in known[:_MAX_LISTED])
+        known = [step for step in steps if step.transition in _TRANSITIONS and step.node in nodes]
+        listed = ", ".join(map(str, known[:_MAX_LISTED]))
         self._log(f"ignored a request that has arrived too late: {listed}{admission.suffix}")
 
-    async def _change_states(self, values: Mapping[str, Any], reply: Reply) -> None:
+    async def _change_states(self, request: ChangeStates, reply: Callable[[Any], None]) -> None:
         """Run all steps of a request, at the same time unless they wait for each other."""
         nodes = self._callbacks.nodes()
-        texts = [text.split() for text in _steps(values)]
-        steps = [
-            self._start(text, step, nodes)
-            for text, step in zip_longest(texts, _ids(values), fillvalue=None)
-            if text is not None
-        ]
-        response = SetParameters.Response()
+        running = [self._start(request.sender, step, nodes) for step in request.steps]
+        results: list[StepResult] = []
         try:
-            for step in steps:
-                response.results.append(await self._result(step))
-            if FIGURES in values:
-                text = self._callbacks.figures()
-                response.results.append(SetParametersResult(successful=True, reason=text))
+            for step in running:
+                results.append(await self._result(step))  # noqa: PERF401 - kept if canceled
         finally:
-            reply(response)
-        if any(text[:1] == [_SHUTDOWN] for text in texts):
+            reply(StepResults(tuple(results)))
+        if any(step.transition == _SHUTDOWN for step in request.steps):
             self._callbacks.publish_states()
 
     def _start(
-        self, text: Sequence[str], step: StepId | None, nodes: Mapping[str, ManagedNode]
-    ) -> _Step | str:
+        self, sender: str, step: Step, nodes: Mapping[str, ManagedNode]
+    ) -> _RunningStep | str:
         """Start a step unless it was received before; return it, or why it is not started."""
-        transition, name, *after = text if len(text) > 1 else ("", "")
-        node = nodes.get(name)
+        node = nodes.get(step.node)
         if node is None:
             return "the process has no such node"
-        known = self._received.find(name, step)
+        known = self._received.find(sender, step)
         if known is not None:
             return known
-        if self._received.is_replaced(name, step):
+        if self._received.is_replaced(sender, step):
             return "a later request was received before"
-        earlier = [other.change for other in self._received.of(after) if not other.change.done()]
+        before = self._received.of(step.after)
+        earlier = [other.change for other in before if not other.change.done()]
         if earlier:
-            change = self._loop.run_task(self._change_after(earlier, node, transition))
+            change = self._loop.run_task(self._change_after(earlier, node, step.transition))
         else:
-            change = node.loop.run_task(self._change(node, transition))
-        new = _Step(change)
-        self._received.add(name, step, new)
+            change = node.loop.run_task(self._change(node, step.transition))
+        new = _RunningStep(change)
+        self._received.add(sender, step, new)
         return new
 
     async def _change_after(
@@ -210,25 +184,13 @@ class MemberService:
             return TransitionOutcome(transition, node.state, success=True)
         return await node.lifecycle.change(transition)
 
-    async def _result(self, step: _Step | str) -> SetParametersResult:
+    async def _result(self, step: _RunningStep | str) -> StepResult:
         """Return the result of a step, which is the same if it is requested again."""
         if isinstance(step, str):
-            return SetParametersResult(successful=False, reason=step)
+            return StepResult(success=False, reason=step)
         outcome = await step.change
         if step.result is None:
-            number = str(self._callbacks.report_number())
-            reason = number if outcome.success else outcome.reason
-            step.result = SetParametersResult(successful=outcome.success, reason=reason)
+            number = self._callbacks.report_number()
+            reason = "" if outcome.success else outcome.reason
+            step.result = StepResult(outcome.success, reason, number)
         return step.result
-
-
-def _steps(values: Mapping[str, Any]) -> list[str]:
-    return [text for value in values.values() for text in value.string_array_value]
-
-
-def _ids(values: Mapping[str, Any]) -> list[StepId]:
-    """Return what identifies the steps of a request; nothing if it is of another version."""
-    if SENDER not in values or NUMBERS not in values:
-        return []
-    sender = values[SENDER].string_value
-    return [StepId(sender, number) for number in values[NUMBERS].integer_array_value]

@@ -2,12 +2,12 @@
 
 The services (std_srvs/srv/Trigger) are named as those of nav2's lifecycle manager: ``startup``,
 ``pause``, ``resume``, ``reset``, ``shutdown`` and ``is_active``. ``startup_all_or_nothing`` and
-``resume_all_or_nothing`` undo everything if a node fails. ``restart`` restarts the nodes
-whose full names are in the parameter ``nodes`` (rcl_interfaces/srv/SetParametersAtomically).
+``resume_all_or_nothing`` undo everything if a node fails. The service ``request`` has the requests
+of commands and other processes: see :mod:`composer.runtime.protocol`.
 
-The node publishes the states of all nodes on ``/diagnostics`` (REP 107) and, latched, on ``state``:
-on each change, and while there are subscriptions every second and for each new one. While there
-are subscriptions, it publishes callback timings on ``callbacks`` and ``/diagnostics``.
+The node publishes the states of all nodes on ``/diagnostics`` (REP 107) and, latched, as a report
+on ``state``: on each change, and while there are subscriptions every second and for each new one.
+While there are subscriptions, it publishes callback timings on ``callbacks`` and ``/diagnostics``.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
@@ -29,6 +28,7 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.base.fast_dataclass import dataclass
@@ -40,37 +40,45 @@ from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
+from composer.runtime.manager.diagnostics import diagnostic_array
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
-from composer.runtime.manager.other_instances import Instance, OtherInstances
+from composer.runtime.manager.other_instances import OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.queries import ManagerQueries
-from composer.runtime.manager.status_messages import status_message
-from composer.runtime.members.report import signed_report
-from composer.runtime.metrics.figures import (
-    CallbackFigures,
-    ChainFigures,
-    Figures,
-    to_statuses,
-    to_text,
-)
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.process.query_socket import QuerySocket
-from composer.runtime.ros.diagnostic_arrays import Status as Diagnostic
-from composer.runtime.ros.diagnostic_arrays import write_array
-from composer.runtime.ros.limited_requests import limit_type_descriptions
-from composer.runtime.ros.manager_protocol import (
+from composer.runtime.protocol.codec import ProtocolError, encode
+from composer.runtime.protocol.reports import (
+    CallbackFigures,
+    ChainFigures,
+    SystemReport,
+    TimingReport,
+    signed,
+)
+from composer.runtime.protocol.requests import (
     ALL_OR_NOTHING,
-    CALLBACKS_QOS,
     CALLBACKS_TOPIC,
     IS_ACTIVE,
     NAME,
-    RESTART,
-    RESTART_NODES,
-    STATE_QOS,
+    REQUEST,
     STATE_TOPIC,
+    AskReportKey,
+    ChangeStates,
+    Done,
+    Instance,
+    KeepGoals,
+    Restart,
+)
+from composer.runtime.ros.limited_requests import limit_type_descriptions, limited
+from composer.runtime.ros.manager_interface import (
+    CALLBACKS_QOS,
+    STATE_QOS,
+    RequestService,
+    answer_message,
+    read_request,
 )
 from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.supervision.main_queue import Command
@@ -81,7 +89,11 @@ COMMANDS = (
     *("startup", "pause", "resume", "reset", "shutdown"),
     *(f"{name}{ALL_OR_NOTHING}" for name in ("startup", "resume")),
 )
+_RESTART = "restart"
+#: The requests of the coordinating process to the others.
+_OF_MEMBERS = (ChangeStates, KeepGoals, AskReportKey)
 _DIAGNOSTICS = "/diagnostics"
+_NS_PER_S = 10**9
 _PERIOD_S = 1.0
 #: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
 #: several milliseconds, so changes then wait longer: messages take at most 2 % of the time. While
@@ -173,15 +185,15 @@ class ManagerNode:
         )
         self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
-        self._diagnostics = self._publisher(_DIAGNOSTICS, 10, self._publish)
-        self._state = self._publisher(f"~/{STATE_TOPIC}", STATE_QOS, self._publish)
+        self._diagnostics = self._publisher(DiagnosticArray, _DIAGNOSTICS, 10, self._publish)
+        self._state = self._publisher(String, f"~/{STATE_TOPIC}", STATE_QOS, self._publish)
         self._callbacks = self._publisher(
-            f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
+            String, f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
         )
         for command in COMMANDS:
             self._add_service(Trigger, command, partial(self._on_command, command))
         self._add_service(Trigger, IS_ACTIVE, self._on_is_active)
-        self._add_service(SetParametersAtomically, RESTART, self._on_restart)
+        self._add_service(limited(RequestService), REQUEST, self._on_request)
         changes = PolledGraphChanges(self._node)
         self._instances = OtherInstances(
             changes,
@@ -201,11 +213,11 @@ class ManagerNode:
                 self._publish,
                 host.expect_end,
                 status.keep_goals,
-                self._figures_text,
+                self._called,
                 "" if is_child else report_key,  # the coordinating process has given it
             )
             self._member = MemberService(
-                self._node, self._loop, callbacks, own_participant.hex(), self._log.info
+                self._loop, callbacks, own_participant.hex(), self._log.info
             )
         if any(node.left_to_manager for node in status.snapshot().nodes):
             ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
@@ -214,8 +226,8 @@ class ManagerNode:
             self._loop,
             self._graph,
             store,
-            self._status_message,
-            figures=lambda: (host.callbacks(), host.chains()),
+            self._report,
+            self._timings,
         )
         self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()
@@ -240,10 +252,10 @@ class ManagerNode:
         self._node.destroy_node()
 
     def _publisher(
-        self, name: str, profile: QoSProfile | int, publish: Callable[[], None]
+        self, kind: type[Any], name: str, profile: QoSProfile | int, publish: Callable[[], None]
     ) -> Publisher:
         """Create a publisher; call ``publish`` for each new subscription."""
-        publisher = self._node.create_publisher(DiagnosticArray, name, profile)
+        publisher = self._node.create_publisher(kind, name, profile)
         subscriptions = 0
 
         def on_matched() -> None:
@@ -253,8 +265,8 @@ class ManagerNode:
                 publish()
 
         with suppress(UnsupportedEventTypeError):  # then the next message follows within a second
-            kind = QoSPublisherEventType.RCL_PUBLISHER_MATCHED
-            self.process_context.events.watch(publisher.handle, kind, on_matched)
+            event = QoSPublisherEventType.RCL_PUBLISHER_MATCHED
+            self.process_context.events.watch(publisher.handle, event, on_matched)
         return publisher
 
     def _add_service(self, kind: Any, name: str, callback: Callable[[Any, Reply], None]) -> None:
@@ -268,29 +280,34 @@ class ManagerNode:
         command, all_or_nothing, _ = name.partition(ALL_OR_NOTHING)
         self._host.on_command(Command(command, answer, all_or_nothing=bool(all_or_nothing)))
 
-    def _on_restart(self, request: SetParametersAtomically.Request, reply: Reply) -> None:
-        def answer(success: bool, message: str) -> None:
-            result = SetParametersResult(successful=success, reason=message)
-            response = SetParametersAtomically.Response(result=result)
-            self._loop.call_soon(lambda: reply(response))
+    def _on_request(self, message: Any, reply: Reply) -> None:
+        """Answer a request, or send it to what answers it."""
+        kinds = (Restart,) if self._member is None else (*_OF_MEMBERS, Restart)
+        try:
+            request = read_request(message, *kinds)
+        except ProtocolError as error:
+            reply(answer_message(error))
+            return
+        if isinstance(request, Restart):
+            self._restart(request.nodes, reply)
+        elif self._member is not None:
+            self._member.on_request(request, lambda answer: reply(answer_message(answer)))
 
-        nodes = tuple(
-            name
-            for parameter in request.parameters
-            if parameter.name == RESTART_NODES
-            for name in parameter.value.string_array_value
-        )
+    def _restart(self, nodes: tuple[str, ...], reply: Reply) -> None:
+        def answer(success: bool, message: str) -> None:
+            self._loop.call_soon(lambda: reply(answer_message(Done(success, message))))
+
         known = self._host.nodes()
         unknown = [name for name in nodes if name not in known]
         if unknown or not nodes:
-            expected = "expected the full names of nodes in the parameter 'nodes'"
+            expected = "expected the full names of nodes"
             answer(False, f"there is no node '{unknown[0]:.256}'" if unknown else expected)
         else:
-            self._host.on_command(Command(RESTART, answer, nodes))
+            self._host.on_command(Command(_RESTART, answer, nodes))
 
     def _on_is_active(self, _: Trigger.Request, reply: Reply) -> None:
         status = self._status.snapshot()
-        reply(Trigger.Response(success=status.is_active, message=status.summary))
+        reply(Trigger.Response(success=status.is_active, message=status.message))
 
     def _tick(self) -> None:
         self._host.update_status()
@@ -306,17 +323,17 @@ class ManagerNode:
     def _on_query_error(self, error: Exception) -> None:
         self._node.get_logger().error(f"cannot answer a query of a command: {error!r}")
 
-    def _figures_text(self) -> str:
-        called = (item for item in self._host.callbacks() if item.count or item.dropped)
-        return to_text((*self._host.chains(), *called))
+    def _timings(self) -> TimingReport:
+        return TimingReport(self._host.callbacks(), self._host.chains(), self._now_ns / _NS_PER_S)
+
+    def _called(self) -> TimingReport:
+        """Return the timings for a summary: of what was called, without histograms."""
+        timings = self._timings()
+        called = (item for item in timings.callbacks if item.count or item.dropped)
+        return replace(timings, callbacks=tuple(replace(item, histogram="") for item in called))
 
     def _publish_callbacks(self) -> None:
-        figures: tuple[Figures, ...] = (
-            *self._host.chains(),
-            *self._host.callbacks(),
-        )
-        statuses = to_statuses(self._status.without_nodes.system, figures)
-        self._callbacks.publish(write_array(self._now_ns, statuses))
+        self._callbacks.publish(String(data=encode(self._timings())))
 
     def _publish_soon(self) -> None:
         self._changed_s = time.monotonic()
@@ -375,25 +392,22 @@ class ManagerNode:
     def _now_ns(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)
 
-    def _status_message(self) -> list[Diagnostic]:
-        chains = self._host.chains()
-        status, uptime_s = self._status.snapshot(), self._uptime_s
-        process = None if self._member is None else self._member.reported
-        return status_message(status, uptime_s, chains, self._number, process)
+    def _report(self) -> SystemReport:
+        status = replace(
+            self._status.snapshot(), at_s=self._now_ns / _NS_PER_S, number=self._number
+        )
+        return status if self._member is None else self._member.completed(status)
 
     def _publish_now(self) -> None:
         start_s = time.monotonic()
         self._number += 1
-        statuses, now_ns = self._status_message(), self._now_ns
-        if self._report_key:
-            self._state.publish(signed_report(now_ns, statuses, self._report_key))
-        else:
-            self._state.publish(write_array(now_ns, statuses))
+        report = self._report()
+        self._state.publish(String(data=signed(encode(report), self._report_key)))
         if self._member is not None:
             self._member.on_report(self._number)
         if self._diagnostics.get_subscription_count():
-            statuses += to_statuses(self._status.without_nodes.system, self._host.callbacks())
-            self._diagnostics.publish(write_array(now_ns, statuses))
+            chains, callbacks = self._host.chains(), self._host.callbacks()
+            self._diagnostics.publish(diagnostic_array(report, self._uptime_s, chains, callbacks))
         self._published_s = time.monotonic()
         took_s = self._published_s - start_s
         self._batch_s = min(max(_BATCH_S, took_s / _MAX_SHARE), _PERIOD_S)

@@ -8,12 +8,9 @@ longer reports the other one and continues.
 
 from __future__ import annotations
 
-import json
-import math
 import re
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 from uuid import uuid4
 
@@ -21,10 +18,10 @@ from rclpy.client import Client
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from composer.base.fast_dataclass import dataclass
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
-from composer.runtime.ros.manager_protocol import INSTANCE_PREFIX, IS_ACTIVE
+from composer.runtime.protocol.codec import ProtocolError, decode, encode
+from composer.runtime.protocol.requests import INSTANCE_PREFIX, IS_ACTIVE, Instance
 from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.ros_graph.graph import participant, servers_of
 
@@ -39,39 +36,24 @@ _SAME_START_S = 0.1
 _HOST = re.compile(r"[\w.-]{1,253}", re.ASCII)
 
 
-@dataclass(frozen=True, slots=True)
-class Instance:
-    """A process that runs the system, for ``uptime_s`` seconds."""
+def is_older(instance: Instance, other: Instance) -> bool:
+    """Return whether an instance started before another one.
 
-    host: str
-    pid: int
-    uptime_s: float
-
-    @property
-    def text(self) -> str:
-        """The response of its service."""
-        return json.dumps(asdict(self))
-
-    def is_older_than(self, other: Instance) -> bool:
-        """Return whether it started before ``other``.
-
-        Not by the time of day, which may differ between hosts.
-        """
-        lead_s = self.uptime_s - other.uptime_s
-        if abs(lead_s) <= _SAME_START_S:
-            return (self.host, self.pid) < (other.host, other.pid)
-        return lead_s > 0.0
+    Not by the time of day, which may differ between hosts.
+    """
+    lead_s = instance.uptime_s - other.uptime_s
+    if abs(lead_s) <= _SAME_START_S:
+        return (instance.host, instance.pid) < (other.host, other.pid)
+    return lead_s > 0.0
 
 
 def parse_instance(text: str) -> Instance | None:
     """Return the instance that a response describes, None for anything else."""
     try:
-        content = json.loads(text)
-        host, pid, uptime_s = content["host"], int(content["pid"]), float(content["uptime_s"])
-        is_valid = _HOST.fullmatch(host) is not None and math.isfinite(uptime_s)
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        instance = decode(text, Instance)
+    except ProtocolError:
         return None
-    return Instance(host, pid, uptime_s) if is_valid else None
+    return instance if _HOST.fullmatch(instance.host) else None
 
 
 class OtherInstances:
@@ -138,7 +120,7 @@ class OtherInstances:
         self._loop.add_service(service, self._respond)
 
     def _respond(self, _: Any, reply: Reply) -> None:
-        reply(Trigger.Response(success=True, message=self._own().text))
+        reply(Trigger.Response(success=True, message=encode(self._own())))
 
     def _check_start(self) -> None:
         self.check()
@@ -160,7 +142,7 @@ class OtherInstances:
         if other is None:
             self._reported.add(service)
         elif self._is_starting:
-            if other.is_older_than(self._own()):
+            if is_older(other, self._own()):
                 self._on_older(other)
         elif other.uptime_s > START_S:  # otherwise it is about to find out
             self._reported.add(service)

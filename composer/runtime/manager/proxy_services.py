@@ -35,8 +35,8 @@ from composer.runtime.node.parameter_services import (
     set_parameters,
     value_of,
 )
+from composer.runtime.protocol.requests import CHANGE_STATE, full_parameter_name
 from composer.runtime.ros.limited_requests import TooLarge, limited
-from composer.runtime.ros.manager_protocol import CHANGE_STATE, full_parameter_name
 
 #: Returns the nodes of the system by their full names.
 Nodes = Callable[[], Mapping[str, ManagedNode]]

@@ -6,8 +6,8 @@ See :mod:`composer.runtime.process.query_socket`, on whose thread the methods ar
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -16,22 +16,22 @@ from rcl_interfaces.msg import ParameterValue
 from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.proxy_services import ProxyParameterStore
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.parameter_services import count_items, in_slices
-from composer.runtime.process.query_socket import (
-    ACTION,
-    ENDPOINTS,
-    GRAPH,
-    NODE,
-    NODES,
-    PARAMETERS,
-    STATUS,
-    TOPIC,
-    Answer,
+from composer.runtime.process.query_socket import Answer
+from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.requests import (
+    ActionQuery,
+    EndpointsQuery,
+    GraphQuery,
+    NodeQuery,
+    NodesQuery,
+    ParameterDescription,
+    ParametersAnswer,
+    ParametersQuery,
+    StatusQuery,
+    TopicQuery,
+    full_parameter_name,
 )
-from composer.runtime.ros.diagnostic_arrays import Status
-from composer.runtime.ros.manager_protocol import full_parameter_name
-from composer.runtime.ros.parameter_description import ParameterDescription
 from composer.runtime.ros.parameter_values import description, plain_value
 
 #: Commands wait a little longer. A node that hangs does not answer.
@@ -42,57 +42,52 @@ _MAX_ITEMS = 20_000
 
 
 class ManagerQueries:
-    """Answers queries with plain data, or with None if the answer is not certain."""
+    """Answers queries, or returns None if the answer is not certain."""
 
     def __init__(
         self,
         loop: Loop,
         graph: GraphObserver,
         parameters: ProxyParameterStore,
-        status: Callable[[], Iterable[Status]],
-        figures: Callable[[], tuple[Iterable[CallbackFigures], Iterable[ChainFigures]]],
+        report: Callable[[], SystemReport],
+        timings: Callable[[], TimingReport],
     ) -> None:
-        """``figures()`` returns the timings of callbacks and chains."""
         self._loop = loop
         self._graph = graph
         self._parameters = parameters
-        self._status = status
-        self._figures = figures
+        self._report = report
+        self._timings = timings
 
-    def answers(self) -> Mapping[str, Answer]:
-        """Return the queries by name."""
+    def answers(self) -> Mapping[type[Any], Answer]:
+        """Return the answers by the types of queries."""
         return {
-            GRAPH: lambda _: self._graph.view(),
-            NODES: lambda _: self._graph.nodes(),
-            NODE: lambda name: self._graph.node(str(name)),
-            TOPIC: lambda name: self._graph.topic(str(name)),
-            ACTION: lambda name: self._graph.action(str(name)),
-            ENDPOINTS: lambda _: self._graph.endpoints(),
-            STATUS: lambda callbacks: self._system_status(callbacks=bool(callbacks)),
-            PARAMETERS: self._node_parameters,
+            GraphQuery: lambda _: self._graph.view(),
+            NodesQuery: lambda _: self._graph.nodes(),
+            NodeQuery: lambda query: self._graph.node(query.name),
+            TopicQuery: lambda query: self._graph.topic(query.name),
+            ActionQuery: lambda query: self._graph.action(query.name),
+            EndpointsQuery: lambda _: self._graph.endpoints(),
+            StatusQuery: self._status,
+            ParametersQuery: self._node_parameters,
         }
 
-    def _system_status(self, *, callbacks: bool) -> dict[str, list[Any]]:
-        """Return the name, the message and the values of the system and of each node.
+    def _status(self, query: StatusQuery) -> SystemReport:
+        report = self._report()
+        if not query.callbacks:
+            return report
+        timed = self._timings()
+        return replace(
+            report, callbacks=timed.callbacks, chains=timed.chains, callbacks_at_s=timed.at_s
+        )
 
-        With ``callbacks``, add the timings of callbacks and chains.
-        """
-        statuses = [[item.name, item.message, item.values] for item in self._status()]
-        timed, chains = self._figures() if callbacks else ((), ())
-        return {
-            "status": statuses,
-            "callbacks": list(map(asdict, timed)),
-            "chains": list(map(asdict, chains)),
-        }
-
-    def _node_parameters(self, requested: Any) -> dict[str, list[Any]] | None:
+    def _node_parameters(self, query: ParametersQuery) -> ParametersAnswer | None:
         """Return descriptions and values of the parameters of the system's nodes and manager.
 
-        ``requested`` are full names of nodes, None for all. Other nodes are left out, and so are
-        those of other processes, which have parameter services of their own.
+        Other nodes are left out, and so are those of other processes, which have parameter services
+        of their own.
         """
         names = [
-            name for name in self._parameters.nodes() if requested is None or name in requested
+            name for name in self._parameters.nodes() if query.nodes is None or name in query.nodes
         ]
         done = threading.Event()
         future = self._loop.run_task(self._collect(names))
@@ -102,19 +97,20 @@ class ManagerQueries:
             return None
         return future.result()
 
-    async def _collect(self, nodes: list[str]) -> dict[str, list[Any]] | None:
+    async def _collect(self, nodes: list[str]) -> ParametersAnswer | None:
         """Return the parameters of the nodes, None if they are too many or too large."""
         left = _MAX_ITEMS
-        found: dict[str, list[Any]] = {}
+        found: dict[str, tuple[tuple[ParameterDescription, Any], ...]] = {}
         for node in nodes:
-            found[node] = []
+            of_node = []
             names = await self._parameters.names_of(node)
             async for described, value in in_slices(names, partial(self._parameter, node)):
                 left -= 1 + count_items(value)
                 if left < 0:
                     return None
-                found[node].append([asdict(described), plain_value(value)])
-        return found
+                of_node.append((described, plain_value(value)))
+            found[node] = tuple(of_node)
+        return ParametersAnswer(found)
 
     async def _parameter(self, node: str, name: str) -> tuple[ParameterDescription, ParameterValue]:
         store = self._parameters

@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-from composer.base.fast_dataclass import dataclass
-from composer.runtime.members.report import REPORTS_WITHIN_S
+from composer.runtime.members.figures import REPORTS_WITHIN_S
+from composer.runtime.protocol.requests import Step
 
 T = TypeVar("T")
 
@@ -21,43 +21,32 @@ T = TypeVar("T")
 _OUTDATED_S = REPORTS_WITHIN_S + 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class StepId:
-    """What identifies a step: its sender, and its number there."""
-
-    sender: str
-    number: int
-
-
 class ReceivedSteps(Generic[T]):
-    """The last step of each node, with what runs it."""
+    """The last step of each node, with its sender and what runs it."""
 
     def __init__(self) -> None:
-        self._last: dict[str, tuple[StepId | None, T]] = {}
-        #: The last step that was received, as it is reported.
-        self.last_text = ""
+        self._last: dict[str, tuple[str, int, T]] = {}
+        #: The sender and the number of the last step that was received, as they are reported.
+        self.last = ("", 0)
 
-    def find(self, node: str, step: StepId | None) -> T | None:
+    def find(self, sender: str, step: Step) -> T | None:
         """Return what runs a step that was received before; None if it is a new one."""
-        last = self._last.get(node)
-        return last[1] if last is not None and step is not None and last[0] == step else None
+        last = self._last.get(step.node)
+        return last[2] if last is not None and last[:2] == (sender, step.number) else None
 
-    def is_replaced(self, node: str, step: StepId | None) -> bool:
+    def is_replaced(self, sender: str, step: Step) -> bool:
         """Return whether a later step of the node was received before, from the same sender."""
-        last = None if node not in self._last else self._last[node][0]
-        if step is None or last is None or step.sender != last.sender:
-            return False
-        return step.number < last.number
+        last_sender, last_number, _ = self._last.get(step.node, ("", 0, None))
+        return sender == last_sender and step.number < last_number
 
-    def add(self, node: str, step: StepId | None, running: T) -> None:
+    def add(self, sender: str, step: Step, running: T) -> None:
         """Keep what runs a new step."""
-        self._last[node] = step, running
-        if step is not None:
-            self.last_text = f"{step.sender} {step.number}"
+        self._last[step.node] = sender, step.number, running
+        self.last = sender, step.number
 
     def of(self, nodes: Iterable[str]) -> list[T]:
         """Return what runs, or ran, the last steps of some nodes."""
-        return [self._last[node][1] for node in nodes if node in self._last]
+        return [self._last[node][2] for node in nodes if node in self._last]
 
 
 class ReportTimes:

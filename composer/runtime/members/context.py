@@ -1,10 +1,11 @@
-"""What a process of the system needs from the one that coordinates it, and the nodes in it."""
+"""What a process of the system needs from the one that coordinates it, and one of its lives."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import field
 from typing import Protocol
 
 from rclpy.node import Node as RosNode
@@ -12,12 +13,12 @@ from rclpy.node import Node as RosNode
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Process
 from composer.model.hosts import own_enclave
-from composer.runtime.children.child_processes import ChildProcesses, Command
+from composer.runtime.children.child_processes import Child, ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.kept_goals import KeptGoals
-from composer.runtime.members.report import MemberState
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
+from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 
 class ProcessUnavailable(Exception):
@@ -35,7 +36,7 @@ class Member(Protocol):
     def state(self) -> str:
         """Its lifecycle state, as far as this process knows."""
 
-    def on_report(self, reported: MemberState) -> None:
+    def on_report(self, reported: NodeReport) -> None:
         """Receive its state, with each report."""
 
     def on_process_end(self, reason: str) -> None:
@@ -76,3 +77,31 @@ class MemberContext:
         usual |= own_enclave(os.environ, self.full_name(process))
         environment = {name.value: value for name, value in process.environment}
         return Command(words, {**usual, **environment, REPORT_KEY_VARIABLE: report_key})
+
+
+@dataclass(slots=True)
+class MemberLife:
+    """One life of the process, as a child or started elsewhere, and its last report.
+
+    Its reports are signed with ``report_key``. ``lost`` is why its nodes have failed, although
+    it may still run. ``holds_lock`` is whether it holds the instance lock on this computer.
+    ``answered`` are the numbers of the last reports before the responses to requests, by node.
+    """
+
+    report_key: str
+    child: Child | None = None
+    last: SystemReport | None = None
+    reported_s: float = 0.0
+    lost: str = ""
+    holds_lock: bool = False
+    answered: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def states(self) -> Mapping[str, NodeReport]:
+        """The nodes in the last report."""
+        return {} if self.last is None else {node.node: node for node in self.last.nodes}
+
+    @property
+    def is_up(self) -> bool:
+        """Whether it reports."""
+        return self.last is not None and not self.lost

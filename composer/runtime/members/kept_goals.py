@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from composer.model import PrimaryState, System
-from composer.plan import STOPPED, SystemGoals, parse_goals, system_goals
+from composer.plan import STOPPED, SystemGoals, system_goals
 
 
 class KeptGoals:
@@ -26,20 +26,19 @@ class KeptGoals:
         reported = self._reported
         return None if reported is None or reported.activity == STOPPED else reported
 
-    def change(self, goals: Mapping[str, PrimaryState], activity: str) -> str | None:
-        """Set goals by the keys of nodes; return the text for all processes if it is a new one."""
+    def change(self, goals: Mapping[str, PrimaryState], activity: str) -> SystemGoals | None:
+        """Set goals by the keys of nodes; return them for all processes if they are new ones."""
         if self._last == (goals, activity):
             return None
         self._last = goals, activity
         return self._replace(system_goals(self._system, goals, activity, serial=0))
 
-    def stop(self) -> str | None:
+    def stop(self) -> SystemGoals | None:
         """Let the next coordinating process start the system as if it were the first one."""
         return None if self._current is None else self._replace(SystemGoals(0, STOPPED))
 
-    def on_report(self, text: str) -> str | None:
+    def on_report(self, reported: SystemGoals | None) -> SystemGoals | None:
         """Receive what a process keeps; return what it is to keep instead."""
-        reported = parse_goals(text)
         with self._lock:
             current = self._current
             if current is None:
@@ -50,13 +49,13 @@ class KeptGoals:
                 return None
             if _serial(reported) >= current.serial:  # found too late to be used
                 self._current = current = replace(current, serial=_serial(reported) + 1)
-            return str(current)
+            return current
 
-    def _replace(self, goals: SystemGoals) -> str:
+    def _replace(self, goals: SystemGoals) -> SystemGoals:
         with self._lock:
             serial = max(_serial(self._reported), _serial(self._current)) + 1
             self._current = replace(goals, serial=serial)
-            return str(self._current)
+            return self._current
 
 
 def _serial(goals: SystemGoals | None) -> int:

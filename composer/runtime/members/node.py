@@ -9,14 +9,11 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
-
 from composer.model import Node
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import within
 from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
-from composer.runtime.members.report import MemberState
 from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES, TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
@@ -27,7 +24,8 @@ from composer.runtime.outside_nodes.outside_node import (
     TransitionRefused,
 )
 from composer.runtime.outside_nodes.remote_node import DONE_IN, GOALS
-from composer.runtime.ros.manager_protocol import CREATE
+from composer.runtime.protocol.reports import NodeReport
+from composer.runtime.protocol.requests import CREATE, StepResult
 
 #: A report follows a successful response soon; each second there is one in any case.
 _REPORTED_WITHIN_S = 2.0
@@ -65,7 +63,7 @@ class MemberNode(OutsideNode):
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """What its process reports of it, by the names of the fields of ``NodeStatus``."""
+        """What its process reports of it, by the names of the fields of ``NodeReport``."""
         return self._process.figures(self.full_name).current
 
     @property
@@ -121,7 +119,7 @@ class MemberNode(OutsideNode):
         finally:
             result.cancel()
         response = result.result()
-        return "" if response.successful else str(response.reason)
+        return "" if response.success else response.reason
 
     async def _work(self, transition: str) -> None:
         try:
@@ -186,7 +184,7 @@ class MemberNode(OutsideNode):
         self._reported, self._is_moving = goal, False
         self._given_up.clear()  # requests arrive in order
 
-    async def _finish(self, result: Future[SetParametersResult], reported: Future[None]) -> None:
+    async def _finish(self, result: Future[StepResult], reported: Future[None]) -> None:
         """Wait for the end of a transition: a report, or a response, perhaps that of many nodes."""
         either: Future[None] = Future()
         for future in (result, reported):
@@ -195,7 +193,7 @@ class MemberNode(OutsideNode):
         if reported.done():
             return
         response = result.result()
-        if not response.successful:
+        if not response.success:
             raise TransitionRefused(response.reason, self._reported or UNCONFIGURED)
         if self._awaited == (FINALIZED, reported):
             await self._wait_for_counters(reported)
@@ -241,7 +239,7 @@ class MemberNode(OutsideNode):
         if self._state == FINALIZED:
             self._process.end_if_done()
 
-    def on_report(self, reported: MemberState) -> None:
+    def on_report(self, reported: NodeReport) -> None:
         """Follow the state of the node, by a report that includes all responses."""
         state, before = reported.state, self._reported
         is_primary = state in PRIMARY_STATES

@@ -15,9 +15,9 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.members.context import MemberContext
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.computer import is_this_computer
+from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
 _POLL_S = 0.01
 
@@ -127,7 +127,7 @@ class OtherProcesses:
     def on_stop(self) -> None:
         """Ask for timings; let the next coordinating process start the system as the first one."""
         for process in self._all:
-            self._loop.call_soon(process.ask_for_figures)
+            self._loop.call_soon(process.ask_for_timings)
         self._send(self._goals.stop())
 
     def wait_for_messages(self, end_s: float) -> None:
@@ -142,13 +142,13 @@ class OtherProcesses:
 
     def callbacks(self) -> tuple[CallbackFigures, ...]:
         """Return the timings of callbacks that the processes have sent."""
-        return tuple(item for process in self._all for item in process.callbacks)
+        return tuple(item for process in self._all for item in process.timings.callbacks)
 
     def chains(self) -> tuple[ChainFigures, ...]:
         """Return the latencies of chains that the processes have sent."""
-        return tuple(item for process in self._all for item in process.chains)
+        return tuple(item for process in self._all for item in process.timings.chains)
 
-    def _send(self, goals: str | None) -> None:
+    def _send(self, goals: SystemGoals | None) -> None:
         if goals is not None:
             for process in self._all:
                 self._loop.call_soon(partial(process.keep_goals, goals))

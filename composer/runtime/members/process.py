@@ -7,8 +7,8 @@ The process with the instance lock runs the nodes, whatever has started it. One 
 here is used as it is, and from then on only awaited: what has started it may start it again.
 
 Nothing that arrives on a topic decides: only reports count that are signed with the key of the
-process, see :mod:`.report`. What the process is, is learnt from its instance lock, its end as a
-child, or the answer of its service.
+process, see :mod:`composer.runtime.protocol.reports`. What the process is, is learnt from its
+instance lock, its end as a child, or the answer of its service.
 """
 
 from __future__ import annotations
@@ -16,34 +16,40 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from time import monotonic
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
+from std_msgs.msg import String
 
 from composer.model import LogLevel, Process
 from composer.model.names import PROGRAM_LOGGER
+from composer.plan import SystemGoals
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.output import attribute_line, process_loggers
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
-from composer.runtime.members.context import Member, MemberContext, ProcessUnavailable
-from composer.runtime.members.life import MemberLife
-from composer.runtime.members.report import (
-    REPORTS_WITHIN_S,
-    MemberReport,
-    NodeFigures,
-    is_signed,
-    parse_report,
+from composer.runtime.members.context import (
+    Member,
+    MemberContext,
+    MemberLife,
+    ProcessUnavailable,
 )
+from composer.runtime.members.figures import REPORTS_WITHIN_S, NodeFigures
 from composer.runtime.members.requests import MemberRequests
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, from_text
 from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held, report_key
-from composer.runtime.ros.manager_protocol import CHANGE_STATES, NAME, STATE_QOS, STATE_TOPIC
+from composer.runtime.protocol.codec import ProtocolError, decode
+from composer.runtime.protocol.reports import (
+    SystemReport,
+    TimingReport,
+    is_signed,
+    split_signature,
+)
+from composer.runtime.protocol.requests import NAME, REQUEST, STATE_TOPIC, StepResult
+from composer.runtime.ros.manager_interface import STATE_QOS
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
 STARTS_WITHIN_S = 30.0
@@ -70,25 +76,25 @@ class MemberProcess:
         self._life: MemberLife | None = None  # from the start, or the first report, to the end
         self._may_start = bool(context.command)
         self._answered_key = ""  # of a process whose service was asked for it
-        self._unsigned = b""  # the report for which it was asked
+        self._unsigned = ""  # the report for which it was asked
+        self._problem = ""  # why its reports cannot be read
         self._starting: Future[None] | None = None
         self._is_ending = False
         self._belongs_to_another = False
         manager = f"{self._name}/{NAME}"
-        service = f"{manager}/{CHANGE_STATES}"
+        service = f"{manager}/{REQUEST}"
         self.requests = MemberRequests(
             context.manager,
             context.loop,
             service,
-            on_figures=self._on_figures,
+            on_timings=self._on_timings,
             on_report_key=self._on_report_key,
             on_problem=self._warn,
         )
         #: The timings of its callbacks and chains, once it was asked for them.
-        self.callbacks: tuple[CallbackFigures, ...] = ()
-        self.chains: tuple[ChainFigures, ...] = ()
+        self.timings = TimingReport()
         self._reports = context.manager.create_subscription(
-            DiagnosticArray, f"{manager}/{STATE_TOPIC}", lambda _: None, STATE_QOS, raw=True
+            String, f"{manager}/{STATE_TOPIC}", lambda _: None, STATE_QOS
         )
         context.loop.add_subscription(self._reports, self._on_message)
         self._checked_s = monotonic()
@@ -135,15 +141,15 @@ class MemberProcess:
         """Leave its nodes as they are, unless it was started here. Thread-safe."""
         self._belongs_to_another = True
 
-    def keep_goals(self, goals: str) -> None:
+    def keep_goals(self, goals: SystemGoals) -> None:
         """Let the process keep the goals of the system."""
         if self._life is not None and self._life.is_up and not self.is_left:
             self.requests.keep(goals)
 
-    def ask_for_figures(self) -> None:
+    def ask_for_timings(self) -> None:
         """Ask for the timings of callbacks and chains."""
         if self._life is not None and self._life.is_up:
-            self.requests.ask_for_figures()
+            self.requests.ask_for_timings()
 
     def figures(self, node: str) -> NodeFigures:
         """Return the rates and counters of a node."""
@@ -181,9 +187,7 @@ class MemberProcess:
             starting, self._starting = self._starting, None
             starting.set_result(None)
 
-    def request(
-        self, node: str, transition: str, after: Sequence[str] = ()
-    ) -> Future[SetParametersResult]:
+    def request(self, node: str, transition: str, after: Sequence[str] = ()) -> Future[StepResult]:
         """Request a transition of a node, after those of others; return the future of its result.
 
         Raises ProcessUnavailable if the process does not run; so does the future if it ends.
@@ -256,6 +260,7 @@ class MemberProcess:
         """Return that the process has not reported in time, and as much of the reason as known."""
         is_found = self._context.manager.count_publishers(self._reports.topic_name)
         reason = "its reports do not arrive" if is_found else "it is not in the ROS graph"
+        reason = self._problem or reason
         if self._life is None and is_held(self._name):
             reason += ", and another process holds its instance lock"
         return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
@@ -294,19 +299,22 @@ class MemberProcess:
 
     # --- reports
 
-    def _on_message(self, taken: tuple[bytes, Any]) -> None:
-        report, life = self._read(taken[0])
+    def _on_message(self, taken: tuple[String, Any]) -> None:
+        self._on_report(taken[0].data)
+
+    def _on_report(self, text: str) -> None:
+        report, life = self._read(text)
         if report is None or life is None or report.is_starting:
             return
         has_returned = bool(life.lost) or (life.last is None and life.child is None)
         before = life.states
-        if any(before.get(name, now).state != now.state for name, now in report.nodes.items()):
+        if any(before.get(now.node, now).state != now.state for now in report.nodes):
             self.moved_s = monotonic()
         life.last, life.reported_s = report, monotonic()
-        for name, figures in self._figures.items():
-            if name in report.nodes:
-                taken_figures = report.nodes[name].figures
-                figures.take(taken_figures, is_started_here=life.child is not None)
+        for node in report.nodes:
+            if node.node in self._figures:
+                is_child = life.child is not None
+                self._figures[node.node].take(node, report.host, is_started_here=is_child)
         if report.is_stopping:
             if not self._is_ending:
                 self._lose(life, "is shutting down")
@@ -314,37 +322,35 @@ class MemberProcess:
         life.lost = ""
         goals = self._context.goals.on_report(report.goals)
         self.requests.on_report(report, goals)
-        for name, reported in report.nodes.items():
-            member = self._members.get(name)
-            if member is not None and report.number > life.answered.get(name, -1):
-                member.on_report(reported)
+        for node in report.nodes:
+            member = self._members.get(node.node)
+            if member is not None and report.number > life.answered.get(node.node, -1):
+                member.on_report(node)
                 if has_returned:
                     member.on_process_return()
 
-    def _on_response(self, life: MemberLife, node: str, done: Future[SetParametersResult]) -> None:
+    def _on_response(self, life: MemberLife, node: str, done: Future[StepResult]) -> None:
         """Ignore the reports of a node from before the end of its transition."""
         if done.cancelled():
             return
         self.moved_s = monotonic()
-        if done.exception() is None and done.result().successful:
-            with suppress(ValueError):  # of another version
-                life.answered[node] = int(done.result().reason)
+        if done.exception() is None and done.result().success:
+            life.answered[node] = done.result().report
 
-    def _on_figures(self, text: str) -> None:
-        with suppress(ValueError):  # of another version
-            callbacks, self.chains = from_text(text)
-            self.callbacks = tuple(item for item in callbacks if item.node in self._members)
+    def _on_timings(self, timings: TimingReport) -> None:
+        called = (item for item in timings.callbacks if item.node in self._members)
+        self.timings = replace(timings, callbacks=tuple(called))
 
     def _on_report_key(self, key: str) -> None:
         """Read the report again for which the service of its process was asked for the key."""
         self._answered_key = key
-        self._on_message((self._unsigned, None))
+        self._on_report(self._unsigned)
 
-    def _read(self, content: bytes) -> tuple[MemberReport | None, MemberLife | None]:
+    def _read(self, content: str) -> tuple[SystemReport | None, MemberLife | None]:
         """Return the report in a message and the life that it belongs to, if it counts."""
         life = self._life
         if life is not None and is_signed(content, life.report_key):
-            report = parse_report(content)
+            report = self._parsed(content)
             is_new = report and (life.last is None or report.number > life.last.number)
             return report, life if is_new else None
         if life is not None and life.child is not None:
@@ -352,14 +358,24 @@ class MemberProcess:
         key_here = report_key(self._name)
         key = self._answered_key if key_here is None else key_here
         if is_signed(content, key):
-            report = parse_report(content)
+            report = self._parsed(content)
             return report, self._next_life(report, key) if report else None
         if key_here is None:
             self._unsigned = content
             self.requests.ask_for_report_key()
         return None, None
 
-    def _next_life(self, report: MemberReport, key: str) -> MemberLife | None:
+    def _parsed(self, content: str) -> SystemReport | None:
+        """Return the signed report in a message; warn once of a process of another version."""
+        try:
+            return decode(split_signature(content)[1], SystemReport)
+        except ProtocolError as error:
+            if str(error) != self._problem:
+                self._problem = str(error)
+                self._warn(f"reports what cannot be read: {error}")
+            return None
+
+    def _next_life(self, report: SystemReport, key: str) -> MemberLife | None:
         """Return the life of a process that was started elsewhere; None if it is not to be used."""
         life = self._life
         if report.is_child or report.is_stopping or (life is None and self._is_ending):
@@ -370,7 +386,7 @@ class MemberProcess:
             self._lose(life, "has ended")
         return self._use(report, key)
 
-    def _use(self, report: MemberReport, key: str) -> MemberLife:
+    def _use(self, report: SystemReport, key: str) -> MemberLife:
         """Use a process that was started elsewhere, and start none from now on."""
         for figures in self._figures.values():
             figures.end_life()

@@ -10,13 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
+from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Future
-
-if TYPE_CHECKING:  # this module and its tests need no ROS
-    from rcl_interfaces.msg import SetParametersResult
+from composer.runtime.protocol.requests import Step, StepResult
 
 #: A process reports each second, and each report says what it has received.
 AGAIN_AFTER_S = 3.0
@@ -25,24 +23,23 @@ _REPORTS_UNTIL_LOST = 2
 
 @dataclass(frozen=True, slots=True)
 class RequestedStep:
-    """A step, with the number that it keeps if it is requested again."""
+    """A step, and the future of its result."""
 
-    number: int
-    text: str
-    result: Future[SetParametersResult] = field(default_factory=Future)
+    step: Step
+    result: Future[StepResult] = field(default_factory=Future)
 
 
 @dataclass(frozen=True, slots=True)
 class MemberRequest:
-    """A request on its way: steps, or goals of the system and whether it asks for figures.
+    """A request on its way: steps, or goals of the system and whether it asks for timings.
 
     Steps are requested again ``again_after_s`` later, twice as long after each time. ``seen`` is
     the number of the last report that had been received when it was sent.
     """
 
     steps: Sequence[RequestedStep] = ()
-    goals: str = ""
-    figures: bool = False
+    goals: SystemGoals | None = None
+    timings: bool = False
     again_after_s: float = AGAIN_AFTER_S
     seen: int = 0
 
@@ -62,5 +59,7 @@ class MemberRequest:
         ``received`` is the number of the last step that the process has received according to its
         report ``seen``; the first report after the request may be older than its arrival.
         """
-        is_unknown = any(step.number > received for step in self.steps if not step.result.done())
+        is_unknown = any(
+            item.step.number > received for item in self.steps if not item.result.done()
+        )
         return is_unknown and seen >= self.seen + _REPORTS_UNTIL_LOST

@@ -12,34 +12,32 @@ Steps without a result are requested again: see :mod:`.requested_steps`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import count
 from time import monotonic
 from typing import Any
 from uuid import uuid4
 
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
-from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node as RosNode
 
+from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.members.report import MemberReport
 from composer.runtime.members.requested_steps import AGAIN_AFTER_S, MemberRequest, RequestedStep
-from composer.runtime.ros.manager_protocol import (
-    FIGURES,
-    GOALS,
-    LAST_STEPS,
-    NUMBERS,
-    PARTICIPANT,
-    REPORT_KEY,
-    SEEN_REPORT,
-    SENDER,
-    STEPS,
+from composer.runtime.protocol.codec import ProtocolError
+from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.requests import (
+    AskReportKey,
+    ChangeStates,
+    KeepGoals,
+    Step,
+    StepResult,
 )
+from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
 from composer.runtime.ros_graph.graph import participant, servers_of
 
-_MAX_STEPS = 500  # per request; a service takes up to 1000
+_MAX_STEPS = 500  # per request; a service takes a million characters
 _MAX_REQUESTS = 8
 _POLL_S = 0.01
 #: A request without steps is answered at once, unless it or its response is lost: rmw drops a
@@ -52,17 +50,10 @@ _DISCOVERED_WITHIN_S = 3.0
 _READY_WITHIN_S = 3.0
 #: A response may be lost, and a killed process is known for 20 s more, with its service.
 _KEY_AGAIN_S = 0.25
-_TYPES = {
-    "bool_value": ParameterType.PARAMETER_BOOL,
-    "integer_value": ParameterType.PARAMETER_INTEGER,
-    "string_value": ParameterType.PARAMETER_STRING,
-    "integer_array_value": ParameterType.PARAMETER_INTEGER_ARRAY,
-    "string_array_value": ParameterType.PARAMETER_STRING_ARRAY,
-}
 
 
 class MemberRequests:
-    """The client of the service ``change_states`` of a process. Use it on ``loop``."""
+    """The client of the service ``request`` of a process. Use it on ``loop``."""
 
     def __init__(  # noqa: PLR0913 - three of them are callbacks
         self,
@@ -70,11 +61,11 @@ class MemberRequests:
         loop: Loop,
         service: str,
         *,
-        on_figures: Callable[[str], None],
+        on_timings: Callable[[TimingReport], None],
         on_report_key: Callable[[str], None],
         on_problem: Callable[[str], None],
     ) -> None:
-        """``on_figures(text)`` receives the timings that were requested.
+        """``on_timings(report)`` receives the timings that were requested.
 
         ``on_report_key(key)`` receives the key that was asked for.
         ``on_problem(text)`` receives why the process does not get requests, once for each process.
@@ -82,7 +73,7 @@ class MemberRequests:
         self._ros = ros
         self._loop = loop
         self._service = service
-        self._client = ros.create_client(SetParameters, service)
+        self._client = ros.create_client(RequestService, service)
         self._sender = uuid4().hex
         self._numbers = count(1)  # of steps
         self._participant = ""  # that of the process, once it has reported
@@ -93,35 +84,33 @@ class MemberRequests:
         self._is_discovered = True  # the service of this participant
         self._awaited_until_s = 0.0
         self._is_polling = False
-        self._on_figures = on_figures
+        self._on_timings = on_timings
         self._on_report_key = on_report_key
         self._key_request: Any = None  # the last one
         self._key_asked_s = -_KEY_AGAIN_S
         self._on_problem = on_problem
         self._holds = 0
         self._unsent: list[RequestedStep] = []
-        self._unsent_goals = ""
-        self._wants_figures = False
+        self._unsent_goals: SystemGoals | None = None
+        self._wants_timings = False
         self._sent: dict[Any, MemberRequest] = {}
         #: Whether the process ends after the next requests.
         self.are_last = False
         loop.add_client(self._client)
 
-    def request(
-        self, node: str, transition: str, after: Sequence[str] = ()
-    ) -> Future[SetParametersResult]:
+    def request(self, node: str, transition: str, after: Sequence[str] = ()) -> Future[StepResult]:
         """Request a transition; return the future of its result, which may be canceled.
 
         It begins after the transitions of the nodes ``after`` that were requested before.
         """
-        step = RequestedStep(next(self._numbers), " ".join((transition, node, *after)))
+        step = RequestedStep(Step(next(self._numbers), transition, node, tuple(after)))
         step.result.add_done_callback(self._on_result)
         self._unsent.append(step)
         if len(self._unsent) == 1:  # otherwise, sending is due already
             self._loop.call_soon(self._send)
         return step.result
 
-    def on_report(self, report: MemberReport, goals: str | None) -> None:
+    def on_report(self, report: SystemReport, goals: SystemGoals | None) -> None:
         """Receive a report of the process, and the goals that it has to keep, if any."""
         if self._participant != report.participant:
             self._participant = report.participant
@@ -133,7 +122,7 @@ class MemberRequests:
         if self._unsent:  # an exception may have ended the wait for the service
             self._send()
 
-    def keep(self, goals: str) -> None:
+    def keep(self, goals: SystemGoals) -> None:
         """Request that the process keeps the goals of the system.
 
         It may be lost: reports say which goals the process keeps.
@@ -143,9 +132,9 @@ class MemberRequests:
             self._unsent_goals = goals
             self._loop.call_soon(self._send)
 
-    def ask_for_figures(self) -> None:
+    def ask_for_timings(self) -> None:
         """Request the timings of the callbacks and chains of the process."""
-        self._wants_figures = True
+        self._wants_timings = True
         self._loop.call_soon(self._send)
 
     def ask_for_report_key(self) -> None:
@@ -156,15 +145,15 @@ class MemberRequests:
         self._key_asked_s = now_s
         if self._key_request is not None:
             self._client.remove_pending_request(self._key_request)
-        request = SetParameters.Request(parameters=[_parameter(REPORT_KEY, bool_value=True)])
+        request = request_message(AskReportKey())
         self._key_request = pending = self._client.call_async(request)
         pending.add_done_callback(self._on_key)
 
     @property
     def has_messages(self) -> bool:
         """Whether goals of the system, or a request for timings, are on their way. Thread-safe."""
-        is_unsent = bool(self._unsent_goals) or self._wants_figures
-        return is_unsent or any(sent.goals or sent.figures for sent in tuple(self._sent.values()))
+        is_unsent = self._unsent_goals is not None or self._wants_timings
+        return is_unsent or any(sent.goals or sent.timings for sent in tuple(self._sent.values()))
 
     def hold(self) -> None:
         """Collect requests until :meth:`release`. Thread-safe."""
@@ -181,7 +170,7 @@ class MemberRequests:
             self._client.remove_pending_request(pending)
         self._unsent.clear()
         self._sent.clear()
-        self._unsent_goals, self._wants_figures = "", False
+        self._unsent_goals, self._wants_timings = None, False
         for step in open_:
             step.result.set_exception(error)
 
@@ -196,7 +185,7 @@ class MemberRequests:
 
     def _send(self) -> None:
         while (
-            (self._unsent or self._unsent_goals or self._wants_figures)
+            (self._unsent or self._unsent_goals or self._wants_timings)
             and not self._holds
             and len(self._sent) < _MAX_REQUESTS
         ):
@@ -207,7 +196,7 @@ class MemberRequests:
             self._send_request(self._next())
 
     def _send_request(self, request: MemberRequest) -> None:
-        pending = self._client.call_async(self._message(request))
+        pending = self._client.call_async(request_message(self._document(request)))
         self._sent[pending] = request
         pending.add_done_callback(self._on_response)
         if request.steps:
@@ -224,7 +213,7 @@ class MemberRequests:
         self._client.remove_pending_request(pending)
         again = request.again(self._seen)
         if request.is_lost(self._received, self._seen):
-            self._report_problem(f"has not received '{again.steps[0].text}'; it is requested again")
+            self._report_problem(f"has not received '{again.steps[0].step}'; it is requested again")
         self._send_request(again)
 
     def _wait_for_service(self) -> None:
@@ -257,9 +246,9 @@ class MemberRequests:
 
     def _next(self) -> MemberRequest:
         """Return the next request: a message, which is answered at once, or steps."""
-        if self._unsent_goals or self._wants_figures:
-            message = MemberRequest(goals=self._unsent_goals, figures=self._wants_figures)
-            self._unsent_goals, self._wants_figures = "", False
+        if self._unsent_goals or self._wants_timings:
+            message = MemberRequest(goals=self._unsent_goals, timings=self._wants_timings)
+            self._unsent_goals, self._wants_timings = None, False
             return message
         steps, self._unsent = self._unsent[:_MAX_STEPS], self._unsent[_MAX_STEPS:]
         return MemberRequest(steps, again_after_s=AGAIN_AFTER_S, seen=self._seen)
@@ -270,7 +259,7 @@ class MemberRequests:
             self._client.remove_pending_request(pending)
             self._send()
 
-    def _on_result(self, result: Future[SetParametersResult]) -> None:
+    def _on_result(self, result: Future[StepResult]) -> None:
         if result.cancelled():
             self._loop.call_soon(self._forget_canceled)
 
@@ -281,44 +270,34 @@ class MemberRequests:
             if sent.steps and not sent.is_awaited:
                 self._forget(pending)
 
-    def _message(self, request: MemberRequest) -> SetParameters.Request:
-        name = LAST_STEPS if self.are_last else STEPS
-        parameters = [_parameter(name, string_array_value=[step.text for step in request.steps])]
-        for key, text in ((PARTICIPANT, self._participant), (GOALS, request.goals)):
-            if text:
-                parameters.append(_parameter(key, string_value=text))
-        if request.steps:
-            numbers = [step.number for step in request.steps]
-            parameters += [
-                _parameter(SENDER, string_value=self._sender),
-                _parameter(NUMBERS, integer_array_value=numbers),
-                _parameter(SEEN_REPORT, integer_value=self._seen),
-            ]
-        if request.figures:
-            parameters.append(_parameter(FIGURES, bool_value=True))
-        return SetParameters.Request(parameters=parameters)
+    def _document(self, request: MemberRequest) -> ChangeStates | KeepGoals:
+        if not request.steps:
+            return KeepGoals(self._participant, request.goals, request.timings)
+        steps = tuple(step.step for step in request.steps)
+        return ChangeStates(self._participant, self._sender, self._seen, steps, self.are_last)
 
     def _on_key(self, pending: Any) -> None:
         if pending is self._key_request:
             self._key_request = None
-            for result in pending.result().results[-1:]:
-                self._on_report_key(result.reason)
+            with suppress(ProtocolError):
+                self._on_report_key(read_answer(pending.result(), AskReportKey()).key)
 
     def _on_response(self, pending: Any) -> None:
         sent = self._sent.pop(pending, None)
         if sent is None:
             return
-        results = pending.result().results
+        results: Sequence[StepResult] = ()
+        refusal = "refused"
+        try:
+            answer = read_answer(pending.result(), self._document(sent))
+            if isinstance(answer, TimingReport):
+                self._on_timings(answer)
+            else:
+                results = answer.results
+        except ProtocolError as error:
+            refusal = f"refused: {error}"
         for step, result in zip(sent.steps, results, strict=False):
             step.result.set_result(result)
         for step in sent.steps:  # without a result, the request was refused as a whole
-            step.result.set_result(SetParametersResult(successful=False, reason="refused"))
-        if sent.figures and results:
-            self._on_figures(results[-1].reason)
+            step.result.set_result(StepResult(success=False, reason=refusal))
         self._send()
-
-
-def _parameter(name: str, **value: Any) -> Parameter:
-    """Return a parameter; ``value`` is the one field of its value."""
-    (kind,) = value
-    return Parameter(name=name, value=ParameterValue(type=_TYPES[kind], **value))

@@ -132,7 +132,7 @@ class OutsideNode(ABC):
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """What is known of it, by the names of the fields of ``NodeStatus``."""
+        """What is known of it, by the names of the fields of ``NodeReport``."""
         return {}
 
     def now_s(self) -> float:

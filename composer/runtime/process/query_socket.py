@@ -2,9 +2,10 @@
 
 A command that joins the ROS graph itself imports rclpy and waits for discovery, which takes about a
 second. The manager of a running system discovered the graph long ago, and knows the states and
-parameters of its nodes. It listens on a Unix socket next to the instance lock. A command sends the
-name of a query and an argument as one line of JSON, and receives the answer as one JSON document,
-with null if the manager is not certain. See docs/decisions/0015-query-socket.md.
+parameters of its nodes. It listens on a Unix socket next to the instance lock. A command sends a
+query of :mod:`composer.runtime.protocol.requests` as one line, and receives a line with what the
+system sees of the network, and the answer, which is empty if the manager is not certain. See
+docs/decisions/0015-query-socket.md.
 """
 
 from __future__ import annotations
@@ -14,26 +15,14 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from composer.model.names import is_hidden
 from composer.runtime.process.instance_lock import socket_path
+from composer.runtime.protocol.codec import ProtocolError, decode, encode
 
-#: A name and its types. Nodes have none; more than one type is a mistake in some node.
-NameAndTypes = tuple[str, tuple[str, ...]]
-#: The sorted names of all nodes, topics, services and actions, including hidden ones.
-GraphView: TypeAlias = Mapping[str, tuple[NameAndTypes, ...]]
-
-KINDS = ("node", "topic", "service", "action")
-#: The queries: the view of the graph, its nodes, the endpoints of one node, of all nodes, of a
-#: topic and of an action, the status of the system, and the parameters of its nodes. See
-#: :mod:`composer.runtime.manager.queries`.
-GRAPH, NODES, NODE, ENDPOINTS = "graph", "nodes", "node", "endpoints"
-TOPIC, ACTION = "topic", "action"
-STATUS, PARAMETERS = "status", "parameters"
 #: Processes that differ in one of these variables may see different graphs.
 _VARIABLES = (
     "RMW_IMPLEMENTATION",
@@ -48,13 +37,8 @@ _READ_BYTES = 65_536
 _MAX_QUERY_BYTES = 65_536
 #: A command that comes in addition joins the graph itself.
 _MAX_CONNECTIONS = 64
-#: Answers a query: returns plain data for JSON, or None if it is not certain.
+#: Answers a query of its type, or returns None if it is not certain.
 Answer: TypeAlias = Callable[[Any], Any]
-
-
-def visible(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
-    """Return the names that ROS tools do not hide."""
-    return tuple(item for item in names if not is_hidden(item[0]))
 
 
 class QuerySocket:
@@ -63,10 +47,10 @@ class QuerySocket:
     def __init__(
         self,
         system: str,
-        answers: Mapping[str, Answer],
+        answers: Mapping[type[Any], Answer],
         on_error: Callable[[Exception], None],
     ) -> None:
-        """``system`` is the namespace of the manager; ``answers`` are the queries by name.
+        """``system`` is the namespace of the manager; ``answers`` are those to queries, by type.
 
         If there cannot be a socket, as with a very long name, commands join the graph themselves.
         """
@@ -122,22 +106,23 @@ class QuerySocket:
 
     def _respond(self, connection: socket.socket) -> None:
         try:
-            name, argument = json.loads(_read_line(connection))
-            answer = self._answers[name]
-        except (ValueError, TypeError, KeyError, RecursionError):  # of another version
+            query = decode(_read_line(connection), *self._answers)
+        except ProtocolError:  # of another version, whose command joins the graph itself
             return
         with self._answering:
             if _has_given_up(connection):
                 return  # an answer may take half a second, for which the next commands would wait
-            document = {"environment": _environment(), "answer": answer(argument)}
+            answer = self._answers[type(query)](query)
+        document = "" if answer is None else encode(answer)
         connection.settimeout(_TRANSFER_WITHIN_S)
-        connection.sendall(json.dumps(document).encode())  # the limit is for all of it
+        connection.sendall(f"{_environment()}\n{document}".encode())  # the limit is for all of it
 
 
-def ask(system: str, query: str, argument: Any, timeout_s: float) -> Any:
-    """Return the answer of a system on this computer, as plain data.
+def ask(system: str, query: Any, timeout_s: float) -> Any:
+    """Return the answer of a system on this computer, which has the type ``query.Answer``.
 
-    None if it does not respond in time, is not certain, or may see another graph than this process.
+    None if it does not respond in time, is not certain, is of another version, or may see another
+    graph than this process.
     """
     path = socket_path(system)
     if path is None or timeout_s <= 0.0:
@@ -146,21 +131,12 @@ def ask(system: str, query: str, argument: Any, timeout_s: float) -> Any:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
             connection.settimeout(timeout_s)
             connection.connect(str(path))
-            connection.sendall(json.dumps([query, argument]).encode() + b"\n")
-            document = json.loads(b"".join(iter(lambda: connection.recv(_READ_BYTES), b"")))
-        return document["answer"] if document["environment"] == _environment() else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
-def read_graph(system: str, timeout_s: float) -> GraphView | None:
-    """Return the graph as a system on this computer sees it; None as for :func:`ask`."""
-    graph = ask(system, GRAPH, None, timeout_s)
-    try:
-        return graph and {
-            kind: tuple((name, tuple(types)) for name, types in graph[kind]) for kind in KINDS
-        }
-    except (ValueError, KeyError, TypeError):
+            connection.sendall(encode(query).encode() + b"\n")
+            received = b"".join(iter(lambda: connection.recv(_READ_BYTES), b""))
+        environment, _, document = received.partition(b"\n")
+        is_usable = document and environment == _environment().encode()
+        return decode(document, query.Answer) if is_usable else None
+    except (OSError, ProtocolError):
         return None
 
 
@@ -198,5 +174,5 @@ def _listen(path: Path) -> socket.socket | None:
     return listener
 
 
-def _environment() -> list[str]:
-    return [os.environ.get(name, "") for name in _VARIABLES]
+def _environment() -> str:
+    return json.dumps([os.environ.get(name, "") for name in _VARIABLES])

@@ -7,7 +7,7 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
 from rclpy.parameter import parameter_value_to_python
 
-from composer.runtime.ros.parameter_description import ParameterDescription
+from composer.runtime.protocol.requests import ParameterDescription
 
 NOT_SET = "not set"
 _TYPES = {

@@ -24,7 +24,7 @@ from rclpy.validate_node_name import validate_node_name
 
 from composer.model.names import join_node_name
 from composer.runtime.middleware.dds_participants import ended_participants
-from composer.runtime.process.query_socket import NameAndTypes
+from composer.runtime.protocol.requests import NameAndTypes
 from composer.runtime.ros_graph.endpoints import (
     PARTICIPANT_BYTES,
     UNKNOWN_NODE,

@@ -5,25 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
-from composer.base.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.model.names import is_hidden, join_node_name, split_node_name
 from composer.plan.drift import ObservedEndpoint
-from composer.runtime.process.query_socket import NameAndTypes, visible
+from composer.runtime.protocol.requests import (
+    ActionInfo,
+    NameAndTypes,
+    NodeInfo,
+    visible_names,
+)
 from composer.runtime.ros_graph.graph import RosGraph
-
-
-@dataclass(frozen=True, slots=True)
-class NodeInfo:
-    """The endpoints of a node, by name."""
-
-    name: str
-    subscriptions: tuple[NameAndTypes, ...]
-    publishers: tuple[NameAndTypes, ...]
-    services: tuple[NameAndTypes, ...]
-    clients: tuple[NameAndTypes, ...]
-    action_servers: tuple[NameAndTypes, ...]
-    action_clients: tuple[NameAndTypes, ...]
 
 
 def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
@@ -41,17 +32,7 @@ def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
 
 
 def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:
-    return tuple(sorted(found if hidden else visible(found)))
-
-
-@dataclass(frozen=True, slots=True)
-class ActionInfo:
-    """The nodes with a server or client of an action."""
-
-    name: str
-    types: tuple[str, ...]
-    servers: tuple[str, ...]
-    clients: tuple[str, ...]
+    return tuple(sorted(found if hidden else visible_names(found)))
 
 
 def action_info(graph: RosGraph, name: str, types: tuple[str, ...]) -> ActionInfo:

@@ -63,7 +63,7 @@ class Commands:
             problem = self._restart(command.nodes, self.supervisor.desired.serial)
         else:
             problem = self._run_for_system(command.name, together=command.all_or_nothing)
-        summary = self.status.snapshot().summary
+        summary = self.status.snapshot().message
         return problem is None, summary if problem is None else f"{problem}; {summary}"
 
     def _run_for_system(self, name: str, *, together: bool) -> str | None:

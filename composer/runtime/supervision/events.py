@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures
+from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
 
 @dataclass(frozen=True, slots=True)

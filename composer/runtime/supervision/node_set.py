@@ -16,7 +16,7 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.placement import place_threads
 from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.members.node import MemberNode
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, chain_figures, figures
+from composer.runtime.metrics.figures import chain_figures, figures
 from composer.runtime.node.managed_node import (
     FINALIZED,
     ManagedNode,
@@ -26,6 +26,7 @@ from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameters import ParameterError
 from composer.runtime.outside_nodes.external_node import ExternalNode
 from composer.runtime.outside_nodes.outside_node import OutsideNode
+from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.node_factory import NodeFactory
@@ -142,7 +143,7 @@ class NodeSet:
         )
 
     def reported_figures(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return what is known of the nodes outside the process, by fields of ``NodeStatus``."""
+        """Return what is known of the nodes outside the process, by fields of ``NodeReport``."""
         nodes = tuple(self.nodes.items())
         return {name: node.figures for name, node in nodes if isinstance(node, OutsideNode)}
 

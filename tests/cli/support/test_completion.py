@@ -24,9 +24,10 @@ from composer.cli.support.completion import (
     silent,
 )
 from composer.cli.support.system_arguments import complete_system
-from composer.client.systems import local_graph
+from composer.client.systems import local_queries
 from composer.runtime.process.instance_lock import hold_instance_lock
-from composer.runtime.process.query_socket import GRAPH, GraphView, QuerySocket
+from composer.runtime.process.query_socket import QuerySocket
+from composer.runtime.protocol.requests import GraphAnswer, GraphQuery, GraphView
 
 
 def complete(*words: str) -> list[str]:
@@ -67,7 +68,9 @@ def robot(
         "action": (("/navigate", ()), ("/navigate_back", ())),
     }
     with hold_instance_lock("/fleet/robot"):
-        server = QuerySocket("/fleet/robot", {GRAPH: lambda _: view}, lambda _: None)
+        server = QuerySocket(
+            "/fleet/robot", {GraphQuery: lambda _: GraphAnswer(view)}, lambda _: None
+        )
         yield
         server.close(10.0)
 
@@ -107,7 +110,7 @@ def test_names(
     complete_names: Complete, typed: str, offered: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(completion, "_WITHIN_S", 60.0)
-    monkeypatch.setattr(local_graph, "RESPONSE_S", 60.0)
+    monkeypatch.setattr(local_queries, "RESPONSE_S", 60.0)
     assert complete_names(typed) == offered
 
 

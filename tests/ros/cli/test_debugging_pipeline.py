@@ -16,16 +16,16 @@ from std_msgs.msg import String
 
 from composer.client.graph_names import GraphNames
 from composer.client.session import Deadline, Session
-from composer.client.systems.local_graph import local_names
 from composer.client.systems.local_queries import (
     local_action,
+    local_names,
     local_node,
     local_parameters,
     local_report,
     local_reports,
     local_topic,
 )
-from composer.runtime.process.query_socket import KINDS
+from composer.runtime.protocol.requests import KINDS
 from tests.ros.support.commands import (
     PATIENCE_S,
     compose,

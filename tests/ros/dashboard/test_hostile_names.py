@@ -7,13 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import Log, ParameterDescriptor
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from composer.runtime.ros.manager_protocol import CALLBACKS_QOS, STATE_QOS
-from tests.ros.cli.test_hostile_graph import STATE
+from composer.runtime.protocol.codec import encode
+from composer.runtime.protocol.reports import (
+    CallbackFigures,
+    ChainFigures,
+    NodeReport,
+    SystemReport,
+    TimingReport,
+)
+from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS
 from tests.ros.support.commands import Running, hand_written
 from tests.ros.support.dashboard import Address, dashboard
 from tests.ros.support.in_process import Peer
@@ -63,30 +69,24 @@ def _publish(peer: Peer) -> None:
     descriptor = ParameterDescriptor(description=EVIL, additional_constraints=EVIL)
     node.declare_parameter(EVIL, EVIL, descriptor)
     node.create_service(Trigger, f"{FORGED}/is_active", lambda _, response: response)
-    forged = {**STATE, "held_down": EVIL, "condition": EVIL, "last_error": EVIL, "slowest": EVIL}
-    forged |= {"state": EVIL, "process": EVIL, "host": EVIL, "pid": EVIL, "depends_on": "/a=<b>x"}
-    system = {"activity": EVIL, "host": EVIL, "pid": EVIL, "ready": "true"}
-    report = DiagnosticArray(
-        status=[
-            _status("/forged", system, message=EVIL),
-            _status(f"/forged: /{EVIL}", forged),
-            _status("/forged: /forged/node", forged),
-        ]
+    texts = dict.fromkeys(("held_down", "condition", "last_error", "slowest", "process"), EVIL)
+    nodes = (
+        NodeReport(name, EVIL, state=EVIL, host=EVIL, pid=EVIL, depends_on={"/a": "<b>x"}, **texts)  # type: ignore[arg-type]
+        for name in (f"/{EVIL}", "/forged/node")
+    )
+    report = SystemReport("/forged", EVIL, tuple(nodes), EVIL, EVIL)
+    timings = TimingReport(
+        (CallbackFigures("/forged/node", EVIL, EVIL),), (ChainFigures(EVIL, 1.0),)
     )
     logged = Log(level=40, name=EVIL, msg=EVIL, file=EVIL, function=EVIL)
     for kind, topic, qos, message in (
-        (DiagnosticArray, f"{FORGED}/state", STATE_QOS, report),
-        (DiagnosticArray, f"{FORGED}/callbacks", CALLBACKS_QOS, report),
+        (String, f"{FORGED}/state", STATE_QOS, String(data=encode(report))),
+        (String, f"{FORGED}/callbacks", CALLBACKS_QOS, String(data=encode(timings))),
         (Log, "/rosout", 10, logged),
         (String, "/text", 10, String(data=EVIL)),
     ):
         publisher = node.create_publisher(kind, topic, qos)
         node.create_timer(0.3, lambda to=publisher, message=message: to.publish(message))
-
-
-def _status(name: str, values: dict[str, str], message: str = "") -> DiagnosticStatus:
-    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    return DiagnosticStatus(name=name, message=message, values=pairs)
 
 
 @pytest.fixture(scope="module")

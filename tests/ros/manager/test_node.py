@@ -8,17 +8,21 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
 from composer.plan import bring_up, tear_down
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
-from composer.runtime.manager.status_messages import status_message
+from composer.runtime.manager.diagnostics import diagnostic_array
 from composer.runtime.process import StartRefused
-from composer.runtime.ros.manager_protocol import STATE_QOS
+from composer.runtime.protocol.codec import decode
+from composer.runtime.protocol.reports import CallbackFigures, NodeReport, SystemReport
+from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.supervision.events import RolledBack, RollingBack, StateChanged
-from composer.runtime.supervision.status import NodeStatus, SystemStatus
+from composer.runtime.supervision.status import Status
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
 
@@ -68,6 +72,11 @@ def are_a_second_apart(messages: list[DiagnosticArray]) -> bool:
 def latest(messages: list[Any]) -> dict[str, dict[str, str]]:
     """Return the values of the last message, by the names of its statuses."""
     return {status.name: values(status) for status in messages[-1].status}
+
+
+def reported(messages: list[String]) -> dict[str, NodeReport]:
+    """Return the nodes in the last report, by name."""
+    return {node.node: node for node in decode(messages[-1].data, SystemReport).nodes}
 
 
 def test_commands_pause_resume_reset_and_start_a_system(tmp_path: Path, peer: Peer) -> None:
@@ -178,7 +187,7 @@ def test_states_are_published_latched_on_change_and_every_second(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(ROBOT, tmp_path, planner=PLANNER):
-        states = peer.listen(DiagnosticArray, "/fleet/robot/manager/state", STATE_QOS)
+        states = peer.listen(String, "/fleet/robot/manager/state", STATE_QOS)
         wait_until(lambda: states, "the latched state")
         diagnostics = peer.listen(DiagnosticArray, "/diagnostics")
         wait_until(lambda: len(diagnostics) >= 5, "messages at once, then every second")
@@ -194,19 +203,17 @@ def test_states_are_published_latched_on_change_and_every_second(
 
         assert peer.set_parameter("/fleet/planner", "fault", "deactivate") == ""
         assert not peer.change("/fleet/planner", "deactivate")
-        wait_until(
-            lambda: latest(states)["robot: /fleet/motor"]["state"] == "inactive", "the new state"
-        )
+        wait_until(lambda: reported(states)["/fleet/motor"].state == "inactive", "the new state")
         # It is reported as held down after its dependents were deactivated.
+        wait_until(lambda: reported(states)["/fleet/planner"].held_down, "the node to be held down")
+        planner = reported(states)["/fleet/planner"]
+        assert planner.state == "unconfigured"
+        assert planner.held_down == "deactivate ended in an error: ValueError: no map"
+        assert planner.last_error == "deactivate ended in an error: ValueError: no map"
         wait_until(
-            lambda: latest(states)["robot: /fleet/planner"]["held_down"], "the node to be held down"
+            lambda: diagnostics[-1].status[0].level == DiagnosticStatus.ERROR, "the diagnostics"
         )
-        status = latest(states)["robot: /fleet/planner"]
-        assert status["state"] == "unconfigured"
-        assert status["held_down"] == "deactivate ended in an error: ValueError: no map"
-        assert status["last_error"] == "deactivate ended in an error: ValueError: no map"
-        assert states[-1].status[0].level == DiagnosticStatus.ERROR
-        assert "/fleet/planner is isolated" in states[-1].status[0].message
+        assert "/fleet/planner is isolated" in diagnostics[-1].status[0].message
 
 
 DIAMOND = """
@@ -275,12 +282,27 @@ def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) ->
     assert again.end().exit_code == 0
 
 
-def test_the_length_of_reported_texts_is_limited() -> None:
-    node = NodeStatus("/planner", "active", last_error=10_000 * "x", held_down=10_000 * "y")
-    status = SystemStatus("robot", "running", (node,), "host", 1, 0.0)
-    for part in status_message(status, 0.0, (), 0):
-        assert len(part.message) < 600
-        assert all(len(value) < 600 for value in part.values.values())
+def test_the_length_of_reported_texts_is_limited(tmp_path: Path) -> None:
+    status = Status(system_of(ROBOT, tmp_path))
+    status.set_error("planner", 10_000 * "x")
+    status.set_desired({}, {"planner": 10_000 * "y"}, {})
+    report = status.snapshot()
+    assert all(len(node.last_error + node.held_down) < 1100 for node in report.nodes)
+    assert len(report.message) < 700
+
+
+def test_diagnostics_can_be_sent_whatever_user_code_reports() -> None:
+    node = NodeReport("/arm", "active", last_error="\ud800 é", sent={"/a": 3}, sent_hz=0.5)
+    callback = CallbackFigures("/arm", "timer", "tick", overruns=2)
+    report = SystemReport("robot", "running", (node,), "vm", "1", at_s=1.5)
+    content = serialize_message(diagnostic_array(report, 2.0, (), (callback,)))
+    message = deserialize_message(content, DiagnosticArray)
+    assert seconds(message) == 1.5
+    system, arm, tick = message.status
+    assert values(system)["ready"] == "false"
+    assert values(arm)["last_error"] == "? é"
+    assert [values(arm)[key] for key in ("sent", "sent_hz", "busy")] == ["/a=3", "0.5", ""]
+    assert (tick.level, tick.message) == (DiagnosticStatus.WARN, "2 over budget, 0 dropped")
 
 
 def test_no_published_status_is_lost(tmp_path: Path) -> None:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import itertools
-import json
-from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager import other_instances
-from composer.runtime.manager.other_instances import Instance, parse_instance
-from composer.runtime.ros.manager_protocol import STATE_QOS
+from composer.runtime.manager.other_instances import is_older, parse_instance
+from composer.runtime.protocol.codec import decode, encode
+from composer.runtime.protocol.reports import SystemReport
+from composer.runtime.protocol.requests import Instance
+from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.supervision.events import Stopping
 from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
 
@@ -38,30 +40,22 @@ def offer_manager(peer: Peer, message: str) -> list[Any]:
 
 
 def instance(uptime_s: float) -> str:
-    return json.dumps({"host": "elsewhere", "pid": 4321, "uptime_s": uptime_s})
-
-
-def changed(message: DiagnosticArray, **values: str) -> DiagnosticArray:
-    forged = deepcopy(message)
-    kept = [item for item in forged.status[0].values if item.key not in values]
-    forged.status[0].values = kept + [KeyValue(key=key, value=values[key]) for key in values]
-    return forged
+    return encode(Instance("elsewhere", "4321", uptime_s))
 
 
 def test_no_message_ends_a_system(tmp_path: Path, peer: Peer) -> None:
     with running(ROBOT, tmp_path) as system:
-        received = peer.listen(DiagnosticArray, STATE, STATE_QOS)
+        received = peer.listen(String, STATE, STATE_QOS)
         wait_until(lambda: received, "a message to replay")
-        publisher = peer.publisher(DiagnosticArray, STATE, STATE_QOS)
-        replayed = changed(received[0], host="elsewhere", pid="4321", uptime="1000000.0")
-
-        forged = itertools.cycle((replayed, changed(replayed, uptime="2e6"), DiagnosticArray()))
+        publisher = peer.publisher(String, STATE, STATE_QOS)
+        report = decode(received[0].data, SystemReport)
+        replayed = encode(replace(report, host="elsewhere", pid="4321", started_s=1.0))
+        forged = itertools.cycle((replayed, replayed.replace("running", "stopped"), ""))
 
         def flood() -> bool:
             """Publish once more; return whether the manager has published twice meanwhile."""
-            publisher.publish(next(forged))
-            own = [item for item in received if item.status and item.header != replayed.header]
-            return len(own) > 1
+            publisher.publish(String(data=next(forged)))
+            return sum("content" in item.data and "4321" not in item.data for item in received) > 2
 
         wait_until(flood, "messages of the manager")
         assert not system.reported(Stopping)
@@ -80,7 +74,7 @@ def test_a_system_is_refused_while_it_starts(tmp_path: Path, peer: Peer) -> None
 
 @pytest.mark.parametrize(
     "response",
-    [instance(uptime_s=0.0), '{"host": "a\\u001b[2J", "pid": 1, "uptime_s": 9e9}', "[" * 100_000],
+    [instance(uptime_s=0.0), encode(Instance("a\x1b[2J", "1", 9e9)), "[" * 100_000],
     ids=["younger", "odd host", "deep"],
 )
 def test_a_younger_or_unreadable_instance_is_ignored(
@@ -102,7 +96,7 @@ def test_a_system_that_has_started_warns_once(
         requests = offer_manager(peer, instance(uptime_s=3600.0))
         line = system.wait_for_log("host elsewhere, process 4321")
         assert "stop one of them" in line
-        received = peer.listen(DiagnosticArray, STATE, STATE_QOS)
+        received = peer.listen(String, STATE, STATE_QOS)
         wait_until(lambda: len(received) >= 3, "the next checks, once a second")
         assert system.log().count(line) == 1
         assert sum(request is not None for request in requests) == 1
@@ -110,14 +104,12 @@ def test_a_system_that_has_started_warns_once(
 
 
 def test_the_older_instance_is_decided_by_uptime_then_by_name() -> None:
-    first, second = Instance("a", 1, 60.0), Instance("a", 2, 30.0)
-    assert first.is_older_than(second)
-    assert not second.is_older_than(first)
-    together = Instance("a", 2, 60.05)
-    assert first.is_older_than(together)
-    assert not together.is_older_than(first)
-    assert parse_instance(first.text) == first
-    for text in ("", "[]", "{}", '{"host": 1, "pid": 1, "uptime_s": 1}', "null"):
+    first, second = Instance("a", "1", 60.0), Instance("a", "2", 30.0)
+    assert is_older(first, second)
+    assert not is_older(second, first)
+    together = Instance("a", "2", 60.05)
+    assert is_older(first, together)
+    assert not is_older(together, first)
+    assert parse_instance(encode(first)) == first
+    for text in ("", "[]", encode(Instance("a b", "1", 1.0))):
         assert parse_instance(text) is None
-    assert parse_instance('{"host": "a", "pid": 1, "uptime_s": NaN}') is None
-    assert parse_instance('{"host": "a", "pid": 1e999, "uptime_s": 1}') is None

@@ -7,15 +7,17 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import TransitionEvent
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from composer.plan import SystemGoals
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.other_instances import Instance
 from composer.runtime.process.instance_lock import hold_instance_lock, local_systems
-from composer.runtime.ros.manager_protocol import STATE_QOS
+from composer.runtime.protocol.codec import decode
+from composer.runtime.protocol.reports import SystemReport, split_signature
+from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
 from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, split, states
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system_of, wait_until
@@ -88,7 +90,7 @@ def stop_until_the_pause(
     member: subprocess.Popen[bytes], system: RunningSystem, peer: Peer
 ) -> None:
     """Stop the process of the detector; let it return before the pause is complete."""
-    reports = peer.listen(DiagnosticArray, "/lab/robot/acting/manager/state", STATE_QOS)
+    reports = peer.listen(String, "/lab/robot/acting/manager/state", STATE_QOS)
     wait_until(lambda: reports, "a report")
     changes = len(system.states("/lab/arm"))
     system.behavior("arm").is_held = True
@@ -114,8 +116,11 @@ def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:
         coordinator.wait_for("3 of 3 nodes active")
         moves = peer.listen(TransitionEvent, "/lab/detector/transition_event")
         assert peer.change("/lab/arm", "deactivate")
-        reports = peer.listen(DiagnosticArray, f"{running_managers(peer)[0]}/state", STATE_QOS)
-        wait_until(lambda: reports and "arm=inactive" in kept_goals(reports), "the goals")
+        reports = peer.listen(String, f"{running_managers(peer)[0]}/state", STATE_QOS)
+        wait_until(
+            lambda: reports and (goals := kept_goals(reports)) and "/lab/arm" in goals.others,
+            "the goals",
+        )
         coordinator.stop(signal.SIGKILL)
     found = peer.listen(String, "/lab/found")
     wait_until(lambda: len(found) > 10, "messages without the coordinator")
@@ -198,9 +203,9 @@ def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
         system.stop()
 
 
-def kept_goals(reports: list[DiagnosticArray]) -> str:
+def kept_goals(reports: list[String]) -> SystemGoals | None:
     """Return the goals of the system that a process keeps, according to its last report."""
-    return next((item.value for item in reports[-1].status[0].values if item.key == "goals"), "")
+    return decode(split_signature(reports[-1].data)[1], SystemReport).goals
 
 
 def running_managers(peer: Peer) -> list[str]:

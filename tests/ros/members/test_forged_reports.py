@@ -6,13 +6,16 @@ import os
 import signal
 import subprocess
 from collections.abc import Callable
-from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import String
 
-from composer.runtime.ros.manager_protocol import STATE_QOS
+from composer.runtime.protocol.codec import ProtocolError, decode, encode
+from composer.runtime.protocol.reports import SystemReport, split_signature
+from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed, Restarted
 from tests.ros.members.split_robot import TEXT, command_of, split
 from tests.ros.support.in_process import Peer, wait_until
@@ -22,75 +25,75 @@ TOPIC = "/lab/robot/sensing/manager/state"
 SMALL = TEXT.partition("  detector:")[0].replace("  acting: {}\n", "")
 
 
-def changed(report: DiagnosticArray, **values: str) -> DiagnosticArray:
-    """Return a report with other values of the process and its nodes."""
-    forged = deepcopy(report)
-    for status in forged.status:
-        for item in status.values:
-            item.value = values.get(item.key, item.value)
-    return forged
+def changed(text: str, state: dict[str, Any] | None = None, **values: Any) -> str:
+    """Return a report with its signature and other values of the process and its nodes."""
+    signature, document = split_signature(text)
+    report = decode(document, SystemReport)
+    nodes = tuple(replace(node, **(state or {})) for node in report.nodes)
+    return signature + encode(replace(report, **{"nodes": nodes, **values}))
 
 
-def of_another_run(report: DiagnosticArray) -> DiagnosticArray:
-    identity = {"pid": "99", "host": "robot7", "started": "1700000000.5", "participant": "00" * 12}
-    return changed(report, is_child="false", number="5", **identity)
+def of_another_run(text: str) -> str:
+    identity = {"pid": "99", "host": "robot7", "started_s": 1.7e9, "participant": "00" * 12}
+    return changed(text, is_child=False, number=5, **identity)
 
 
-def with_many_nodes(report: DiagnosticArray) -> DiagnosticArray:
-    forged = changed(report)
-    values = forged.status[1].values
-    forged.status += [DiagnosticStatus(name=f"x: /n{i}", values=values) for i in range(200)]
-    return forged
+def with_many_nodes(text: str) -> str:
+    (node,) = decode(split_signature(text)[1], SystemReport).nodes
+    return changed(text, nodes=tuple(replace(node, node=f"/n{i}") for i in range(200)))
 
 
-FORGERIES: tuple[Callable[[DiagnosticArray], DiagnosticArray], ...] = (
+FORGERIES: tuple[Callable[[str], str], ...] = (
     of_another_run,
     with_many_nodes,
-    lambda report: changed(report, activity="stopping", number="999999"),
-    lambda report: changed(report, state="inactive", number="999999"),
-    lambda report: changed(report, held_down="\x1b[31mforged\n", number="999999"),
-    lambda report: changed(of_another_run(report), started="9e9", number="999999"),
-    deepcopy,  # as it was, later
+    lambda text: changed(text, activity="stopping", number=999999),
+    lambda text: changed(text, {"state": "inactive"}, number=999999),
+    lambda text: changed(text, {"held_down": "\x1b[31mforged\n"}, number=999999),
+    lambda text: changed(of_another_run(text), started_s=9e9, number=999999),
+    lambda text: split_signature(text)[1],
+    lambda text: text,  # as it was, later
 )
 
 
 def test_forged_and_replayed_reports_decide_nothing(tmp_path: Path, peer: Peer) -> None:
-    publisher = peer.node.create_publisher(DiagnosticArray, TOPIC, STATE_QOS)
-    values = {"activity": "running", "host": "robot7", "pid": "99", "started": "1", "number": "5"}
-    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    publisher.publish(DiagnosticArray(status=[DiagnosticStatus(name="robot", values=pairs)]))
+    publisher = peer.node.create_publisher(String, TOPIC, STATE_QOS)
+    forged = SystemReport("robot", "running", (), "robot7", "99", started_s=1.0, number=5)
+    publisher.publish(String(data=encode(forged)))
     with split(tmp_path, SMALL) as system:  # the latched one comes before the process starts
         camera = system.node("camera")
         pid = camera.pid
         assert pid is not None
-        reports = peer.listen(DiagnosticArray, TOPIC, STATE_QOS)
+        reports = peer.listen(String, TOPIC, STATE_QOS)
         wait_until(lambda: any(is_of(report, pid) for report in reports), "a report")
-        report = next(report for report in reports if is_of(report, pid))
+        report = next(report.data for report in reports if is_of(report, pid))
         for forge in FORGERIES:
-            publisher.publish(forge(report))
+            publisher.publish(String(data=forge(report)))
         reports.clear()
         wait_until(lambda: sum(is_of(later, pid) for later in reports) > 1, "reports after them")
         assert (camera.state, camera.pid) == ("active", pid)
         assert system.states("/lab/camera")[-1] == "/lab/camera active"
         assert not system.reported(NodeFailed)
 
-        publisher.publish(of_another_run(report))
+        publisher.publish(String(data=of_another_run(report)))
         os.kill(pid, signal.SIGKILL)
-        publisher.publish(of_another_run(report))
+        publisher.publish(String(data=of_another_run(report)))
         wait_until(lambda: system.reported(Restarted), "the restart")
         assert camera.pid not in (pid, None)
 
 
-def is_of(report: DiagnosticArray, pid: int) -> bool:
-    return any(item.key == "pid" and item.value == str(pid) for item in report.status[0].values)
+def is_of(message: String, pid: int) -> bool:
+    try:
+        return decode(split_signature(message.data)[1], SystemReport).pid == str(pid)
+    except ProtocolError:
+        return False
 
 
 def test_a_process_of_another_computer_is_known_by_its_service(
     tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The coordinating process cannot read its instance lock, and asks it for its key."""
-    publisher = peer.node.create_publisher(DiagnosticArray, TOPIC, STATE_QOS)
-    publisher.publish(DiagnosticArray(status=[DiagnosticStatus(name="robot")]))
+    publisher = peer.node.create_publisher(String, TOPIC, STATE_QOS)
+    publisher.publish(String(data="robot"))
     path = tmp_path / "robot.yaml"
     path.write_text(SMALL, encoding="utf-8")
     other = tmp_path / "other"

@@ -5,16 +5,21 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import TransitionEvent
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from composer.runtime.ros.manager_protocol import STATE_QOS
+from composer.runtime.protocol.codec import decode
+from composer.runtime.protocol.reports import SystemReport, split_signature
+from composer.runtime.protocol.requests import ChangeStates, Step, StepResult
+from composer.runtime.ros.manager_interface import (
+    STATE_QOS,
+    RequestService,
+    read_answer,
+    request_message,
+)
 from composer.runtime.supervision.events import NodeFailed
 from tests.ros.members.split_robot import command_of, split
 from tests.ros.support.in_process import Peer, finished, wait_until
@@ -44,7 +49,7 @@ class Busy(Behavior):
             Path(folder, "busy").touch()
             ctypes.PyDLL(None).usleep(1_500_000)
 """
-SERVICE = "/lab/robot/other/manager/change_states"
+SERVICE = "/lab/robot/other/manager/request"
 STATE = "/lab/robot/other/manager/state"
 
 
@@ -53,14 +58,15 @@ def test_a_request_that_a_full_queue_has_dropped_is_sent_again(tmp_path: Path, p
     with split(tmp_path, TEXT) as system:
         moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
         peer.wait_until_known("/lab/camera")
-        flood = peer.client(SetParameters, SERVICE)
+        flood = peer.client(RequestService, SERVICE)
+        of_another = request_message(ChangeStates("that of another process", "", 0, ()))
         requests = system.host._node_set.other_processes._processes["other"].requests
         assert peer.set_parameter("/lab/camera", "folder", str(tmp_path)) == ""
         wait_until(tmp_path.joinpath("busy").exists, "the process")
         pause = peer.begin(Trigger, "/lab/robot/manager/pause")
         wait_until(lambda: any(sent.steps for sent in requests._sent.values()), "the request")
         for _ in range(QUEUE + 2):
-            flood.call_async(request_of([], participant="that of another process"))
+            flood.call_async(of_another)
         assert finished(pause).success
         problem = "process 'other' has not received 'deactivate /lab/camera'; it is requested again"
         assert system.log().count(problem) == 1
@@ -69,75 +75,67 @@ def test_a_request_that_a_full_queue_has_dropped_is_sent_again(tmp_path: Path, p
 
 
 @pytest.fixture
-def member(tmp_path: Path, peer: Peer) -> Iterator[list[DiagnosticArray]]:
+def member(tmp_path: Path, peer: Peer) -> Iterator[list[String]]:
     """The reports of a process that runs on its own."""
     path = tmp_path / "robot.yaml"
     path.write_text(TEXT, encoding="utf-8")
     tmp_path.joinpath("busy.py").write_text(BUSY, encoding="utf-8")
     process = subprocess.Popen([*command_of(path), "--process", "other"], stderr=subprocess.DEVNULL)
     try:
-        reports = peer.listen(DiagnosticArray, STATE, STATE_QOS)
-        wait_until(lambda: reports and value(reports, "activity") == "running", "its nodes")
+        reports = peer.listen(String, STATE, STATE_QOS)
+        wait_until(lambda: reports and last(reports).activity == "running", "its nodes")
         yield reports
     finally:
         process.terminate()
         assert process.wait(60.0) == 0
 
 
-def test_a_step_that_arrives_twice_is_run_once(member: list[DiagnosticArray], peer: Peer) -> None:
+def test_a_step_that_arrives_twice_is_run_once(member: list[String], peer: Peer) -> None:
     moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
-    configure = numbered({1: "configure /lab/camera"})
-    calls = [peer.begin(SetParameters, SERVICE, configure) for _ in range(2)]
-    first, second = (finished(call).results for call in calls)
-    assert first[0].successful
+    seen = last(member).number
+    configure = Step(1, "configure", "/lab/camera")
+    request = ChangeStates("", "peer", seen, (configure,))
+    calls = [peer.begin(RequestService, SERVICE, request_message(request)) for _ in range(2)]
+    first, second = (read_answer(finished(call), request).results for call in calls)
+    assert first[0].success
     assert first == second
-    (unknown,) = peer.call(SetParameters, SERVICE, numbered({2: "configure /lab/arm"})).results
+    (unknown,) = results(peer, seen, Step(2, "configure", "/lab/arm"))
     assert unknown.reason == "the process has no such node"
-    both = numbered({3: "activate /lab/camera", 1: "configure /lab/camera"})
-    activated, outdated = peer.call(SetParameters, SERVICE, both).results
-    assert activated.successful
+    activated, outdated = results(peer, seen, Step(3, "activate", "/lab/camera"), configure)
+    assert activated.success
     assert outdated.reason == "a later request was received before"
     wait_until(lambda: len(moves) >= 4, "the transitions")
     assert labels(moves) == ["configuring", "inactive", "activating", "active"]
-    wait_until(lambda: value(member, "last_step") == "peer 3", "the report")
+    wait_until(lambda: last(member).received("peer") == 3, "the report")
 
 
-def test_a_step_that_arrives_too_late_is_not_run(member: list[DiagnosticArray], peer: Peer) -> None:
+def test_a_step_that_arrives_too_late_is_not_run(member: list[String], peer: Peer) -> None:
     """Its sender does not wait for it any more: it has seen no report for longer than that."""
     moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
-    seen = int(value(member, "number"))
+    seen = last(member).number
     for number, transition in enumerate(("configure", "activate"), 1):
-        steps = {number: f"{transition} /lab/camera"}
-        (result,) = peer.call(SetParameters, SERVICE, numbered(steps, seen)).results
-        assert result.successful, result.reason
-    wait_until(lambda: int(value(member, "number")) > seen + 10, "reports of ten seconds")
-    for steps in ({3: "shutdown /lab/camera"}, {4: "deactivate /lab/camera"}):
-        peer.client(SetParameters, SERVICE).call_async(numbered(steps, seen))
-    fresh = numbered({5: "cleanup /lab/camera"}, int(value(member, "number")))
-    (result,) = peer.call(SetParameters, SERVICE, fresh).results
+        (result,) = results(peer, seen, Step(number, transition, "/lab/camera"))
+        assert result.success, result.reason
+    wait_until(lambda: last(member).number > seen + 10, "reports of ten seconds")
+    for step in (Step(3, "shutdown", "/lab/camera"), Step(4, "deactivate", "/lab/camera")):
+        late = ChangeStates("", "peer", seen, (step,))
+        peer.client(RequestService, SERVICE).call_async(request_message(late))
+    (result,) = results(peer, last(member).number, Step(5, "cleanup", "/lab/camera"))
     assert "the node is active" in result.reason  # requests arrive in order
     assert labels(moves) == ["configuring", "inactive", "activating", "active"]
 
 
-def value(reports: list[DiagnosticArray], key: str) -> str:
-    return next(item.value for item in reports[-1].status[0].values if item.key == key)
+def last(reports: list[String]) -> SystemReport:
+    return decode(split_signature(reports[-1].data)[1], SystemReport)
+
+
+def results(peer: Peer, seen: int, *steps: Step) -> tuple[StepResult, ...]:
+    """Request steps, and return their results."""
+    request = ChangeStates("", "peer", seen, steps)
+    answer = read_answer(peer.call(RequestService, SERVICE, request_message(request)), request)
+    found: tuple[StepResult, ...] = answer.results
+    return found
 
 
 def labels(moves: list[TransitionEvent]) -> list[str]:
     return [move.goal_state.label for move in moves]
-
-
-def numbered(steps: dict[int, str], seen: int | None = None) -> SetParameters.Request:
-    return request_of(list(steps.values()), numbers=list(steps), sender="peer", seen_report=seen)
-
-
-def request_of(steps: list[str], **others: Any) -> SetParameters.Request:
-    kinds = {str: "string", int: "integer", list: "integer_array"}
-    kind = ParameterType.PARAMETER_STRING_ARRAY
-    array = ParameterValue(type=kind, string_array_value=steps)
-    parameters = [Parameter(name="steps", value=array)]
-    for name, content in others.items():
-        if content is not None:
-            filled = ParameterValue(**{f"{kinds[type(content)]}_value": content})
-            parameters.append(Parameter(name=name, value=filled))
-    return SetParameters.Request(parameters=parameters)

@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rcl_interfaces.msg import SetParametersResult
 
 from composer.model import ExecutorKind, LogLevel
 from composer.runtime.executors.futures import Future
 from composer.runtime.members import node as member_node
 from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.node import MemberNode
-from composer.runtime.members.report import MemberState
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import OutsideContext
+from composer.runtime.protocol.reports import NodeReport
+from composer.runtime.protocol.requests import StepResult
 from tests.ros.members.split_robot import DETECTOR, TEXT
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
@@ -44,9 +44,9 @@ class Process:
         self.killed = reason
         raise ProcessUnavailable(reason)
 
-    def request(self, *_: object) -> Future[SetParametersResult]:
-        done: Future[SetParametersResult] = Future()
-        done.set_result(SetParametersResult(successful=True, reason="1"))
+    def request(self, *_: object) -> Future[StepResult]:
+        done: Future[StepResult] = Future()
+        done.set_result(StepResult(success=True, report=1))
         return done
 
 
@@ -76,8 +76,12 @@ def failed_node(on: Bench, process: Any, folder: Path, listener: Any) -> MemberN
     return node
 
 
+def reported(state: str, held_down: str = "") -> NodeReport:
+    return NodeReport("/lab/camera", "active", state=state, held_down=held_down)
+
+
 def report(on: Bench, node: MemberNode, state: str) -> None:
-    on.loop.run(lambda: node.on_report(MemberState(state, "silent for 1 s")))
+    on.loop.run(lambda: node.on_report(reported(state, "silent for 1 s")))
 
 
 @contextmanager
@@ -121,8 +125,8 @@ class CutOff(Process):
 
     is_absent = False
 
-    def request(self, *_: object) -> Future[SetParametersResult]:
-        lost: Future[SetParametersResult] = Future()
+    def request(self, *_: object) -> Future[StepResult]:
+        lost: Future[StepResult] = Future()
         lost.set_exception(ProcessUnavailable("process 'sensing' has not reported for 5 s"))
         return lost
 
@@ -131,17 +135,17 @@ def test_a_request_that_arrives_after_a_cut_is_not_that_of_a_user(tmp_path: Path
     with bench(ExecutorKind.EVENTS) as on:
         listener = Listener()
         node = failed_node(on, CutOff(), tmp_path, listener)
-        on.loop.run(lambda: node.on_report(MemberState("active", "")))
+        on.loop.run(lambda: node.on_report(reported("active")))
         on.loop.run(node.take_over)
         pause = on.loop.run_task(node.run_step("deactivate", lambda: False))
         wait_until(pause.done, "the end of the request")
-        on.loop.run(lambda: node.on_report(MemberState("active", "")))
+        on.loop.run(lambda: node.on_report(reported("active")))
         on.loop.run(node.take_over)
         events = listener.events
         events.clear()
-        on.loop.run(lambda: node.on_report(MemberState("inactive", "")))
+        on.loop.run(lambda: node.on_report(reported("inactive")))
         assert events == ["return inactive", "returned"]  # and a plan activates it
         events.clear()
-        on.loop.run(lambda: node.on_report(MemberState("active", "")))
-        on.loop.run(lambda: node.on_report(MemberState("inactive", "")))
+        on.loop.run(lambda: node.on_report(reported("active")))
+        on.loop.run(lambda: node.on_report(reported("inactive")))
         assert events == ["activate active", "deactivate inactive"]  # now it is one

@@ -10,37 +10,41 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParameters
+from std_msgs.msg import String
 
 from composer.model import ExecutorKind
+from composer.plan import STOPPED, SystemGoals
 from composer.runtime.children.child_processes import Child, ChildProcesses
 from composer.runtime.executors.sources import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
-from composer.runtime.members.context import MemberContext, ProcessUnavailable
+from composer.runtime.members.context import MemberContext, MemberLife, ProcessUnavailable
 from composer.runtime.members.kept_goals import KeptGoals
-from composer.runtime.members.life import MemberLife
 from composer.runtime.members.process import MemberProcess
-from composer.runtime.members.report import MemberReport
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import hold_instance_lock
-from composer.runtime.ros.manager_protocol import (
-    CHANGE_STATES,
-    FIGURES,
-    GOALS,
-    NUMBERS,
-    SEEN_REPORT,
-    SENDER,
+from composer.runtime.protocol.codec import ProtocolError
+from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.requests import (
+    ChangeStates,
+    KeepGoals,
+    StepResult,
+    StepResults,
+)
+from composer.runtime.ros.manager_interface import (
     STATE_QOS,
+    RequestService,
+    answer_message,
+    read_request,
 )
 from composer.runtime.ros_graph.graph import participant, servers_of
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
 
-SERVICE = "/robot/acting/manager/change_states"
+SERVICE = "/robot/acting/manager/request"
+RUNNING = SystemGoals(1, "running")
+GOALS = SystemGoals(1, STOPPED)
 
 
 class Process:
@@ -51,49 +55,60 @@ class Process:
         self.steps: list[str] = []
         self.ids: list[tuple[str, int]] = []
         self.seen: list[int] = []
-        self.goals: list[str] = []
+        self.goals: list[SystemGoals | None] = []
         self.asked = 0
-        bench.serve(SetParameters, SERVICE, self._on_request)
+        bench.serve(RequestService, SERVICE, self._on_request)
 
-    def _on_request(self, request: SetParameters.Request, reply: Reply) -> None:
-        names = [parameter.name for parameter in request.parameters]
-        steps = request.parameters[0].value.string_array_value
-        values = {parameter.name: parameter.value for parameter in request.parameters}
-        self.steps += steps
-        if steps:
-            sender = values[SENDER].string_value
-            self.ids += [(sender, number) for number in values[NUMBERS].integer_array_value]
-            self.seen.append(values[SEEN_REPORT].integer_value)
-        self.asked += FIGURES in names
-        self.goals += [item.value.string_value for item in request.parameters if item.name == GOALS]
+    def _on_request(self, message: RequestService.Request, reply: Reply) -> None:
+        request = read_request(message, ChangeStates, KeepGoals)
+        if isinstance(request, KeepGoals):
+            self.asked += request.wants_timings
+            self.goals.append(request.goals)
+            answer: Any = TimingReport(at_s=1.0)
+        else:
+            self.steps += map(str, request.steps)
+            self.ids += [(request.sender, step.number) for step in request.steps]
+            self.seen.append(request.seen_report)
+            answer = StepResults((StepResult(success=True, report=1),) * len(request.steps))
         if self.answers:
-            results = [SetParametersResult(successful=True, reason="1") for _ in steps]
-            results += [SetParametersResult(reason="[]")] * (FIGURES in names)
-            reply(SetParameters.Response(results=results))
+            reply(answer_message(answer))
 
 
-def report_of(participant: str, number: int = 1, last_step: str = "") -> MemberReport:
-    return MemberReport("running", "vm", "7", 1.0, False, number, "", participant, last_step, {})
+def report_of(participant: str, number: int = 1, sender: str = "", step: int = 0) -> SystemReport:
+    return SystemReport(
+        name="/robot/acting",
+        activity="running",
+        nodes=(),
+        host="vm",
+        pid="7",
+        number=number,
+        participant=participant,
+        last_sender=sender,
+        last_step=step,
+    )
 
 
 def requests_of(
-    on: Bench, service: str, figures: list[str], on_problem: Callable[[str], None]
+    on: Bench, service: str, timings: list[TimingReport], on_problem: Callable[[str], None]
 ) -> MemberRequests:
     return MemberRequests(
         on.node,
         on.loop,
         service,
-        on_figures=figures.append,
+        on_timings=timings.append,
         on_report_key=lambda _: None,
         on_problem=on_problem,
     )
 
 
 def client(
-    on: Bench, figures: list[str], problems: list[str] | None = None, service: str = SERVICE
+    on: Bench,
+    timings: list[TimingReport],
+    problems: list[str] | None = None,
+    service: str = SERVICE,
 ) -> MemberRequests:
     on_problem = ([] if problems is None else problems).append
-    requests = requests_of(on, service, figures, on_problem)
+    requests = requests_of(on, service, timings, on_problem)
     wait_until(requests._client.service_is_ready, "the service")
     return requests
 
@@ -110,7 +125,7 @@ def test_requests_whose_responses_are_lost_do_not_keep_others_from_being_sent() 
         process.answers = True
         result = on.loop.run(lambda: requests.request("/last", "activate"))
         wait_until(result.done, "the response")
-        assert result.result().successful
+        assert result.result().success
 
 
 def test_a_canceled_request_is_not_sent_later() -> None:
@@ -144,8 +159,8 @@ def test_steps_whose_responses_are_lost_are_requested_again() -> None:
         requests.release()
         wait_until(lambda: len(process.steps) == 2, "the first request")
         (sender, first), (_, second) = process.ids
-        text = f"{sender} {second}"  # received: only the responses are lost
-        on.loop.run(lambda: requests.on_report(report_of(own, 9, text), None))
+        received = report_of(own, 9, sender, second)  # only the responses are lost
+        on.loop.run(lambda: requests.on_report(received, None))
         results[0].cancel()  # its node has given up
         wait_until(lambda: len(process.steps) >= 4, "two more requests")
         assert process.steps[:4] == ["activate /node1", *["activate /node2"] * 3]
@@ -153,7 +168,7 @@ def test_steps_whose_responses_are_lost_are_requested_again() -> None:
         assert process.seen[-1] == 9
         process.answers = True
         wait_until(results[1].done, "the response")
-        assert results[1].result().successful
+        assert results[1].result().success
         assert not problems
         assert not requests._sent
 
@@ -208,7 +223,7 @@ def test_an_error_of_discovery_does_not_keep_requests_from_being_sent(
             wait_until(lambda: on.errors() == [RuntimeError], "the error")
         on.loop.run(lambda: requests.on_report(report, None))
         wait_until(result.done, "the response")
-        assert result.result().successful
+        assert result.result().success
 
 
 def test_lost_goals_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,7 +233,7 @@ def test_lost_goals_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
         requests = client(on, [])
 
         def is_kept_twice() -> bool:
-            on.loop.run(lambda: requests.keep("1 running active"))  # as each report asks for it
+            on.loop.run(lambda: requests.keep(RUNNING))  # as each report asks for it
             return len(process.goals) >= 2
 
         wait_until(is_kept_twice, "the goals")
@@ -227,17 +242,17 @@ def test_lost_goals_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_timings_and_goals_need_no_steps() -> None:
     with bench(ExecutorKind.EVENTS) as on:
-        process, figures = Process(on), list[str]()
+        process, timings = Process(on), list[TimingReport]()
         process.answers = True
-        requests = client(on, figures)
+        requests = client(on, timings)
         requests.hold()
-        on.loop.run(requests.ask_for_figures)
-        on.loop.run(lambda: requests.keep("1 stopped active"))
+        on.loop.run(requests.ask_for_timings)
+        on.loop.run(lambda: requests.keep(GOALS))
         assert requests.has_messages
         requests.release()
-        wait_until(lambda: figures == ["[]"], "the timings")
+        wait_until(lambda: timings == [TimingReport(at_s=1.0)], "the timings")
         assert not requests.has_messages
-        assert (process.goals, process.asked, process.steps) == (["1 stopped active"], 1, [])
+        assert (process.goals, process.asked, process.steps) == ([GOALS], 1, [])
 
 
 def test_a_process_that_is_not_meant_neither_follows_nor_answers(
@@ -251,10 +266,18 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
 
     with bench(ExecutorKind.EVENTS) as on:
         callbacks = MemberCallbacks(dict, *[nothing] * 6, "")
-        MemberService(on.node, on.loop, callbacks, MEANT, nothing).on_report(1)
-        service = on.node.resolve_service_name(f"~/{CHANGE_STATES}")
-        requests = client(on, [], service=service)
-        on.loop.run(lambda: requests.on_report(report_of(KILLED), "goals"))
+        member = MemberService(on.loop, callbacks, MEANT, nothing)
+        member.on_report(1)
+        on.serve(
+            RequestService,
+            SERVICE,
+            lambda message, reply: member.on_request(
+                read_request(message, ChangeStates, KeepGoals),
+                lambda answer: reply(answer_message(answer)),
+            ),
+        )
+        requests = client(on, [])
+        on.loop.run(lambda: requests.on_report(report_of(KILLED), RUNNING))
         others = on.loop.run(lambda: requests.request("/camera", "activate"))
         on.loop.run(lambda: requests.on_report(report_of(MEANT), None))
         own = on.loop.run(lambda: requests.request("/camera", "activate"))
@@ -289,7 +312,7 @@ def test_the_error_says_why_a_process_has_not_reported(
     with bench(ExecutorKind.EVENTS) as on, lock:
         process = silent_process(on, tmp_path)
         if is_in_the_graph:
-            on.node.create_publisher(DiagnosticArray, "/robot/acting/manager/state", STATE_QOS)
+            on.node.create_publisher(String, "/robot/acting/manager/state", STATE_QOS)
         start = on.loop.run_task(process.ensure())
         wait_until(start.done, "the error")
         reason = "its reports do not arrive"
@@ -330,9 +353,20 @@ def test_a_request_waits_for_the_service_of_the_process_that_has_reported(
         if is_discovered:
             (server,) = servers_of(on.node, SERVICE)
             report = report_of(participant(server).hex())
-            on.loop.run(lambda: requests.on_report(report, "1 running active"))
+            on.loop.run(lambda: requests.on_report(report, RUNNING))
         else:
             requests._awaited_until_s = 0.0
         wait_until(result.done, "the response")
         wait_until(lambda: not requests.has_messages, "the response to the goals")
-        assert process.goals == ["1 running active"] * is_discovered
+        assert process.goals == [RUNNING] * is_discovered
+
+
+def test_a_refused_request_says_why() -> None:
+    """As by a process of another version."""
+    with bench(ExecutorKind.EVENTS) as on:
+        error = ProtocolError("it is of ros2-composer '9.0' (protocol 9)")
+        on.serve(RequestService, SERVICE, lambda _, reply: reply(answer_message(error)))
+        requests = client(on, [])
+        result = on.loop.run(lambda: requests.request("/arm", "activate"))
+        wait_until(result.done, "the response")
+        assert result.result() == StepResult(success=False, reason=f"refused: {error}")

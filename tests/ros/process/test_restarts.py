@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParametersAtomically
 
-from composer.runtime.ros.manager_protocol import RESTART, RESTART_NODES
+from composer.runtime.protocol.requests import REQUEST, Restart
+from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
 from tests.ros.support.in_process import Peer
 from tests.ros.support.system_process import PATIENCE_S, RunningSystem
 
@@ -124,15 +123,11 @@ def test_restarts(restarts: int, peer: Peer, tmp_path: Path) -> None:
     (tmp_path / "talker.py").write_text(TALKER, encoding="utf-8")
 
     def restart(node: str) -> None:
-        names = ParameterValue(
-            type=ParameterType.PARAMETER_STRING_ARRAY, string_array_value=[f"/{node}"]
-        )
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter(name=RESTART_NODES, value=names)]
-        )
-        service = f"/robot/manager/{RESTART}"
-        result = peer.call(SetParametersAtomically, service, request).result
-        assert result.successful, result.reason
+        request = Restart((f"/{node}",))
+        service = f"/robot/manager/{REQUEST}"
+        response = peer.call(RequestService, service, request_message(request))
+        done = read_answer(response, request)
+        assert done.success, done.message
 
     with RunningSystem(str(tmp_path / "robot.yaml")) as system:
         system.wait_for("3 of 3 nodes active")

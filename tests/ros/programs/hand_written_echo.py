@@ -9,9 +9,9 @@ import sys
 import time
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
 
 
 def main() -> None:
@@ -23,7 +23,7 @@ def main() -> None:
     print("ready", flush=True)
     lost, received = [], []
     node.create_subscription(
-        DiagnosticArray,
+        String,
         topic,
         received.append,
         QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL),

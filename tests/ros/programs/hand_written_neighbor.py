@@ -6,11 +6,11 @@ Runs until it is killed. Prints ``ready``.
 from __future__ import annotations
 
 import itertools
+import json
 import random
 
 import rclpy
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
@@ -30,9 +30,9 @@ class Neighbor(Node):
         self.random = random.Random(1)
         self.numbers = itertools.count()
         self.text = self.create_publisher(String, "/text", 10)
-        self.state = self.create_publisher(DiagnosticArray, STATE, LATCHED)
+        self.state = self.create_publisher(String, STATE, LATCHED)
         self.clock_topic = self.create_publisher(Clock, "/clock", 10)
-        self.create_subscription(DiagnosticArray, STATE, self.replay, LATCHED)
+        self.create_subscription(String, STATE, self.replay, LATCHED)
         self.clients_of_nodes = [
             self.create_client(ChangeState, f"/{name}/change_state")
             for name in ("ticker", "sleeper")
@@ -44,16 +44,15 @@ class Neighbor(Node):
         for _ in range(3):
             self.text.publish(String(data="x" * self.random.choice((0, 10, 10_000))))
 
-    def replay(self, message: DiagnosticArray) -> None:
-        """Publish a status of the manager again, with another host and a larger uptime."""
-        values = {item.key: item.value for status in message.status[:1] for item in status.values}
-        if values.get("host", "elsewhere") == "elsewhere":
+    def replay(self, message: String) -> None:
+        """Publish a report of the manager again, with another host and an earlier start."""
+        if "elsewhere" in message.data or "content" not in message.data:
             return
-        values |= {"host": "elsewhere", "pid": "1", "uptime": "1e9"}
-        forged = [KeyValue(key=key, value=value) for key, value in values.items()]
+        document = json.loads(message.data)
+        document["content"] |= {"host": "elsewhere", "pid": "1", "started_s": 1.0}
         for _ in range(3):
-            self.state.publish(DiagnosticArray(status=[DiagnosticStatus(values=forged)]))
-        self.state.publish(DiagnosticArray())
+            self.state.publish(String(data=json.dumps(document)))
+        self.state.publish(String())
 
     def request(self) -> None:
         number = next(self.numbers)

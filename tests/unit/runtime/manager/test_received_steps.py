@@ -4,38 +4,33 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes, StepId
+from composer.runtime.manager.received_steps import ReceivedSteps, ReportTimes
+from composer.runtime.protocol.requests import Step
 
-FIRST, SECOND = StepId("ab", 1), StepId("ab", 2)
+FIRST, SECOND = (Step(number, "activate", "/arm") for number in (1, 2))
+OF_LEG = Step(1, "activate", "/leg")
 
 
 def test_a_step_that_arrives_again_is_found() -> None:
     steps = ReceivedSteps[str]()
-    assert steps.find("/arm", FIRST) is None
-    steps.add("/arm", FIRST, "configure")
-    assert steps.find("/arm", FIRST) == "configure"
-    assert steps.find("/leg", FIRST) is None
-    assert steps.last_text == "ab 1"
+    assert steps.last == ("", 0)
+    assert steps.find("ab", FIRST) is None
+    steps.add("ab", FIRST, "configure")
+    assert steps.find("ab", FIRST) == "configure"
+    assert steps.find("ab", OF_LEG) is None
+    assert steps.find("cd", FIRST) is None
+    assert steps.last == ("ab", 1)
     assert steps.of(["/arm", "/leg"]) == ["configure"]
 
 
 def test_a_step_is_replaced_by_the_next_one_of_its_node_from_the_same_sender() -> None:
     steps = ReceivedSteps[str]()
-    assert not steps.is_replaced("/arm", FIRST)
-    steps.add("/arm", SECOND, "activate")
-    assert steps.is_replaced("/arm", FIRST)
-    assert not steps.is_replaced("/arm", SECOND)
-    assert not steps.is_replaced("/leg", FIRST)
-    assert not steps.is_replaced("/arm", StepId("cd", 1))  # another coordinating process
-
-
-def test_steps_without_a_number_are_always_new() -> None:
-    steps = ReceivedSteps[str]()
-    steps.add("/arm", None, "configure")
-    assert steps.find("/arm", None) is None
-    assert not steps.is_replaced("/arm", None)
-    assert not steps.is_replaced("/arm", FIRST)
-    assert steps.last_text == ""
+    assert not steps.is_replaced("ab", FIRST)
+    steps.add("ab", SECOND, "activate")
+    assert steps.is_replaced("ab", FIRST)
+    assert not steps.is_replaced("ab", SECOND)
+    assert not steps.is_replaced("ab", OF_LEG)
+    assert not steps.is_replaced("cd", FIRST)  # another coordinating process
 
 
 @pytest.mark.parametrize(

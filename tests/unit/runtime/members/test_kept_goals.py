@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from composer.model import PrimaryState, System
+from composer.plan import STOPPED, SystemGoals
 from composer.runtime.members.kept_goals import KeptGoals
 from tests.unit.support.resolving import system_of
 
 ACTIVE, INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
+BOTH = {"arm": ACTIVE, "eye": ACTIVE}
 
 
 @pytest.fixture
@@ -20,36 +22,40 @@ def robot() -> System:
     return system_of("{system: robot, nodes: {arm: {}, eye: {}}}")
 
 
+def running(serial: int) -> SystemGoals:
+    return SystemGoals(serial, "running")
+
+
 def test_the_goals_with_the_highest_serial_are_used(goals: KeptGoals) -> None:
-    for text in ("4 running active", "7 paused inactive", "", "5 reset unconfigured"):
-        assert goals.on_report(text) is None
-    assert str(goals.found) == "7 paused inactive"
-    assert goals.change({"arm": ACTIVE, "eye": INACTIVE}, "running") == (
-        "8 running active /eye=inactive"
-    )
+    highest = SystemGoals(7, "paused", INACTIVE)
+    for found in (running(4), highest, None, SystemGoals(5, "reset", PrimaryState.UNCONFIGURED)):
+        assert goals.on_report(found) is None
+    assert goals.found == highest
+    changed = goals.change({"arm": ACTIVE, "eye": INACTIVE}, "running")
+    assert changed == SystemGoals(8, "running", ACTIVE, {"/eye": INACTIVE})
 
 
 def test_goals_that_have_not_changed_are_not_sent(goals: KeptGoals) -> None:
-    assert goals.change({"arm": ACTIVE, "eye": ACTIVE}, "running") == "0 running active"
-    assert goals.change({"arm": ACTIVE, "eye": ACTIVE}, "running") is None
-    assert goals.change({"arm": ACTIVE, "eye": ACTIVE}, "paused") == "1 paused active"
+    assert goals.change(BOTH, "running") == running(0)
+    assert goals.change(BOTH, "running") is None
+    assert goals.change(BOTH, "paused") == SystemGoals(1, "paused")
 
 
 def test_a_process_with_other_goals_gets_those_of_now(goals: KeptGoals) -> None:
-    goals.change({"arm": ACTIVE, "eye": ACTIVE}, "running")
-    assert goals.on_report("0 running active") is None
-    assert goals.on_report("") == "0 running active"
-    assert goals.on_report("9 paused inactive") == "10 running active"  # found too late
-    assert goals.on_report("0 running active") == "10 running active"
-    assert goals.on_report("10 running active") is None
+    goals.change(BOTH, "running")
+    assert goals.on_report(running(0)) is None
+    assert goals.on_report(None) == running(0)
+    assert goals.on_report(SystemGoals(9, "paused", INACTIVE)) == running(10)  # found too late
+    assert goals.on_report(running(0)) == running(10)
+    assert goals.on_report(running(10)) is None
 
 
 def test_a_shutdown_ends_a_pause(goals: KeptGoals) -> None:
     assert goals.stop() is None  # nothing has been brought up
-    goals.change({"arm": INACTIVE, "eye": INACTIVE}, "paused")
-    text = goals.stop()
-    assert text == "1 stopped active"
+    goals.change(dict.fromkeys(BOTH, INACTIVE), "paused")
+    stopped = goals.stop()
+    assert stopped == SystemGoals(1, STOPPED)
     following = KeptGoals(robot())
-    following.on_report(text)
+    following.on_report(stopped)
     assert following.found is None
-    assert following.change({"arm": ACTIVE, "eye": ACTIVE}, "running") == "2 running active"
+    assert following.change(BOTH, "running") == running(2)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
+from composer.plan import SystemGoals
 from composer.runtime.members.requested_steps import MemberRequest, RequestedStep
+from composer.runtime.protocol.requests import Step, StepResult
 
-RESULT: Any = "done"
+RESULT = StepResult(success=True)
 
 
 def request(count: int = 3) -> MemberRequest:
-    texts = [f"activate /node{number}" for number in range(count)]
-    return MemberRequest([RequestedStep(*item) for item in enumerate(texts, 1)], seen=10)
+    steps = (Step(number + 1, "activate", f"/node{number}") for number in range(count))
+    return MemberRequest(list(map(RequestedStep, steps)), seen=10)
 
 
 def test_only_steps_without_a_result_are_requested_again_later_each_time() -> None:
@@ -22,7 +22,7 @@ def test_only_steps_without_a_result_are_requested_again_later_each_time() -> No
     first.steps[0].result.set_result(RESULT)
     first.steps[1].result.cancel()  # nothing waits for it
     second = first.again(13)
-    assert [step.text for step in second.steps] == ["activate /node2"]
+    assert [str(item.step) for item in second.steps] == ["activate /node2"]
     assert second.steps[0] is first.steps[2]  # with the same number
     assert second.again_after_s == 2.0 * first.again_after_s
     assert second.seen == 13
@@ -53,4 +53,4 @@ def test_a_request_whose_last_steps_have_results_is_not_lost() -> None:
 
 
 def test_goals_are_not_awaited() -> None:
-    assert not MemberRequest(goals="1 running active").is_awaited
+    assert not MemberRequest(goals=SystemGoals(1, "running")).is_awaited

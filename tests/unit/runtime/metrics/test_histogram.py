@@ -17,14 +17,20 @@ from composer.cli.support.callback_tables import (
     top_data,
     top_table,
 )
-from composer.client.systems.system_reports import NodeReport, SystemReport, with_processes
-from composer.runtime.metrics.figures import CallbackFigures, ChainFigures, figures, rates
+from composer.client.systems.system_reports import with_processes
+from composer.runtime.metrics.figures import figures, rates
 from composer.runtime.metrics.statistics import (
     BATCH_SIZE,
     BOUNDS_S,
     CallbackStatistics,
     Histogram,
     Statistics,
+)
+from composer.runtime.protocol.reports import (
+    CallbackFigures,
+    ChainFigures,
+    NodeReport,
+    SystemReport,
 )
 
 
@@ -133,7 +139,6 @@ def report(at_s: float, *callbacks: CallbackFigures) -> SystemReport:
     return SystemReport(
         name="/robot",
         activity="running",
-        message="2 of 2 nodes active",
         host="robot1",
         pid="12",
         nodes=(),
@@ -175,7 +180,7 @@ def test_top_shows_one_line_per_callback_up_to_the_height_of_the_terminal() -> N
     before, now = two_reports()
     found = sorted_rates(before, now, SortKey.NODE)
     assert top_table(now, found) == (
-        "/robot: running, 2 of 2 nodes active (host robot1, process 12), callbacks 30.0 % busy\n"
+        "/robot: running, 0 of 0 nodes active (host robot1, process 12), callbacks 30.0 % busy\n"
         "node  callback             calls/s  busy %  mean ms  p99 ms  max ms  late ms  over  "
         "dropped\n"
         "/a    timer 'tick'            50.0   10.00    2.000   3.000   4.000    0.500     6\n"

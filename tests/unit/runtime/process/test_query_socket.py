@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import socket
 import threading
 import time
@@ -7,18 +8,20 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from composer.runtime.process import query_socket
 from composer.runtime.process.instance_lock import socket_path
-from composer.runtime.process.query_socket import (
-    GRAPH,
+from composer.runtime.process.query_socket import QuerySocket, ask
+from composer.runtime.protocol.codec import encode
+from composer.runtime.protocol.requests import (
+    GraphAnswer,
+    GraphQuery,
     GraphView,
-    QuerySocket,
-    ask,
-    read_graph,
-    visible,
+    NodesQuery,
+    visible_names,
 )
 
 VIEW: GraphView = {
@@ -28,6 +31,15 @@ VIEW: GraphView = {
     "action": (("/navigate", ("composer_interfaces/action/Navigate",)),),
 }
 LIMIT_S = 30.0
+
+
+def answer_of(view: GraphView | None) -> GraphAnswer | None:
+    return None if view is None else GraphAnswer(view)
+
+
+def read_graph(system: str, timeout_s: float) -> GraphView | None:
+    answer = ask(system, GraphQuery(), timeout_s)
+    return None if answer is None else answer.names
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +57,9 @@ def serve() -> Iterator[Callable[[Callable[[], GraphView | None]], list[Exceptio
 
     def start(view: Callable[[], GraphView | None]) -> list[Exception]:
         errors: list[Exception] = []
-        sockets.append(QuerySocket("/robot", {GRAPH: lambda _: view()}, errors.append))
+        sockets.append(
+            QuerySocket("/robot", {GraphQuery: lambda _: answer_of(view())}, errors.append)
+        )
         return errors
 
     yield start
@@ -89,7 +103,10 @@ def test_an_error_is_reported_and_the_next_command_served(
     assert read_graph("/robot", LIMIT_S) == VIEW
 
 
-@pytest.mark.parametrize("line", [b"", b"\n", b"[1, 2]\n", b"{}\n", b'["unknown", 1]\n', b"\xff\n"])
+UNKNOWN = f"{encode(NodesQuery())}\n".encode()
+
+
+@pytest.mark.parametrize("line", [b"", b"\n", b"[1, 2]\n", b"{}\n", UNKNOWN, b"\xff\n"])
 def test_an_unknown_query_has_no_answer(line: bytes, serve: Callable[..., list[Exception]]) -> None:
     errors = serve(lambda: VIEW)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
@@ -98,8 +115,8 @@ def test_an_unknown_query_has_no_answer(line: bytes, serve: Callable[..., list[E
         connection.sendall(line)
         connection.shutdown(socket.SHUT_WR)
         assert connection.recv(1) == b""
-    assert ask("/robot", "unknown", None, LIMIT_S) is None
-    assert ask("/robot", GRAPH, None, LIMIT_S) is not None
+    assert ask("/robot", NodesQuery(), LIMIT_S) is None
+    assert read_graph("/robot", LIMIT_S) is not None
     assert errors == []
 
 
@@ -108,9 +125,26 @@ def test_the_view_of_another_discovery_range_is_not_used(
 ) -> None:
     serve(lambda: VIEW)
     # Server and client share an environment here: each reads it once, the server first.
-    ranges = iter([["LOCALHOST"], ["SUBNET"]])
+    ranges = iter(["LOCALHOST", "SUBNET"])
     monkeypatch.setattr(query_socket, "_environment", lambda: next(ranges))
     assert read_graph("/robot", LIMIT_S) is None
+
+
+def test_an_answer_of_another_version_is_not_used(
+    serve: Callable[..., list[Exception]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def of_next_version(value: Any) -> str:
+        document = json.loads(encode(value))
+        return json.dumps(document | {"version": document["version"] + 1})
+
+    serve(lambda: VIEW)
+    for kind in (GraphAnswer, GraphQuery):
+        monkeypatch.setattr(
+            query_socket,
+            "encode",
+            lambda value, kind=kind: (of_next_version if type(value) is kind else encode)(value),
+        )
+        assert read_graph("/robot", LIMIT_S) is None
 
 
 def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
@@ -152,7 +186,7 @@ def test_a_slow_command_blocks_only_itself(serve: Callable[..., list[Exception]]
     topics = tuple((f"/topic_{number}", ()) for number in range(50_000))
     serve(lambda: {**VIEW, "topic": topics})
     with ExitStack() as stack:
-        for sent in (b"[", b'["graph", null]\n') * 20:
+        for sent in (b"[", f"{encode(GraphQuery())}\n".encode()) * 20:
             connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             stack.enter_context(connection)
             connection.connect(str(socket_path("/robot")))
@@ -197,7 +231,7 @@ def test_the_socket_of_a_killed_process_is_replaced(
 
 
 def test_no_file_is_left_at_the_end(folder: Path) -> None:
-    server = QuerySocket("/robot", {GRAPH: lambda _: VIEW}, lambda _: None)
+    server = QuerySocket("/robot", {GraphQuery: lambda _: answer_of(VIEW)}, lambda _: None)
     assert len(list(folder.iterdir())) == 1
     server.close(LIMIT_S)
     assert list(folder.iterdir()) == []
@@ -205,10 +239,10 @@ def test_no_file_is_left_at_the_end(folder: Path) -> None:
 
 def test_a_name_too_long_for_a_socket_is_accepted() -> None:
     system = "/" + "x" * 150
-    server = QuerySocket(system, {GRAPH: lambda _: VIEW}, lambda _: None)
+    server = QuerySocket(system, {GraphQuery: lambda _: answer_of(VIEW)}, lambda _: None)
     assert read_graph(system, LIMIT_S) is None
     server.close(LIMIT_S)
 
 
 def test_hidden_names_are_left_out() -> None:
-    assert visible(VIEW["node"]) == (("/a", ()),)
+    assert visible_names(VIEW["node"]) == (("/a", ()),)

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from composer.runtime.supervision.status import NodeStatus, SystemStatus
+from composer.runtime.protocol.reports import NodeReport, SystemReport
 
-PLANNER = NodeStatus("/planner", "active", state="active")
-CAMERA = NodeStatus("/camera", "inactive", starts_active=False, state="inactive")
+PLANNER = NodeReport("/planner", "active", state="active")
+CAMERA = NodeReport("/camera", "inactive", starts_active=False, state="inactive")
 
 
 @pytest.mark.parametrize(
@@ -26,9 +26,9 @@ CAMERA = NodeStatus("/camera", "inactive", starts_active=False, state="inactive"
     ],
 )
 def test_a_system_is_active_if_all_nodes_that_start_active_are(
-    nodes: tuple[NodeStatus, ...], is_active: bool
+    nodes: tuple[NodeReport, ...], is_active: bool
 ) -> None:
-    status = SystemStatus("robot", "running", nodes, "host", 1, 0.0)
+    status = SystemReport("robot", "running", nodes, "host", "1")
     assert status.is_active is is_active
 
 
@@ -44,17 +44,17 @@ def test_a_system_is_active_if_all_nodes_that_start_active_are(
         ("running", (replace(PLANNER, held_down="silent"), CAMERA), False),
         ("running", (PLANNER, replace(CAMERA, state="unconfigured")), False),
         # In a process whose nodes have not been brought up.
-        ("running", (NodeStatus("/planner", "unconfigured"),), False),
+        ("running", (NodeReport("/planner", "unconfigured"),), False),
     ],
 )
 def test_a_system_is_ready_if_all_nodes_are_where_they_should_be(
-    activity: str, nodes: tuple[NodeStatus, ...], is_ready: bool
+    activity: str, nodes: tuple[NodeReport, ...], is_ready: bool
 ) -> None:
-    assert SystemStatus("robot", activity, nodes, "host", 1, 0.0).is_ready is is_ready
+    assert SystemReport("robot", activity, nodes, "host", "1").is_ready is is_ready
 
 
 def test_the_summary_lists_only_some_failed_nodes() -> None:
-    failed = tuple(NodeStatus(f"/node_{n}", "active", held_down="silent") for n in range(100))
-    summary = SystemStatus("robot", "running", failed, "host", 1, 0.0).summary
+    failed = tuple(NodeReport(f"/node_{n}", "active", held_down="silent") for n in range(100))
+    summary = SystemReport("robot", "running", failed, "host", "1").message
     assert summary.startswith("0 of 100 nodes active, /node_0 is down: silent, /node_1 is")
     assert summary.endswith("/node_4 is down: silent, 95 more are down")
