@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
 from composer.base.source import Located, SourceFile, Span
-from composer.client.parameter_descriptions import settings_of
+from composer.client.parameters import settings_of
 from composer.model import BehaviorReference
 from composer.project import Project
 from composer.runtime.middleware.environment import ROS_ARGUMENTS, prepare_environment

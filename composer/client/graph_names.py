@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from composer.client.name_matching import find_node, full_name, not_found_error
-from composer.client.session import Deadline, RosError, Session
-from composer.model.names import is_hidden
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
+from composer.base.diagnostics import nearest
+from composer.client.session import Deadline, NoResponseError, RosError, Session
+from composer.model.names import is_hidden, topic_name_problem
 from composer.runtime.protocol.requests import (
     ActionInfo,
     NameAndTypes,
@@ -91,3 +94,96 @@ def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -
     known = dict(session.graph.names(kind)).get(name, ())
     others = [other for other in known if other != type_name]
     return f"other nodes use type {', '.join(others)}, not {type_name}" if others else None
+
+
+_MAX_LISTED = 8
+
+
+class NotFoundError(RosError):
+    """The name is not in the ROS graph, or is ambiguous; the hint has similar names."""
+
+
+class InvalidNameError(RosError):
+    """The name is not valid for a topic, service or action."""
+
+
+def full_name(kind: str, name: str) -> str:
+    """Return the full name; a name without a leading slash is in the root namespace.
+
+    Raises InvalidNameError.
+    """
+    absolute = name if name.startswith("/") else f"/{name}"
+    try:
+        validate_full_topic_name(absolute)
+    except InvalidTopicNameException as error:
+        problem = topic_name_problem(absolute) or "is not valid"
+        raise InvalidNameError(f"{kind} name '{absolute}' {problem}") from error
+    return absolute
+
+
+def find_node(
+    session: Session,
+    deadline: Deadline,
+    name: str,
+    list_nodes: Callable[[], tuple[str, ...]],
+    kind: str = "node",
+) -> str:
+    """Return the full name of the node that ``name`` refers to, once it is discovered.
+
+    ``name`` is a full name, or the last part or parts of a single node's name. Raises
+    NotFoundError; NoResponseError if the node may be in a system that does not respond.
+    """
+    found = session.search(lambda: _matches(name, list_nodes()) or None, deadline)
+    if found is None:
+        check_all_respond(session)
+        known = list_nodes()  # it may have been discovered meanwhile
+        found = _matches(name, known)
+        if not found:
+            raise not_found_error(kind, name, known)
+    if name not in found:  # wait for other nodes with the same last part
+        found = _matches(name, session.wait_until_settled(list_nodes, deadline))
+    if len(found) > 1:
+        raise NotFoundError(
+            f"'{name}' matches more than one {kind}", "use a full name: " + ", ".join(found)
+        )
+    return found[0]
+
+
+def check_all_respond(session: Session) -> None:
+    """Raise NoResponseError if a system of this computer is missing in the ROS graph."""
+    for name, pid in session.unresponsive_systems().items():
+        raise NoResponseError(
+            f"system '{name}' does not respond, so its nodes are not known",
+            f"its process {pid} may be busy or stopped",
+        )
+
+
+def not_found_error(kind: str, name: str, known: Iterable[str]) -> NotFoundError:
+    """Return the error for an unknown name, with the most similar known one."""
+    return NotFoundError(f"there is no {kind} '{name}'", _hint(kind, name, list(known)))
+
+
+def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the node with that full name, else those whose names end with it."""
+    if name in known:
+        return (name,)
+    if name.startswith("/"):
+        return ()
+    return tuple(node for node in known if node.endswith(f"/{name}"))
+
+
+def _hint(kind: str, name: str, known: list[str]) -> str:
+    if not known:
+        return (
+            f"no {kind} was found: check that the system is running, and that ROS_DOMAIN_ID and"
+            " the discovery range are the same"
+        )
+    close = nearest(name, known)
+    if close is None:
+        by_last_part = {found.rpartition("/")[2]: found for found in known}
+        match = nearest(name.rpartition("/")[2], by_last_part)
+        close = by_last_part[match] if match is not None else None
+    if close is not None:
+        return f"did you mean '{close}'?"
+    more = ", ..." if len(known) > _MAX_LISTED else ""
+    return "available: " + ", ".join(known[:_MAX_LISTED]) + more

@@ -17,7 +17,7 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rclpy.type_support import check_is_valid_srv_type
 
 from composer.base.fast_dataclass import dataclass
-from composer.client.name_matching import check_all_respond, find_node, not_found_error
+from composer.client.graph_names import check_all_respond, find_node, not_found_error
 from composer.client.requests import (
     Call,
     call_all_with_retries,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -18,12 +19,14 @@ from composer.base.diagnostics import suggestion
 from composer.client.graph_names import GraphNames
 from composer.client.requests import (
     Call,
+    ServiceCaller,
     call_all_with_retries,
     call_once,
     call_with_retries,
 )
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.systems.proxies import PARAMETERS, Proxies
+from composer.language.tree import Plain
 from composer.runtime.protocol.requests import ParameterDescription, full_parameter_name
 from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value
 
@@ -244,3 +247,55 @@ def _converted(value: Any, kind: str) -> Any:
             return [bytes([item]) if type(item) is int else item for item in value]
         case _:
             return value
+
+
+#: How long to wait for the responses of nodes; the parameters of later ones have no description.
+_RESPONSE_S = 2.0
+_SERVICE = "describe_parameters"
+_TYPE = "rcl_interfaces/srv/DescribeParameters"
+
+
+def parameter_settings(
+    session: Session, deadline: Deadline, names: Mapping[str, Iterable[str]]
+) -> dict[str, dict[str, dict[str, Plain]]]:
+    """Return the declarations of parameters as in YAML, by node and parameter.
+
+    ``names`` are the parameters of each node. Nodes without the service, or that do not respond,
+    are left out.
+    """
+    known = {name for name, types in session.graph.services() if _TYPE in types}
+    requests = {
+        f"{node}/{_SERVICE}": (node, list(parameters))
+        for node, parameters in names.items()
+        if f"{node}/{_SERVICE}" in known
+    }
+    with closing(ServiceCaller(session)) as caller:
+        responses = caller.call_all(
+            DescribeParameters,
+            {
+                service: DescribeParameters.Request(names=listed)
+                for service, (_, listed) in requests.items()
+            },
+            Deadline(min(_RESPONSE_S, deadline.left_s)),
+        )
+    found: dict[str, dict[str, dict[str, Plain]]] = {}
+    for service, (node, listed) in requests.items():
+        response = responses[service]
+        if response is not None and len(response.descriptors) == len(listed):
+            descriptions = map(description, listed, response.descriptors)
+            found[node] = {item.name: settings_of(item) for item in descriptions}
+    return found
+
+
+def settings_of(item: ParameterDescription) -> dict[str, Plain]:
+    """Return the declaration of a parameter as in YAML, without its value."""
+    settings: dict[str, Plain] = {
+        "minimum": item.minimum,
+        "maximum": item.maximum,
+        "step": item.step,
+        "read_only": item.read_only or None,
+        "description": item.description or None,
+    }
+    if "unknown" not in item.type and item.type != "not set":
+        settings["type"] = item.type
+    return {key: value for key, value in settings.items() if value is not None}

@@ -9,7 +9,7 @@ from typing import Self
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
 
-from composer.client.messages.rate_sampling import RateMeter
+from composer.client.messages.rates import RateMeter
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, Session
 from composer.client.systems.proxies import LIFECYCLE, PARAMETERS, Proxies

@@ -31,7 +31,7 @@ _MANAGER = "manager"
 #: The self-test of the middleware at each start, on a topic of its own.
 SELF_TEST_TOPICS = "/_compose_trial/*"
 _COMMANDS = (
-    *("is_active", "pause", "reset", "restart", "resume", "shutdown", "startup"),
+    *("is_active", "pause", "request", "reset", "resume", "shutdown", "startup"),
     *("resume_all_or_nothing", "startup_all_or_nothing"),
 )
 #: Section, its attribute, and the element of one name, by the kind of a port.
@@ -90,15 +90,13 @@ def enclaves(system: System) -> tuple[Enclave, ...]:
     manager = _manager(namespace, system)
     for part in parts:
         member = join(part.namespace, f"{part.name.value}/{_MANAGER}")
-        manager.allow(PortKind.CLIENT, f"{member}/change_states")
+        manager.allow(PortKind.CLIENT, f"{member}/request")
         manager.allow(PortKind.SUBSCRIPTION, f"{member}/state")
     own = [node for node in system.nodes if node.process is None]
     found = [Enclave(namespace, (manager, *_profiles(own)))]
     for part in parts:
         path = join(part.namespace, part.name.value)
-        own_manager = _manager(path, part)
-        own_manager.allow(PortKind.SERVICE, "change_states")
-        found.append(Enclave(path, (own_manager, *_profiles(part.nodes))))
+        found.append(Enclave(path, (_manager(path, part), *_profiles(part.nodes))))
     return tuple(found)
 
 

@@ -76,9 +76,8 @@ def call(
     request = yaml_or_stdin(text, stdin)
     with ros_session("compose service", timeout) as (session, deadline):
         from composer.client.calls import ServiceRequest, call_service
-        from composer.client.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames, full_name
         from composer.client.messages.values import to_plain
-        from composer.client.name_matching import full_name
 
         name = full_name("service", service)
         service_type = type_name or GraphNames(session, deadline).only_type("service", name)
@@ -144,9 +143,8 @@ def send_goal(
     with ros_session("compose action", timeout) as (session, deadline):
         from composer.client.calls import GoalRequest
         from composer.client.calls import send_goal as send
-        from composer.client.graph_names import GraphNames
+        from composer.client.graph_names import GraphNames, full_name
         from composer.client.messages.values import to_plain
-        from composer.client.name_matching import full_name
         from composer.client.session import Deadline
 
         name = full_name("action", action)

@@ -89,7 +89,7 @@ def live(
     """
     with ros_session("compose import live", timeout) as (session, deadline):
         from composer.bridges.importing.live import describe_graph
-        from composer.client.parameter_descriptions import parameter_settings
+        from composer.client.parameters import parameter_settings
         from composer.client.snapshot import GraphObserver
 
         with GraphObserver(session) as observer:

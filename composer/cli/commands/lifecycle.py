@@ -54,8 +54,8 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
         _write_states(local, json=json)
         return
     with ros_session("compose lifecycle", timeout) as (session, deadline):
+        from composer.client.graph_names import check_all_respond
         from composer.client.lifecycle import LifecycleClient
-        from composer.client.name_matching import check_all_respond
 
         client = LifecycleClient(session, deadline)
         states = client.states(client.nodes())

@@ -153,8 +153,8 @@ def restart(
     """
     failed = False
     with ros_session("compose lifecycle", timeout) as (session, deadline):
-        from composer.client.systems.managed_nodes import find_managed_nodes
         from composer.client.systems.managers import Systems
+        from composer.client.systems.process_list import find_managed_nodes
 
         systems = Systems(session, deadline)
         for system, names in find_managed_nodes(session, deadline, systems, nodes).items():

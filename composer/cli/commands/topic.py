@@ -152,9 +152,9 @@ def pub(
     limit = 1 if once else times
     text = yaml_or_stdin(content, stdin)
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
+        from composer.client.graph_names import full_name
         from composer.client.messages.topics import NotAcknowledgedError, Publication, publish
         from composer.client.messages.values import class_of, compile_content, to_plain
-        from composer.client.name_matching import full_name
 
         publication = Publication(
             topic=full_name("topic", topic),

@@ -88,7 +88,7 @@ Filter = Annotated[
 
 def _path(path: str | None) -> str | None:
     """Check ``--field`` before ROS starts."""
-    from composer.client.messages.field_paths import path_steps
+    from composer.client.messages.values import path_steps
 
     if path is not None:
         try:
@@ -144,9 +144,9 @@ def echo(
     expression = _filter(condition)
     limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
     with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
+        from composer.client.graph_names import full_name
         from composer.client.messages.topics import Topics, TopicSubscription
         from composer.client.messages.values import part, to_plain
-        from composer.client.name_matching import full_name
 
         topics = Topics(session, deadline)
         name = full_name("topic", topic)
@@ -238,9 +238,9 @@ def hz(
     expression = _filter(condition)
     limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
     with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
+        from composer.client.graph_names import full_name
         from composer.client.messages.rates import RateWindow
         from composer.client.messages.topics import Topics, TopicSubscription
-        from composer.client.name_matching import full_name
         from composer.client.session import Deadline
 
         topics = Topics(session, deadline)

@@ -5,16 +5,18 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from typing import Any, Self
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message, serialize_message
 
 from composer.base.fast_dataclass import dataclass
-from composer.client.graph_names import GraphNames, type_mismatch_hint
-from composer.client.messages.values import Build, class_of
-from composer.client.name_matching import full_name
+from composer.client.graph_names import GraphNames, full_name, type_mismatch_hint
+from composer.client.messages.values import Build, InvalidValueError, class_of
+from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.model.qos import Durability, QosProfile, Reliability
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -204,3 +206,49 @@ def _not_acknowledged_error(topic: str) -> NotAcknowledgedError:
         "messages may be lost: a subscriber may be stopped, busy or gone, or the network may drop"
         f" packets; 'compose topic info -v {topic}' lists the subscriptions",
     )
+
+
+class SerializedPublisher:
+    """Publishes serialized messages once they have proven to be messages of the type."""
+
+    def __init__(self, session: Session, topic: str, type_name: str, qos: QosProfile) -> None:
+        """Raise InvalidValueError or InvalidNameError for a type or a name that is not valid."""
+        self._session = session
+        self._class = class_of(type_name)
+        self._type_name = type_name
+        self._publisher = session.node.create_publisher(
+            self._class, full_name("topic", topic), rclpy_profile(qos)
+        )
+
+    def publish(self, data: bytes) -> None:
+        """Publish a message. Raises InvalidValueError."""
+        self._publisher.publish(_message(data, self._class, self._type_name))
+
+    def close(self) -> None:
+        """Destroy the publisher."""
+        self._session.node.destroy_publisher(self._publisher)
+
+
+def call_serialized(
+    session: Session, deadline: Deadline, service: str, type_name: str, request: bytes
+) -> bytes:
+    """Return the response of a service. Raises InvalidValueError, NoResponseError."""
+    service_class = class_of(type_name, "service")
+    message = _message(request, service_class.Request, f"{type_name}_Request")
+    with closing(ServiceCaller(session)) as caller:
+        try:
+            response = caller.call_once(service_class, service, message, deadline)
+        except NoResponseError as error:
+            hint = type_mismatch_hint(session, "service", service, type_name)
+            raise NoResponseError(str(error), hint) from error
+    return bytes(serialize_message(response))
+
+
+def _message(data: bytes, message_class: Any, type_name: str) -> Any:
+    """Return a message. Raises InvalidValueError."""
+    if not message_class.get_fields_and_field_types():
+        return message_class()  # programs disagree about the bytes of a message without fields
+    try:
+        return deserialize_message(data, message_class)
+    except Exception as error:  # classes of the RMW implementation, which are not public
+        raise InvalidValueError(f"{len(data)} bytes are not a message {type_name}") from error

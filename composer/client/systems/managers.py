@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.base.characters import visible
-from composer.client.name_matching import NotFoundError, not_found_error
+from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.requests import call_once
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.system_reports import parse_state, with_processes

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
+from fnmatch import fnmatchcase
 
 from composer.base.fast_dataclass import dataclass
+from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.lifecycle import LifecycleClient
-from composer.client.session import Deadline, Session
-from composer.client.systems.managers import DISCOVERY_S, Systems
+from composer.client.session import Deadline, NoResponseError, Session
+from composer.client.systems.managers import DISCOVERY_S, Systems, without_members
 from composer.client.systems.system_reports import with_callbacks_of_processes
 from composer.plan.drift import ObservedProcess
 from composer.runtime.process.instance_lock import local_systems
@@ -87,3 +89,50 @@ def _process_of(report: SystemReport, process: str, known: Mapping[str, SystemRe
     name = f"{report.name}/{process}"
     is_own = not process or (name not in known and report.name.endswith(f"/{process}"))
     return report.name if is_own else name
+
+
+#: Managers publish their last report to each new subscription, and again every second.
+_REPORT_WITHIN_S = 2.0
+
+
+def find_managed_nodes(
+    session: Session, deadline: Deadline, systems: Systems, targets: Iterable[str]
+) -> dict[str, tuple[str, ...]]:
+    """Return the nodes that match the targets, by the systems that manage them.
+
+    A target is a full name, the last part of a name, or a pattern. Raises NotFoundError;
+    NoResponseError if a target is not found and a system does not respond.
+    """
+    names: Iterable[str] = {
+        *session.wait_until_settled(systems.discover, deadline),
+        *local_systems(),
+    }
+    names = without_members(names)  # the others move their nodes for one of these
+    reports = systems.reports(names, Deadline(min(_REPORT_WITHIN_S, deadline.left_s)))
+    system_of = {
+        node.node: name for name, report in reports.items() if report for node in report.nodes
+    }
+    silent = [name for name, report in reports.items() if report is None]
+    found: dict[str, dict[str, None]] = {}
+    for target in targets:
+        for node in _matches(target, system_of, silent):
+            found.setdefault(system_of[node], {})[node] = None
+    return {system: tuple(nodes) for system, nodes in found.items()}
+
+
+def _matches(target: str, known: Iterable[str], silent: list[str]) -> list[str]:
+    is_pattern = any(character in target for character in "*?[")
+    pattern = target if target.startswith("/") else f"*/{target}"
+    found = [node for node in known if fnmatchcase(node, pattern)]
+    if not found and silent:
+        raise NoResponseError(
+            f"{silent[0]} does not respond, so its nodes are not known",
+            "its process may be busy or stopped",
+        )
+    if not found:
+        raise not_found_error("node of a running system", target, known)
+    if len(found) > 1 and not is_pattern:
+        raise NotFoundError(
+            f"'{target}' matches more than one node", f"use a full name: {', '.join(found)}"
+        )
+    return found

@@ -40,8 +40,8 @@ class Outgoing:
 
     def open(self, ros: RosGraph) -> None:
         """Create the publisher. Raises RosError, RequestError."""
+        from composer.client.graph_names import full_name
         from composer.client.messages.values import build_message, class_of
-        from composer.client.name_matching import full_name
         from composer.runtime.ros.qos_profiles import rclpy_profile
 
         self._ros = ros
@@ -192,7 +192,7 @@ class GoalFeed(Feed):
     def _observe(self) -> FinishedGoal | None:
         """Send the goal and wait for its end; None if nothing observes it any more."""
         from composer.client.calls import GoalRequest, send_goal
-        from composer.client.name_matching import full_name
+        from composer.client.graph_names import full_name
         from composer.client.session import Deadline
 
         deadline = Deadline(_ACCEPTED_WITHIN_S)

@@ -137,7 +137,7 @@ class FoxgloveConnection(Link):
             self.post({"op": "serviceCallFailure", **content})
 
         def run(ros: RosGraph, deadline: Deadline) -> bytes:
-            from composer.client.messages.serialized import call_serialized
+            from composer.client.messages.topics import call_serialized
 
             return call_serialized(ros.session, deadline, service.name, service.type, call.data)
 

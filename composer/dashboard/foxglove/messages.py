@@ -23,7 +23,7 @@ from composer.dashboard.web.client import Running
 from composer.model.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
-    from composer.client.messages.serialized import SerializedPublisher
+    from composer.client.messages.topics import SerializedPublisher
     from composer.client.shared_session import SampledTopic
     from composer.dashboard.observing.topics import TopicReader
 
@@ -136,7 +136,7 @@ class PublishedFeed(Feed):
 
     def start(self) -> None:
         """Create the publisher; what waits is lost if that is not possible."""
-        from composer.client.messages.serialized import SerializedPublisher
+        from composer.client.messages.topics import SerializedPublisher
         from composer.dashboard.channels.sending import suitable_profile
 
         try:

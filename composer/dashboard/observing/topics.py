@@ -141,7 +141,7 @@ class TopicReader:
 
     def _subscribe(self) -> None:
         """Subscribe, or subscribe again if the publishers have changed."""
-        from composer.client.name_matching import full_name
+        from composer.client.graph_names import full_name
 
         full_name("topic", self.topic)  # raises if it is not a valid name
         ends = self._topology().of_topics.get(self.topic, [])

@@ -29,8 +29,8 @@ def call(values: Values, _: Dashboard) -> Prepared:
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.calls import ServiceRequest, call_service
+        from composer.client.graph_names import full_name
         from composer.client.messages.values import to_short_plain
-        from composer.client.name_matching import full_name
 
         service = full_name("service", name)
         content = ros.forms.from_json(request, type_name, "request")

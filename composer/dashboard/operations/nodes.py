@@ -150,9 +150,9 @@ def restart(values: Values, _: Dashboard) -> Prepared:
 
 def _restart_by_manager(ros: RosGraph, deadline: Deadline, name: str) -> str | None:
     """Restart a node of a system; return the message of the manager, None if it has no manager."""
-    from composer.client.name_matching import NotFoundError
-    from composer.client.systems.managed_nodes import find_managed_nodes
+    from composer.client.graph_names import NotFoundError
     from composer.client.systems.managers import Systems
+    from composer.client.systems.process_list import find_managed_nodes
 
     systems = Systems(ros.session, deadline)
     try:

@@ -5,30 +5,20 @@ The services (std_srvs/srv/Trigger) are named as those of nav2's lifecycle manag
 ``resume_all_or_nothing`` undo everything if a node fails. The service ``request`` has the requests
 of commands and other processes: see :mod:`composer.runtime.protocol`.
 
-The node publishes the states of all nodes on ``/diagnostics`` (REP 107) and, latched, as a report
-on ``state``: on each change, and while there are subscriptions every second and for each new one.
-While there are subscriptions, it publishes callback timings on ``callbacks`` and ``/diagnostics``.
+Its topics are described in :mod:`.publishing`.
 """
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.duration import Duration
-from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
 from rclpy.time_source import USE_SIM_TIME_NAME
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.base.fast_dataclass import dataclass
@@ -40,31 +30,28 @@ from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
-from composer.runtime.manager.diagnostics import diagnostic_array
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.manager.other_instances import OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
+from composer.runtime.manager.publishing import ReportPublisher, ReportSources
 from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.process.query_socket import QuerySocket
-from composer.runtime.protocol.codec import ProtocolError, encode
+from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import (
     CallbackFigures,
     ChainFigures,
     SystemReport,
     TimingReport,
-    signed,
 )
 from composer.runtime.protocol.requests import (
     ALL_OR_NOTHING,
-    CALLBACKS_TOPIC,
     IS_ACTIVE,
     NAME,
     REQUEST,
-    STATE_TOPIC,
     AskReportKey,
     ChangeStates,
     Done,
@@ -74,8 +61,6 @@ from composer.runtime.protocol.requests import (
 )
 from composer.runtime.ros.limited_requests import limit_type_descriptions, limited
 from composer.runtime.ros.manager_interface import (
-    CALLBACKS_QOS,
-    STATE_QOS,
     RequestService,
     answer_message,
     read_request,
@@ -92,19 +77,7 @@ COMMANDS = (
 _RESTART = "restart"
 #: The requests of the coordinating process to the others.
 _OF_MEMBERS = (ChangeStates, KeepGoals, AskReportKey)
-_DIAGNOSTICS = "/diagnostics"
-_NS_PER_S = 10**9
 _PERIOD_S = 1.0
-#: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
-#: several milliseconds, so changes then wait longer: messages take at most 2 % of the time. While
-#: more changes follow, they wait for half a second.
-_BATCH_S = 0.05
-_LONGEST_BATCH_S = 0.5
-_MAX_SHARE = 0.02
-#: A stopped process does not keep others from getting the status.
-_ACKNOWLEDGED_WITHIN_S = 0.2
-_ACKNOWLEDGMENT_PERIOD_S = 0.02
-_AT_ONCE = Duration()
 _ENDS_WITHIN_S = 0.2
 _RESPONSES_ARRIVE_WITHIN_S = 0.15
 
@@ -155,15 +128,8 @@ class ManagerNode:
         """
         self._status = status
         self._host = host
-        self._started_s = time.monotonic()
         self._loop = Loop(NAME, log_exception)
-        self._is_waiting = False  # for subscriptions that do not have the last message yet
-        self._publish_due = threading.Lock()  # held while a message with changes is due
-        self._batch_s = _BATCH_S
-        self._changed_s = self._due_s = 0.0  # monotonic: the last change, when it is published
-        self._published_s = 0.0  # monotonic
-        self._number = 0  # of messages on ``state``
-        self._report_key = report_key
+        self._member: MemberService | None = None
         self._node = Node(
             NAME,
             namespace=namespace,
@@ -185,10 +151,11 @@ class ManagerNode:
         )
         self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
-        self._diagnostics = self._publisher(DiagnosticArray, _DIAGNOSTICS, 10, self._publish)
-        self._state = self._publisher(String, f"~/{STATE_TOPIC}", STATE_QOS, self._publish)
-        self._callbacks = self._publisher(
-            String, f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
+        sources = ReportSources(
+            status, host.callbacks, host.chains, self._completed, self._on_report, report_key
+        )
+        self._reports = ReportPublisher(
+            self._node, self._loop, self.process_context.events, sources
         )
         for command in COMMANDS:
             self._add_service(Trigger, command, partial(self._on_command, command))
@@ -203,14 +170,13 @@ class ManagerNode:
             on_permanent=self._warn_of_instance,
         )
         own_participant = self._instances.participant
-        self._member: MemberService | None = None
         if report_key:
             is_child = status.without_nodes.is_child
             callbacks = MemberCallbacks(
                 host.nodes,
                 host.recreate,
-                lambda: self._number,
-                self._publish,
+                lambda: self._reports.number,
+                self._reports.publish,
                 host.expect_end,
                 status.keep_goals,
                 self._called,
@@ -220,20 +186,16 @@ class ManagerNode:
                 self._loop, callbacks, own_participant.hex(), self._log.info
             )
         if any(node.left_to_manager for node in status.snapshot().nodes):
-            ProxyLifecycleService(self._node, self._loop, host.nodes, self._publish_first)
+            ProxyLifecycleService(self._node, self._loop, host.nodes, self._reports.publish_first)
         self._graph = GraphObserver(changes, own_participant)
         queries = ManagerQueries(
-            self._loop,
-            self._graph,
-            store,
-            self._report,
-            self._timings,
+            self._loop, self._graph, store, self._reports.report, self._reports.timings
         )
         self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
-        self._loop.call_soon(self._publish)
-        status.on_change(self._publish_soon)
+        self._loop.call_soon(self._reports.publish)
+        status.on_change(self._reports.publish_soon)
 
     def retire(self, *, linger: bool) -> None:
         """Publish the last status and stop the loop; ``linger`` until responses have arrived.
@@ -242,7 +204,7 @@ class ManagerNode:
         """
         self._query_socket.close(_ENDS_WITHIN_S)
         self._status.on_change(lambda: None)
-        self._loop.call_soon(self._publish_now)
+        self._loop.call_soon(self._reports.publish_now)
         if linger:
             time.sleep(_RESPONSES_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)
@@ -250,24 +212,6 @@ class ManagerNode:
     def destroy(self) -> None:
         """Leave the ROS graph."""
         self._node.destroy_node()
-
-    def _publisher(
-        self, kind: type[Any], name: str, profile: QoSProfile | int, publish: Callable[[], None]
-    ) -> Publisher:
-        """Create a publisher; call ``publish`` for each new subscription."""
-        publisher = self._node.create_publisher(kind, name, profile)
-        subscriptions = 0
-
-        def on_matched() -> None:
-            nonlocal subscriptions
-            before, subscriptions = subscriptions, publisher.get_subscription_count()
-            if subscriptions > before:
-                publish()
-
-        with suppress(UnsupportedEventTypeError):  # then the next message follows within a second
-            event = QoSPublisherEventType.RCL_PUBLISHER_MATCHED
-            self.process_context.events.watch(publisher.handle, event, on_matched)
-        return publisher
 
     def _add_service(self, kind: Any, name: str, callback: Callable[[Any, Reply], None]) -> None:
         service = self._node.create_service(kind, f"~/{name}", unused_callback)
@@ -313,101 +257,30 @@ class ManagerNode:
         self._host.update_status()
         self._instances.check()
         self._graph.note_participants()
-        if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
-            self._publish()
-        elif self._member is not None:
-            self._member.on_report(self._number)
-        if self._callbacks.get_subscription_count():
-            self._publish_callbacks()
+        self._reports.tick()
+
+    def _completed(self, report: SystemReport) -> SystemReport:
+        return report if self._member is None else self._member.completed(report)
+
+    def _on_report(self, number: int) -> None:
+        if self._member is not None:
+            self._member.on_report(number)
 
     def _on_query_error(self, error: Exception) -> None:
         self._node.get_logger().error(f"cannot answer a query of a command: {error!r}")
 
-    def _timings(self) -> TimingReport:
-        return TimingReport(self._host.callbacks(), self._host.chains(), self._now_ns / _NS_PER_S)
-
     def _called(self) -> TimingReport:
         """Return the timings for a summary: of what was called, without histograms."""
-        timings = self._timings()
+        timings = self._reports.timings()
         called = (item for item in timings.callbacks if item.count or item.dropped)
         return replace(timings, callbacks=tuple(replace(item, histogram="") for item in called))
 
-    def _publish_callbacks(self) -> None:
-        self._callbacks.publish(String(data=encode(self._timings())))
-
-    def _publish_soon(self) -> None:
-        self._changed_s = time.monotonic()
-        if self._publish_due.acquire(blocking=False):
-            self._due_s = self._changed_s + max(self._batch_s, _LONGEST_BATCH_S)
-            self._loop.call_later(self._batch_s, self._publish_changes)
-
-    def _publish_first(self) -> None:
-        """Publish the first change of a batch at once, for processes that wait for it."""
-        if time.monotonic() - self._published_s > self._batch_s:
-            self._publish()
-        else:
-            self._publish_soon()
-
-    def _publish_changes(self) -> None:
-        left_s = min(self._changed_s + self._batch_s, self._due_s) - time.monotonic()
-        if left_s > 0.0:
-            self._loop.call_later(left_s, self._publish_changes)
-            return
-        self._publish_due.release()
-        self._publish()
-
     def _instance(self) -> Instance:
         status = self._status.without_nodes
-        return Instance(status.host, status.pid, self._uptime_s)
+        return Instance(status.host, status.pid, self._reports.uptime_s)
 
     def _warn_of_instance(self, other: Instance) -> None:
         self._log.warn(
             f"this system also runs on host {other.host}, process {other.pid}: their nodes have the"
             " same names and topics; stop one of them"
         )
-
-    @property
-    def _uptime_s(self) -> float:
-        # Not the time of day, which may differ between hosts.
-        return time.monotonic() - self._started_s
-
-    def _publish(self) -> None:
-        """Publish the status once all subscriptions have the last one.
-
-        A message that replaces it earlier would be reported as lost by ``ros2 topic echo``.
-        """
-        if self._is_waiting:
-            return
-        self._is_waiting = True
-        self._publish_by(time.monotonic() + _ACKNOWLEDGED_WITHIN_S)
-
-    def _publish_by(self, end_s: float) -> None:
-        if time.monotonic() < end_s and not self._state.wait_for_all_acked(_AT_ONCE):
-            self._loop.call_later(_ACKNOWLEDGMENT_PERIOD_S, partial(self._publish_by, end_s))
-            return
-        self._is_waiting = False
-        self._publish_now()
-
-    @property
-    def _now_ns(self) -> int:
-        return int(self._node.get_clock().now().nanoseconds)
-
-    def _report(self) -> SystemReport:
-        status = replace(
-            self._status.snapshot(), at_s=self._now_ns / _NS_PER_S, number=self._number
-        )
-        return status if self._member is None else self._member.completed(status)
-
-    def _publish_now(self) -> None:
-        start_s = time.monotonic()
-        self._number += 1
-        report = self._report()
-        self._state.publish(String(data=signed(encode(report), self._report_key)))
-        if self._member is not None:
-            self._member.on_report(self._number)
-        if self._diagnostics.get_subscription_count():
-            chains, callbacks = self._host.chains(), self._host.callbacks()
-            self._diagnostics.publish(diagnostic_array(report, self._uptime_s, chains, callbacks))
-        self._published_s = time.monotonic()
-        took_s = self._published_s - start_s
-        self._batch_s = min(max(_BATCH_S, took_s / _MAX_SHARE), _PERIOD_S)

@@ -6,9 +6,8 @@ are in its reports; requests for transitions go to the manager's service.
 The process with the instance lock runs the nodes, whatever has started it. One that was not started
 here is used as it is, and from then on only awaited: what has started it may start it again.
 
-Nothing that arrives on a topic decides: only reports count that are signed with the key of the
-process, see :mod:`composer.runtime.protocol.reports`. What the process is, is learnt from its
-instance lock, its end as a child, or the answer of its service.
+Nothing that arrives on a topic decides: only signed reports count, see :mod:`.reports`. What the
+process is, is learnt from its instance lock, its end as a child, or the answer of its service.
 """
 
 from __future__ import annotations
@@ -19,9 +18,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from time import monotonic
-from typing import Any
-
-from std_msgs.msg import String
 
 from composer.model import LogLevel, Process
 from composer.model.names import PROGRAM_LOGGER
@@ -32,24 +28,22 @@ from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.members.context import (
+    REPORTS_WITHIN_S,
     Member,
     MemberContext,
     MemberLife,
+    NodeFigures,
     ProcessUnavailable,
 )
-from composer.runtime.members.figures import REPORTS_WITHIN_S, NodeFigures
+from composer.runtime.members.reports import MemberReports
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES
-from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held, report_key
-from composer.runtime.protocol.codec import ProtocolError, decode
+from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
 from composer.runtime.protocol.reports import (
     SystemReport,
     TimingReport,
-    is_signed,
-    split_signature,
 )
-from composer.runtime.protocol.requests import NAME, REQUEST, STATE_TOPIC, StepResult
-from composer.runtime.ros.manager_interface import STATE_QOS
+from composer.runtime.protocol.requests import NAME, REQUEST, StepResult
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
 STARTS_WITHIN_S = 30.0
@@ -75,28 +69,20 @@ class MemberProcess:
         self.moved_s = 0.0
         self._life: MemberLife | None = None  # from the start, or the first report, to the end
         self._may_start = bool(context.command)
-        self._answered_key = ""  # of a process whose service was asked for it
-        self._unsigned = ""  # the report for which it was asked
-        self._problem = ""  # why its reports cannot be read
         self._starting: Future[None] | None = None
         self._is_ending = False
         self._belongs_to_another = False
-        manager = f"{self._name}/{NAME}"
-        service = f"{manager}/{REQUEST}"
         self.requests = MemberRequests(
             context.manager,
             context.loop,
-            service,
+            f"{self._name}/{NAME}/{REQUEST}",
             on_timings=self._on_timings,
             on_report_key=self._on_report_key,
             on_problem=self._warn,
         )
         #: The timings of its callbacks and chains, once it was asked for them.
         self.timings = TimingReport()
-        self._reports = context.manager.create_subscription(
-            String, f"{manager}/{STATE_TOPIC}", lambda _: None, STATE_QOS
-        )
-        context.loop.add_subscription(self._reports, self._on_message)
+        self._reports = MemberReports(self._name, context, self._on_report, self._warn)
         self._checked_s = monotonic()
         self._timer = context.loop.call_every(_CHECK_PERIOD_S, self._check)
 
@@ -226,8 +212,7 @@ class MemberProcess:
         """Stop to observe the process."""
         self._timer.cancel()
         self.requests.close()
-        self._context.loop.remove(self._reports)
-        self._context.manager.destroy_subscription(self._reports)
+        self._reports.close()
 
     def __str__(self) -> str:
         return f"process '{self._process.name}'"
@@ -258,9 +243,7 @@ class MemberProcess:
 
     def _not_reported(self) -> str:
         """Return that the process has not reported in time, and as much of the reason as known."""
-        is_found = self._context.manager.count_publishers(self._reports.topic_name)
-        reason = "its reports do not arrive" if is_found else "it is not in the ROS graph"
-        reason = self._problem or reason
+        reason = self._reports.missing
         if self._life is None and is_held(self._name):
             reason += ", and another process holds its instance lock"
         return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
@@ -299,13 +282,16 @@ class MemberProcess:
 
     # --- reports
 
-    def _on_message(self, taken: tuple[String, Any]) -> None:
-        self._on_report(taken[0].data)
-
     def _on_report(self, text: str) -> None:
-        report, life = self._read(text)
-        if report is None or life is None or report.is_starting:
+        found = self._reports.read(text, self._life, self.requests.ask_for_report_key)
+        if found is None:
             return
+        report, key = found
+        life = self._life_of(report, key)
+        if life is not None and not report.is_starting:
+            self._receive(report, life)
+
+    def _receive(self, report: SystemReport, life: MemberLife) -> None:
         has_returned = bool(life.lost) or (life.last is None and life.child is None)
         before = life.states
         if any(before.get(now.node, now).state != now.state for now in report.nodes):
@@ -342,38 +328,15 @@ class MemberProcess:
         self.timings = replace(timings, callbacks=tuple(called))
 
     def _on_report_key(self, key: str) -> None:
-        """Read the report again for which the service of its process was asked for the key."""
-        self._answered_key = key
-        self._on_report(self._unsigned)
+        self._reports.on_key(key)
 
-    def _read(self, content: str) -> tuple[SystemReport | None, MemberLife | None]:
-        """Return the report in a message and the life that it belongs to, if it counts."""
+    def _life_of(self, report: SystemReport, key: str) -> MemberLife | None:
+        """Return the life that a report belongs to; None if the report does not count."""
         life = self._life
-        if life is not None and is_signed(content, life.report_key):
-            report = self._parsed(content)
-            is_new = report and (life.last is None or report.number > life.last.number)
-            return report, life if is_new else None
-        if life is not None and life.child is not None:
-            return None, None
-        key_here = report_key(self._name)
-        key = self._answered_key if key_here is None else key_here
-        if is_signed(content, key):
-            report = self._parsed(content)
-            return report, self._next_life(report, key) if report else None
-        if key_here is None:
-            self._unsigned = content
-            self.requests.ask_for_report_key()
-        return None, None
-
-    def _parsed(self, content: str) -> SystemReport | None:
-        """Return the signed report in a message; warn once of a process of another version."""
-        try:
-            return decode(split_signature(content)[1], SystemReport)
-        except ProtocolError as error:
-            if str(error) != self._problem:
-                self._problem = str(error)
-                self._warn(f"reports what cannot be read: {error}")
-            return None
+        if life is None or key != life.report_key:
+            return self._next_life(report, key)
+        is_new = life.last is None or report.number > life.last.number
+        return life if is_new else None
 
     def _next_life(self, report: SystemReport, key: str) -> MemberLife | None:
         """Return the life of a process that was started elsewhere; None if it is not to be used."""

@@ -3,7 +3,7 @@
 DDS repeats lost packets, but a request or its response may be lost nevertheless: rmw drops a
 response to a client that the service has not discovered yet, and a full queue the oldest request.
 So a step without a result is requested again. The process recognizes it by its number, and never
-runs it twice: see :mod:`composer.runtime.manager.received_steps`.
+runs it twice: see :mod:`composer.runtime.manager.member_service`.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from composer.client.graph_names import NotFoundError
 from composer.client.lifecycle import LifecycleClient, TransitionError
-from composer.client.name_matching import NotFoundError
 from composer.client.session import Deadline, NoResponseError, Session
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import wait_until

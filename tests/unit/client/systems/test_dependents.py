@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from composer.client.systems.dependents import active_dependents, inactive_dependents, lowered
+from composer.client.systems.lifecycle_batch import active_dependents, inactive_dependents, lowered
 
 
 @dataclass

@@ -1,0 +1,194 @@
+"""The topics of the manager: ``/diagnostics``, and the reports ``state`` and ``callbacks``.
+
+States are published on each change, and while there are subscriptions every second and for each new
+one. Timings of callbacks are published every second while there are subscriptions.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
+from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+
+from composer.base.fast_dataclass import dataclass
+from composer.runtime.executors.event_counts import EventCounts
+from composer.runtime.executors.loop import Loop
+from composer.runtime.manager.diagnostics import diagnostic_array
+from composer.runtime.protocol.codec import encode
+from composer.runtime.protocol.reports import (
+    CallbackFigures,
+    ChainFigures,
+    SystemReport,
+    TimingReport,
+    signed,
+)
+from composer.runtime.protocol.requests import CALLBACKS_TOPIC, STATE_TOPIC
+from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS
+from composer.runtime.supervision.status import Status
+
+_DIAGNOSTICS = "/diagnostics"
+_NS_PER_S = 10**9
+_LONGEST_PERIOD_S = 1.0
+#: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
+#: several milliseconds, so changes then wait longer: messages take at most 2 % of the time. While
+#: more changes follow, they wait for half a second.
+_BATCH_S = 0.05
+_LONGEST_BATCH_S = 0.5
+_MAX_SHARE = 0.02
+#: A stopped process does not keep others from getting the status.
+_ACKNOWLEDGED_WITHIN_S = 0.2
+_ACKNOWLEDGMENT_PERIOD_S = 0.02
+_AT_ONCE = Duration()
+
+
+@dataclass(frozen=True, slots=True)
+class ReportSources:
+    """Where reports come from: ``callbacks()`` and ``chains()`` return timings.
+
+    ``completed(report)`` adds what the coordinating process of the system needs to know, and
+    ``on_report(number)`` is called when a report is the current one. With ``key``, reports are
+    signed.
+    """
+
+    status: Status
+    callbacks: Callable[[], tuple[CallbackFigures, ...]]
+    chains: Callable[[], tuple[ChainFigures, ...]]
+    completed: Callable[[SystemReport], SystemReport]
+    on_report: Callable[[int], None]
+    key: str
+
+
+class ReportPublisher:
+    """Publishes reports of the system. Use it on ``loop``, except for :meth:`publish_soon`."""
+
+    def __init__(self, node: Node, loop: Loop, events: EventCounts, sources: ReportSources) -> None:
+        self._node = node
+        self._loop = loop
+        self._events = events
+        self._sources = sources
+        self._started_s = time.monotonic()
+        self._is_waiting = False  # for subscriptions that do not have the last message yet
+        self._publish_due = threading.Lock()  # held while a message with changes is due
+        self._batch_s = _BATCH_S
+        self._changed_s = self._due_s = 0.0  # monotonic: the last change, when it is published
+        self._published_s = 0.0  # monotonic
+        #: The number of reports so far.
+        self.number = 0
+        self._diagnostics = self._publisher(DiagnosticArray, _DIAGNOSTICS, 10, self.publish)
+        self._state = self._publisher(String, f"~/{STATE_TOPIC}", STATE_QOS, self.publish)
+        self._callbacks = self._publisher(
+            String, f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
+        )
+
+    @property
+    def uptime_s(self) -> float:
+        """How long the process has run; not by the time of day, which may differ between hosts."""
+        return time.monotonic() - self._started_s
+
+    def report(self) -> SystemReport:
+        """Return the current report. Thread-safe."""
+        status = self._sources.status.snapshot()
+        return self._sources.completed(replace(status, at_s=self._now_s, number=self.number))
+
+    def timings(self) -> TimingReport:
+        """Return the current timings. Thread-safe."""
+        return TimingReport(self._sources.callbacks(), self._sources.chains(), self._now_s)
+
+    def tick(self) -> None:
+        """Publish for subscriptions. Call it every second."""
+        if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
+            self.publish()
+        else:
+            self._sources.on_report(self.number)
+        if self._callbacks.get_subscription_count():
+            self._publish_callbacks()
+
+    def publish(self) -> None:
+        """Publish the status once all subscriptions have the last one.
+
+        A message that replaces it earlier would be reported as lost by ``ros2 topic echo``.
+        """
+        if self._is_waiting:
+            return
+        self._is_waiting = True
+        self._publish_by(time.monotonic() + _ACKNOWLEDGED_WITHIN_S)
+
+    def publish_first(self) -> None:
+        """Publish the first change of a batch at once, for processes that wait for it."""
+        if time.monotonic() - self._published_s > self._batch_s:
+            self.publish()
+        else:
+            self.publish_soon()
+
+    def publish_soon(self) -> None:
+        """Publish a change, with others that follow. Thread-safe."""
+        self._changed_s = time.monotonic()
+        if self._publish_due.acquire(blocking=False):
+            self._due_s = self._changed_s + max(self._batch_s, _LONGEST_BATCH_S)
+            self._loop.call_later(self._batch_s, self._publish_changes)
+
+    def publish_now(self) -> None:
+        """Publish the status, whether subscriptions have the last one or not."""
+        start_s = time.monotonic()
+        self.number += 1
+        report = self.report()
+        self._state.publish(String(data=signed(encode(report), self._sources.key)))
+        self._sources.on_report(self.number)
+        if self._diagnostics.get_subscription_count():
+            chains, callbacks = self._sources.chains(), self._sources.callbacks()
+            self._diagnostics.publish(diagnostic_array(report, self.uptime_s, chains, callbacks))
+        self._published_s = time.monotonic()
+        took_s = self._published_s - start_s
+        self._batch_s = min(max(_BATCH_S, took_s / _MAX_SHARE), _LONGEST_PERIOD_S)
+
+    @property
+    def _now_s(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds / _NS_PER_S)
+
+    def _publisher(
+        self, kind: type[Any], name: str, profile: QoSProfile | int, publish: Callable[[], None]
+    ) -> Publisher:
+        """Create a publisher; call ``publish`` for each new subscription."""
+        publisher = self._node.create_publisher(kind, name, profile)
+        subscriptions = 0
+
+        def on_matched() -> None:
+            nonlocal subscriptions
+            before, subscriptions = subscriptions, publisher.get_subscription_count()
+            if subscriptions > before:
+                publish()
+
+        with suppress(UnsupportedEventTypeError):  # then the next message follows within a second
+            event = QoSPublisherEventType.RCL_PUBLISHER_MATCHED
+            self._events.watch(publisher.handle, event, on_matched)
+        return publisher
+
+    def _publish_callbacks(self) -> None:
+        self._callbacks.publish(String(data=encode(self.timings())))
+
+    def _publish_changes(self) -> None:
+        left_s = min(self._changed_s + self._batch_s, self._due_s) - time.monotonic()
+        if left_s > 0.0:
+            self._loop.call_later(left_s, self._publish_changes)
+            return
+        self._publish_due.release()
+        self.publish()
+
+    def _publish_by(self, end_s: float) -> None:
+        if time.monotonic() < end_s and not self._state.wait_for_all_acked(_AT_ONCE):
+            self._loop.call_later(_ACKNOWLEDGMENT_PERIOD_S, partial(self._publish_by, end_s))
+            return
+        self._is_waiting = False
+        self.publish_now()
