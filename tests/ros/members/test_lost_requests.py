@@ -70,7 +70,7 @@ def test_a_request_that_a_full_queue_has_dropped_is_sent_again(tmp_path: Path, p
         assert finished(pause).success
         problem = "process 'other' has not received 'deactivate /lab/camera'; it is requested again"
         assert system.log().count(problem) == 1
-        assert labels(moves) == ["deactivating", "inactive"]
+        wait_until(lambda: labels(moves) == ["deactivating", "inactive"], "the transitions")
         assert not system.reported(NodeFailed)
 
 
