@@ -30,7 +30,8 @@ import yaml
 
 from composer.base.diagnostics import Diagnostic, Severity
 from composer.interfaces import Interfaces
-from composer.loading import LoadResult, collect_diagnostics, load
+from composer.loading import load
+from composer.loading.reported import LoadResult, collect_diagnostics
 from composer.project import Project
 from composer.project.node_types import interface_folders
 

@@ -15,7 +15,8 @@ from composer.base.source import SourceFile
 from composer.language.document import parse_document
 from composer.language.document.writer import write_document
 from composer.language.tree import Mapping, plain
-from composer.loading import LoadResult, gives_same_model, load
+from composer.loading import gives_same_model, load
+from composer.loading.reported import LoadResult
 from composer.model.assembly.canonical import canonical
 from tests.examples import examples
 from tests.properties.trees import maps, trees

@@ -9,7 +9,8 @@ from hypothesis import example, given
 
 from composer.language.document.writer import write_document
 from composer.language.rules import UNUSED_DECLARATION
-from composer.loading import collect_diagnostics, load
+from composer.loading import load
+from composer.loading.reported import collect_diagnostics
 from composer.model.assembly.canonical import canonical
 from tests.examples import examples
 from tests.properties.surfaces import SURFACES, TEXTS

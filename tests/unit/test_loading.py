@@ -7,7 +7,8 @@ import pytest
 from composer.base.diagnostics import Severity
 from composer.base.resources import nodes_folder, systems_folder
 from composer.interfaces import Interfaces
-from composer.loading import LoadResult, load, load_bytes
+from composer.loading import load, load_bytes
+from composer.loading.reported import LoadResult
 from composer.model.resolve import OverrideOptions
 from composer.project.files import find_files
 

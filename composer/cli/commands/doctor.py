@@ -28,7 +28,7 @@ from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.doctor import CheckResult, Level
-    from composer.loading import LoadResult
+    from composer.loading.reported import LoadResult
     from composer.model import System
 
 EPILOG = examples(

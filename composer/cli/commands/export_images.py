@@ -18,7 +18,7 @@ from composer.cli.support.terminal import lines, write, write_raw
 
 if TYPE_CHECKING:
     from composer.bridges.export.container_image import Contents
-    from composer.loading import LoadResult
+    from composer.loading.reported import LoadResult
     from composer.model import System
 
 #: The host and the path of an image, and a tag or a digest.

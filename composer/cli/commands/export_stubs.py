@@ -17,7 +17,7 @@ from composer.cli.support.system_arguments import path_exists
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
-    from composer.loading import LoadResult
+    from composer.loading.reported import LoadResult
     from composer.project import Project
     from composer.python_code.stubs.behaviors import NamedNode
     from composer.python_code.stubs.folder import FolderChanges

@@ -146,7 +146,8 @@ class _Checked:
 
 def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
     from composer.language.document.limits import MAX_BYTES
-    from composer.loading import collect_diagnostics, load_bytes, load_files
+    from composer.loading import load_bytes, load_files
+    from composer.loading.reported import collect_diagnostics
     from composer.project.files import find_files
 
     for path in paths:

@@ -17,7 +17,7 @@ from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.hosts.deployment import RemoteProcess
-    from composer.loading import LoadResult
+    from composer.loading.reported import LoadResult
     from composer.model import Host, LogLevel, System
     from composer.project.copied_files import CopiedFiles
 

@@ -15,7 +15,7 @@ from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.terminal import say, say_raw, use_color
 
 if TYPE_CHECKING:
-    from composer.loading import LoadResult
+    from composer.loading.reported import LoadResult
     from composer.model import System
 
 #: Suffixes of folders and files that are suggested for a mistyped path.

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Severity
-from composer.loading import collect_diagnostics, load_files, project_diagnostics
+from composer.loading import load_files
+from composer.loading.reported import collect_diagnostics, project_diagnostics
 from tests.unit.support.checking import diagnostics_in, rules_broken
 
 TWIST = "geometry_msgs/msg/Twist"

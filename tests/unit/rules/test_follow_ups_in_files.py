@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import collect_diagnostics, load
+from composer.loading import load
+from composer.loading.reported import collect_diagnostics
 from tests.unit.rules.test_follow_ups import system
 from tests.unit.support.checking import diagnostics_in, rules_broken
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Diagnostic
-from composer.loading import load, project_diagnostics
+from composer.loading import load
+from composer.loading.reported import project_diagnostics
 
 FILES = {
     "nodes/planner.yaml": "node: planner\non_activate: {log: ready}\n",

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Diagnostic
-from composer.loading import collect_diagnostics, load, load_files
+from composer.loading import load, load_files
+from composer.loading.reported import collect_diagnostics
 from composer.model import Node
 
 SENSOR = """\

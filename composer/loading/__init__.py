@@ -7,37 +7,32 @@ before it produced, even if that has errors, so that one run shows every diagnos
 from __future__ import annotations
 
 import gc
-import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Map
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import field
 from functools import partial
-from itertools import takewhile
 from pathlib import Path
-from typing import TypeAlias
 
 from composer.base.diagnostics import (
     Diagnostic,
     Severity,
-    has_errors,
     in_order,
     registered_rules,
     shown,
 )
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import read_regular
 from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
 from composer.language.document import parse_bytes, read_document
-from composer.language.document.limits import MAX_BYTES, MAX_ENTRIES
+from composer.language.document.limits import MAX_ENTRIES
 from composer.language.expand import expand
 from composer.language.rules import TOO_LARGE
 from composer.language.schema import check_schema, kind_of, kinds
 from composer.language.schema.kinds import check_kind
 from composer.language.tree import Mapping
 from composer.language.tree import Sequence as ListTree
-from composer.model import System
+from composer.loading.reported import Identity, LoadResult, identity, may_be_included
 from composer.model.assembly import NodeTypeFile, assemble, inherit
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
@@ -48,42 +43,7 @@ from composer.project.settings import apply_rule_settings, check_rule_settings
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.analysis.subjects import joined, without_consequences
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
-from composer.rules.node_types import unused_node_types
 from composer.rules.type_check import TypeCheck
-
-#: What identifies a diagnostic across the systems in which it appears: its rule and place.
-_Identity: TypeAlias = tuple[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class LoadResult:
-    """The model and the diagnostics of a file.
-
-    ``system`` is None if too little of the file could be read. ``node_types`` and ``interfaces``
-    are the definitions that the file could refer to. ``tree`` is the file merged with everything
-    that it includes or extends.
-    """
-
-    system: System | None
-    diagnostics: list[Diagnostic]
-    source: SourceFile
-    project: Project
-    node_types: NodeTypes
-    interfaces: Interfaces
-    tree: Mapping | None = None
-    #: What was left out because it follows from another diagnostic, also if other systems with
-    #: the same node types report it; and the used comments that they would report as unused.
-    follow_ups: frozenset[_Identity] = frozenset()
-
-    @property
-    def is_valid(self) -> bool:
-        """True for a system or node type without errors."""
-        return self.system is not None and not has_errors(self.diagnostics)
-
-    @property
-    def is_runnable(self) -> bool:
-        """True for a system without errors."""
-        return self.system is not None and not self.system.node_type and self.is_valid
 
 
 @contextmanager
@@ -285,28 +245,17 @@ def _location(file: _Resolved) -> Path:
     return file.definitions.folder / Path(file.source.path).name
 
 
-def _may_be_included(path: Path, project: Project, checked: Collection[Path]) -> bool:
-    """Return whether a file next to or above this one, which is not checked now, names it."""
-    folders = takewhile(project.holds, path.parents)
-    for other in (item for folder in folders for item in folder.glob("*.y*ml")):
-        if other not in checked and project.holds(other):
-            with suppress(OSError):
-                if os.fsencode(path.name) in read_regular(other, MAX_BYTES):
-                    return True
-    return False
-
-
 def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> LoadResult:
     """Return what is reported of a file in the end; ``checked`` are all files of this run."""
     source, context = file.source, file.context
     project = file.definitions.project
     diagnostics = file.diagnostics
-    follow_ups: frozenset[_Identity] = frozenset()
+    follow_ups: frozenset[Identity] = frozenset()
     if context is not None:
         diagnostics += reported(context, types.diagnostics(context, diagnostics))
         kept = without_consequences(diagnostics, project.diagnostics)
         kept = joined(deduplicate(kept, context.system.nodes))
-        follow_ups = frozenset(map(_identity, diagnostics)).difference(map(_identity, kept))
+        follow_ups = frozenset(map(identity, diagnostics)).difference(map(identity, kept))
         diagnostics = kept
 
     # Selection: comments in the files and settings of the project silence diagnostics.
@@ -317,7 +266,7 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
         diagnostics,
         source,
         complete=is_complete,
-        may_be_needed=partial(_may_be_included, _location(file), project, checked),
+        may_be_needed=partial(may_be_included, _location(file), project, checked),
     )
     follow_ups |= {(UNUSED_IGNORE.code, str(comment)) for comment in used}
     all_checks()  # import every rule, so that all names in the settings are known
@@ -416,55 +365,3 @@ def gives_same_model(result: LoadResult, text: str) -> bool:
         text.encode(), Path.cwd(), shown=result.source.path, interfaces=result.interfaces
     )
     return again.system == result.system
-
-
-def collect_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
-    """Return the diagnostics of all files together, each once.
-
-    A diagnostic in a file that was loaded itself is reported with that file, not with the systems
-    that include or use it; any other is reported with the first of these systems.
-    """
-    reporter: dict[_Identity, LoadResult] = {}
-    for result in results:
-        for diagnostic in result.diagnostics:
-            if diagnostic.primary.file == result.source:
-                reporter[_identity(diagnostic)] = result
-    diagnostics = project_diagnostics(results)
-    follow_ups = frozenset().union(*(result.follow_ups for result in results))
-    for result in results:
-        diagnostics += (
-            diagnostic
-            for diagnostic in result.diagnostics
-            if _identity(diagnostic) not in follow_ups
-            and reporter.setdefault(_identity(diagnostic), result) is result
-        )
-    return in_order(diagnostics)
-
-
-def _identity(diagnostic: Diagnostic) -> _Identity:
-    """Return what identifies a diagnostic across the systems in which it appears."""
-    return (diagnostic.rule.code, str(diagnostic.primary))
-
-
-#: Rules whose diagnostics may be about node types, also those that were left out as follow-ups.
-_HIDING_NODE_TYPES = ("bad-setting", "unknown-base", "unknown-node-type")
-
-
-def _lacks_node_types(result: LoadResult) -> bool:
-    """Return whether a system may use node types that are not in its model."""
-    rules = {diagnostic.rule.name for diagnostic in result.diagnostics}
-    return result.system is None or not rules.isdisjoint(_HIDING_NODE_TYPES)
-
-
-def project_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
-    """Return the diagnostics that need several files, such as unused node types."""
-    systems = [result.system for result in results if result.system is not None]
-    if any(_lacks_node_types(result) for result in results):
-        return []
-    settings = {result.source.path: result.project.settings for result in results}
-    diagnostics: list[Diagnostic] = []
-    for diagnostic in unused_node_types(systems):
-        file = diagnostic.primary.file
-        kept, _ = without_ignored([diagnostic], file, complete=False)
-        diagnostics += apply_rule_settings(kept, settings[file.path])
-    return in_order(diagnostics)
