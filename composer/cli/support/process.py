@@ -47,7 +47,7 @@ class ReportingProcess:
         errors: BinaryIO | None = None,
         environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        """Start ``compose`` with ``words``; ``variable`` tells it the descriptor for its report."""
+        """Start ``compose`` with ``words``; ``variable`` has the descriptor for its report."""
         self._reading, writing = os.pipe()
         try:
             self.process = subprocess.Popen(  # noqa: S603 - this very program
