@@ -33,7 +33,13 @@ from composer.python_code.trees import (
 from composer.rules.analysis.context import Context, behaviors, distinct_behaviors
 from composer.rules.analysis.formatting import a
 from composer.rules.analysis.subjects import wiring
-from composer.rules.python import CLASS_MISSING, as_warning, missing, unnamed
+from composer.rules.python import (
+    CLASS_MISSING,
+    WRONG_MESSAGE_TYPE,
+    as_warning,
+    missing,
+    unnamed,
+)
 
 MISSING_HANDLER = error("RC433", "missing-handler")
 HANDLER_WITHOUT_PORT = error("RC434", "handler-without-port")
@@ -134,7 +140,7 @@ def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
             label = Label(source.reference.text.span, "the behavior of this node")
             span = span_of(annotation, scope.source)
             given = (("type", f"{node.name}.{_stem(name)}"),)
-            rule = as_warning(HANDLER_SIGNATURE)
+            rule = as_warning(WRONG_MESSAGE_TYPE)
             yield Diagnostic(rule, message, span, (label,), relies_on=given)
 
 

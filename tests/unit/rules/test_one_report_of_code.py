@@ -177,7 +177,7 @@ MISTAKES: dict[str, tuple[dict[str, str], Places]] = {
     ),
     "a service that annotates a message": (
         {"system.yaml": ECHO_BY_CODE.replace("String", "Empty"), "code.py": EMPTY},
-        [("handler-signature", "code.py", 5)],
+        [("wrong-message-type", "code.py", 5)],
     ),
     "a port that a class and a connection name otherwise": (
         {"system.yaml": CLASS_PORT, "talker.py": TALKER},
