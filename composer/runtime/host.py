@@ -251,7 +251,7 @@ class Host:
 
     def _make_listener(self, node: Node) -> NodeListener:
         return SupervisionListener(
-            node, self._supervisor.shared, self._main_queue, self._status, self._reporter
+            node, self._supervisor.reconciler.shared, self._main_queue, self._status, self._reporter
         )
 
     def _create(self, process: ProcessContext) -> bool:
@@ -275,7 +275,7 @@ class Host:
 
     def _bring_up_and_supervise(self) -> None:
         monitor = HealthMonitor(
-            self._node_set, self._supervisor.shared, self._main_queue.put, self._reporter
+            self._node_set, self._supervisor.reconciler.shared, self._main_queue.put, self._reporter
         )
         monitor.start()
         try:

@@ -102,7 +102,7 @@ def test_all_forms_of_a_connection_are_offered(
     [
         ("system: s\nqos_profiles: {q: {rel|iability: reliable}}", "lost messages are sent again"),
         ("system: s\nqos_profiles: {q: {dead|line_ms: 5}}", "Maximum time between two messages"),
-        ("system: s\nexecutors: {e: {ki|nd: events}}", "one callback at a time"),
+        ("system: s\nexecutors: {e: {ki|nd: events}}", "How many callbacks run"),
         ("system: s\nexecutors: {e|e: {kind: events}}", "calls the callbacks of its nodes"),
         ("system: s\nlifecycle: {on_f|ailure: isolate}", "What to do when a node fails"),
         ("system: s\nconnections: [{fr|om: n.a}]", "The publisher or publishers"),
@@ -126,7 +126,7 @@ def test_all_forms_of_a_connection_are_offered(
         (NODE_OF + "transforms: {look|up: [map]}", "The frames that the node looks up"),
         (NODE_OF + "transforms: {static: {l: {par|ent: b}}}", "The parent frame"),
         (NODE_OF + "transforms: {static: {l|l: {parent: b}}}", "The pose of a child frame"),
-        (NODE_OF + "transforms: {dynamic: {l: {fr|om: b}}}", "A subscription of the node"),
+        (NODE_OF + "transforms: {dynamic: {l: {fr|om: b}}}", "The subscription of the node"),
     ],
 )
 def test_a_key_is_described(server: LanguageServer, text: str, shown: str) -> None:

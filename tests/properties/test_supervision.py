@@ -367,7 +367,7 @@ class Supervision(RuleBasedStateMachine):
         listener_of: dict[str, SupervisionListener] = {}
         for model in self.system.nodes:
             listener = SupervisionListener(
-                model, self.supervisor.shared, self.queue, status, reporter
+                model, self.supervisor.reconciler.shared, self.queue, status, reporter
             )
             listener_of[model.name.value] = listener
             self.world.nodes[model.name.value] = SimulatedNode(model, self.world, listener)

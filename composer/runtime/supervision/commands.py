@@ -131,7 +131,7 @@ class Commands:
         self.supervisor.set_goals(started, since)
         problem = self._recreate(since, names)
         if problem is None:
-            failures = self.supervisor.reconcile("restart requested")
+            failures = self.supervisor.reconciler.reconcile("restart requested")
             problem = str(failures[0]) if failures else None
         return problem or self._unreached_of(names)
 
@@ -157,7 +157,7 @@ class Commands:
             if problem is not None:
                 return f"{problem}; rolled back"
         self.supervisor.set_goals(goals, since, "running", forget_failures=forget_failures)
-        self.supervisor.reconcile_settled("bring-up requested")
+        self.supervisor.reconciler.reconcile_settled("bring-up requested")
         self.supervisor.settle()
         desired = self.supervisor.desired
         failed = [self.node_set.nodes[name].full_name for name in needed if name in desired.down]
@@ -176,7 +176,7 @@ class Commands:
         forget_failures: bool = False,
     ) -> str | None:
         self.supervisor.set_goals(goals, since, activity, forget_failures=forget_failures)
-        failures = self.supervisor.reconcile(cause)
+        failures = self.supervisor.reconciler.reconcile(cause)
         return str(failures[0]) if failures else None
 
     def _unreached(self, goals: Mapping[str, PrimaryState]) -> str | None:
@@ -289,5 +289,6 @@ class SystemStart:
         self.reporter.log(LogLevel.INFO, PROGRAM_LOGGER, text)
         serial = self.supervisor.desired.serial
         self.node_set.take_over()
-        self.supervisor.start(found.states(self.system), found.activity, serial)
-        self.supervisor.reconcile_settled("goal under the earlier coordinating process")
+        self.supervisor.set_goals(found.states(self.system), serial, found.activity)
+        self.status.set_activity(found.activity)
+        self.supervisor.reconciler.reconcile_settled("goal under the earlier coordinating process")

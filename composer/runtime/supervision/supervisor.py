@@ -29,7 +29,6 @@ from composer.runtime.supervision.main_queue import (
     NodeEvent,
     NodeMoved,
     NodeReturned,
-    SharedDesiredState,
     StepEnded,
 )
 from composer.runtime.supervision.phases import ExecutionOptions, StepFailed
@@ -47,18 +46,14 @@ class Supervisor:
         self._node_set = reconciler.node_set
         self._main_queue = reconciler.main_queue
         self._status = reconciler.status
-        self._reconciler = reconciler
+        self.reconciler = reconciler
+        self._shared = reconciler.shared
         self._faults = FaultHandler(reconciler)
-
-    @property
-    def shared(self) -> SharedDesiredState:
-        """The desired state. The nodes change it, too: they record external transitions."""
-        return self._reconciler.shared
 
     @property
     def desired(self) -> DesiredState:
         """The desired state now."""
-        return self.shared.value
+        return self._shared.value
 
     @property
     def has_failed_nodes(self) -> bool:
@@ -88,13 +83,8 @@ class Supervisor:
             kept = desired.forget_failures() if forget_failures else desired
             return kept.with_goals(goals, since, activity)
 
-        self.shared.update(change)
-        self._reconciler.publish_desired()
-
-    def start(self, goals: Mapping[str, PrimaryState], activity: str, since: int) -> None:
-        """Set the first goals, and the activity of the system."""
-        self.set_goals(goals, since, activity)
-        self._status.set_activity(activity)
+        self._shared.update(change)
+        self.reconciler.publish_desired()
 
     def bring_up(
         self,
@@ -112,25 +102,25 @@ class Supervisor:
         end_s = time.monotonic() + within_s
         self._faults.before = self._node_set.states(), since
         self.set_goals(goals, since, "running")
-        self.reconcile_settled("bring-up", end_s)
-        self.run(run_command, end_s, until=lambda: self._reconciler.is_settled)
+        self.reconciler.reconcile_settled("bring-up", end_s)
+        self.run(run_command, end_s, until=lambda: self.reconciler.is_settled)
         desired, reason = self.desired, ""
-        if not self._reconciler.is_settled:
+        if not self.reconciler.is_settled:
             reason = f"bring-up timed out after {within_s:g} s"
         elif is_nothing_left(self._system, desired):
             reason = next(iter(desired.down.values()))
         before, self._faults.before = self._faults.before, None
         if self._main_queue.stopping or not reason:
             return None
-        failed = (*desired.down, *desired.unhandled, *self._reconciler.moving)
+        failed = (*desired.down, *desired.unhandled, *self.reconciler.moving)
         names = (self._node_set.nodes[name].full_name for name in failed)
         name = next(names, "the system")
-        self._reconciler.roll_back(*before, name, reason)
+        self.reconciler.roll_back(*before, name, reason)
         return f"{name} failed"
 
     def settle(self) -> None:
         """Handle events until no required node is on its way up, or a command comes."""
-        self.run(None, until=lambda: self._reconciler.is_settled)
+        self.run(None, until=lambda: self.reconciler.is_settled)
 
     def bring_up_together(self, plan: Plan, since: int, within_s: float = math.inf) -> str | None:
         """Execute a plan, all or nothing; return why it failed and was rolled back, or None.
@@ -140,13 +130,13 @@ class Supervisor:
         before = self._node_set.states()
         end_s = time.monotonic() + within_s
         options = ExecutionOptions(end_s=end_s, serial=since)
-        failures = self._reconciler.execute(plan, options)
+        failures = self.reconciler.execute(plan, options)
         if not failures:
             return None
         step, reason = failures[0].step, failures[0].text
         if time.monotonic() >= end_s:
             reason = f"{step.transition} failed: bring-up timed out after {within_s:g} s"
-        self._reconciler.roll_back(before, since, step.full_name, reason)
+        self.reconciler.roll_back(before, since, step.full_name, reason)
         return f"{step.full_name}: {reason}"
 
     def take_down(self, names: Iterable[str], cause: str) -> tuple[StepFailed, ...]:
@@ -160,26 +150,18 @@ class Supervisor:
             lowered = lowered.fail(Fault(name, FaultKind.STEP, cause, lowered.serial))
         plan = reconcile(self._system, lowered, self._node_set.states(), cause)
         options = ExecutionOptions(best_effort=True, serial=desired.serial)
-        return self._reconciler.execute(plan, options)
+        return self.reconciler.execute(plan, options)
 
     def release(self, names: Iterable[str]) -> None:
         """Forget the failures of nodes and their restarts."""
-        self.shared.update(partial(DesiredState.forget_failures, nodes=tuple(names)))
-
-    def reconcile(self, cause: str) -> tuple[StepFailed, ...]:
-        """Take every node to its desired state; failures on the way become faults."""
-        return self._reconciler.reconcile(cause)
-
-    def reconcile_settled(self, cause: str = "", end_s: float = math.inf) -> None:
-        """Take nodes to their desired states; see :meth:`.Reconciler.reconcile_settled`."""
-        self._reconciler.reconcile_settled(cause, end_s)
+        self._shared.update(partial(DesiredState.forget_failures, nodes=tuple(names)))
 
     def tear_down(self, plan: Plan, end_s: float, step_limit_s: float) -> bool:
         """Execute a plan as far as possible; return whether nothing failed."""
         options = ExecutionOptions(
             best_effort=True, stoppable=False, end_s=end_s, step_limit_s=step_limit_s
         )
-        return not self._reconciler.execute(plan, options)
+        return not self.reconciler.execute(plan, options)
 
     # --- events
 
@@ -218,7 +200,7 @@ class Supervisor:
             case NodeMoved() as moved:
                 self._on_moved([moved, *self._main_queue.take_next(NodeMoved)])
             case StepEnded(node=name):
-                self._reconciler.end_step(name)
+                self.reconciler.end_step(name)
             case LoopRecovered() as recovered:
                 self._faults.on_loop_recovered(recovered)
             case NodeReturned(node=name):
@@ -227,7 +209,7 @@ class Supervisor:
     def _on_moved(self, moved: Sequence[NodeMoved]) -> None:
         causes = tuple(dict.fromkeys(item.cause for item in moved if item.cause))
         more = f" and {len(causes) - _MAX_CAUSES} more" * (len(causes) > _MAX_CAUSES)
-        self.reconcile_settled(", ".join(causes[:_MAX_CAUSES]) + more)
+        self.reconciler.reconcile_settled(", ".join(causes[:_MAX_CAUSES]) + more)
 
     def restart(self, restarts: Iterable[Restart]) -> None:
         """Restart failed nodes together, unless external transitions come first."""
@@ -236,7 +218,7 @@ class Supervisor:
             name, serial = restart.node, self.desired.serial
             if self.desired.scheduled.get(name) != restart:
                 continue
-            self.shared.update(partial(DesiredState.restart, node=name, at_s=time.monotonic()))
+            self._shared.update(partial(DesiredState.restart, node=name, at_s=time.monotonic()))
             self._status.count_restart(name)
             problem = self._node_set.recreate(name, partial(self.has_moved, name, serial))
             if problem is not None:
@@ -244,12 +226,12 @@ class Supervisor:
                     [Fault(name, FaultKind.TRANSITION, problem, self.desired.serial)]
                 )
                 continue
-            self._reconciler.note_restart(name, restart.attempt)
+            self.reconciler.note_restart(name, restart.attempt)
             texts.append(f"restart {restart.attempt} of {self._node_set.nodes[name].full_name}")
         if texts:
-            self.reconcile_settled(", ".join(texts))
+            self.reconciler.reconcile_settled(", ".join(texts))
 
     def _on_returned(self, name: str) -> None:
         """Bring a node up again that was not there, or not as expected, and what depends on it."""
-        self.shared.update(partial(DesiredState.release, node=name))
-        self.reconcile_settled(f"{self._node_set.nodes[name].full_name} is there again")
+        self._shared.update(partial(DesiredState.release, node=name))
+        self.reconciler.reconcile_settled(f"{self._node_set.nodes[name].full_name} is there again")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.metrics.statistics import ChainStatistics
+from composer.runtime.protocol.reports import ChainFigures
 from tests.ros.support.in_process import RunningSystem, running, wait_until
 
 BRAKE = """
@@ -40,22 +40,19 @@ class Detector:
 """
 
 
-def chain(system: RunningSystem, name: str) -> ChainStatistics:
-    return next(item for item in system.host._node_set._chains.statistics if item.name == name)
+def chain(system: RunningSystem, name: str) -> ChainFigures:
+    return next(item for item in system.host._node_set.chains() if item.chain == name)
 
 
 @pytest.mark.parametrize("more", ["", ", delivery: dds", ", isolation: copy"])
 def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_path: Path) -> None:
     with running(BRAKE.format(more=more), tmp_path, detector=DETECTOR) as system:
-        stop, see = chain(system, "stop"), chain(system, "see")
-        wait_until(lambda: stop.times.count > 10)
-        counted = stop.times.count  # first: both grow
+        wait_until(lambda: chain(system, "stop").count > 10)
+        counted = chain(system, "stop").count  # first: both grow
         # A message without new data does not count.
         assert counted <= system.node("lidar").sent("scan")
-    assert stop.late == stop.times.count
-    assert see.late == 0
-    assert see.times.mean_s > 0.003
-    # The shortest, within a tenth: the motor may receive a late message together with the next.
-    assert stop.times.percentile_s(0.0) >= see.times.percentile_s(0.0) >= 0.0027
     reported = {item.chain: item for item in system.stop().chains}
-    assert reported["stop"].count == stop.times.count
+    stop, see = reported["stop"], reported["see"]
+    assert stop.late == stop.count >= counted
+    assert see.late == 0
+    assert min(stop.mean_ms, see.mean_ms) > 3.0

@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,7 +17,9 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.qos import QoSProfile
 
-from tests.ros.support.in_process import Peer, wait_until
+from composer.model import PrimaryState
+from composer.runtime.supervision.events import NodeTransitionFailed
+from tests.ros.support.in_process import Peer, running, wait_until
 from tests.ros.support.system_process import RunningSystem
 
 SYSTEM = "systems/pipeline.yaml"
@@ -113,3 +117,20 @@ def test_no_external_transition_is_undone(
     print(f"{count} transitions, {len(failed)} failed, {len(moved)} changes of state")
     assert not failed
     assert len(moved) == count, "the supervisor has moved a node"
+
+
+def test_a_node_that_was_shut_down_meanwhile_does_not_fail(tmp_path: Path) -> None:
+    """As by the coordinating process of the system, when it also ends this one."""
+    text = "{system: robot, nodes: {arm: {}}}"
+    with running(text, tmp_path, autostart=PrimaryState.UNCONFIGURED) as system:
+        node, is_free = system.node("arm"), threading.Event()
+        node.loop.call_soon(is_free.wait)
+        change = node.loop.run_task(node.lifecycle.change("shutdown"))
+        tasks = len(node.loop._tasks)
+        system.host.stop("the test is over")
+        wait_until(lambda: len(node.loop._tasks) > tasks, "the step of the tear-down")
+        is_free.set()
+        assert system.end().exit_code == 0
+        assert change.result().success
+        assert not system.reported(NodeTransitionFailed)
+        assert "refused" not in system.log_text()
