@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from composer.client.hosts import inventory as inventory_module
-from composer.client.hosts.check import differences
 from composer.client.hosts.inventory import (
     Inventory,
     Question,
@@ -20,8 +19,11 @@ from composer.client.hosts.inventory import (
     take_inventory,
     written_question,
 )
-from composer.client.hosts.start import question_about
 from composer.loading import load
+
+pytest.importorskip("asyncssh", reason="asyncssh is not installed")
+from composer.client.hosts.check import differences
+from composer.client.hosts.start import question_about
 
 HERE = Inventory(
     python="3.11",
