@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from array import array
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from composer.base.diagnostics import suggestion
 from composer.base.source import SourceFile
+from composer.client.messages.field_paths import path_steps
 from composer.client.session import RosError
 from composer.interfaces import Interfaces
 from composer.interfaces.index import similar_interface
@@ -174,24 +174,3 @@ def _step(value: Any, step: str | int, path: str) -> Any:
             count = f"{len(value)} item{'' if len(value) == 1 else 's'}"
             raise InvalidValueError(f"'{path}': index {step} of {count}") from error
     raise InvalidValueError(f"'{path}': {value!r:.60} has no part '{step}'")
-
-
-_STEP = re.compile(r"(?P<name>\w+)(?P<indices>(?:\[\d+\])*)", re.ASCII)
-
-
-def path_steps(path: str) -> list[str | int]:
-    """Return the field names and indices of a path; ``ranges.3`` is the same as ``ranges[3]``.
-
-    Raises ValueError if it is not a path.
-    """
-    steps: list[str | int] = []
-    for part in path.split("."):
-        match = _STEP.fullmatch(part)
-        if match is None:
-            raise ValueError(
-                f"'{path}' is not a path of fields and indices, such as transforms[0].header.stamp"
-            )
-        name = match["name"]
-        steps.append(int(name) if name.isdigit() else name)
-        steps += map(int, re.findall(r"\d+", match["indices"]))
-    return steps

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from composer.base.diagnostics import suggestion
@@ -72,6 +73,8 @@ class Imports:
         if top in sys.stdlib_module_names and relative == name:
             return self._failed(rest or top, f"no module named '{name}'")
         nearby = nearby_modules(relative, self._folders(name))
+        if rest and nearby.missing in packages:  # only its definitions are here, as without ROS
+            nearby = replace(nearby, package=top, missing=rest.partition(".")[0])
         names = {*nearby.names}
         if nearby.package in packages:
             names.update(FOLDERS)
