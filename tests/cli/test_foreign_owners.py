@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +16,17 @@ import pytest
 from composer.client.run_log import Record
 from tests.cli.compose import Done, compose
 
-pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="only root can change owners")
+#: In folders that only root can enter, the other user could not run any command.
+PRIVATE = [
+    folder
+    for path in (Path(sys.prefix), Path(__file__))
+    for folder in path.resolve().parents
+    if not folder.stat().st_mode & stat.S_IXOTH
+]
+pytestmark = [
+    pytest.mark.skipif(os.geteuid() != 0, reason="only root can change owners"),
+    pytest.mark.skipif(bool(PRIVATE), reason=f"only root can enter {PRIVATE}"),
+]
 
 OTHER_USER = 65534
 RUN = "log/compose/robot/2026-03-01-08-30-00-000-1"
