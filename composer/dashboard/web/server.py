@@ -157,6 +157,15 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
         super().__init__(*arguments, **options)
         self.close_timeout = _CLOSED_WITHIN_S
 
+    async def send(self, message: Any) -> None:
+        """Send a message. Soon after the last one, the connection ends even without a reader.
+
+        Both this function and ``close`` of a transport wait until the other side has read.
+        """
+        if message["type"] == "websocket.close":
+            self.loop.call_later(self.close_timeout, self.transport.abort)
+        await super().send(message)
+
     def shutdown(self) -> None:
         """End the connection; one that the other side has just ended takes no message any more."""
         with suppress(InvalidState):

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import socket
 import struct
+import termios
+import time
+from array import array
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
@@ -23,8 +28,11 @@ from tests.ros.support.dashboard import (
     close_code,
     dashboard,
 )
+from tests.ros.support.in_process import wait_until
 
 MESSAGE, SERVICE = b"\x01", b"\x02"
+#: A part of what the camera publishes on /large.
+MESSAGE_SIZE = 100_000
 
 
 @pytest.fixture(scope="module")
@@ -227,6 +235,36 @@ def test_all_that_waits_for_a_client_has_one_limit_in_bytes(server: Dashboard) -
     assert server.memory_mb() < before_mb + 80
     with raw(server.address) as client:
         assert client.is_served()
+
+
+def test_the_end_does_not_wait_for_a_client_that_does_not_read(server: Dashboard) -> None:
+    with raw(server.address, max_queue=1, close_timeout=0, ping_interval=None) as client:
+        client.subscribe("/large")
+        unread = Unread(client.socket.socket)
+        wait_until(unread.is_full, "messages that wait")
+        with pytest.raises(ConnectionClosed):
+            send_forever(client)
+
+
+def send_forever(client: Raw) -> None:
+    while True:
+        client.send(b"\xff" * 100_000)
+
+
+class Unread:
+    """What waits in a socket. It is full once nothing has arrived for a while."""
+
+    def __init__(self, socket: socket.socket) -> None:
+        self._socket = socket
+        self._size = 0
+        self._full_at_s = 0.0
+
+    def is_full(self) -> bool:
+        size = array("i", [0])
+        fcntl.ioctl(self._socket, termios.FIONREAD, size)
+        if size[0] != self._size:
+            self._size, self._full_at_s = size[0], time.monotonic() + 1.5
+        return self._size > MESSAGE_SIZE and time.monotonic() > self._full_at_s
 
 
 def test_malformed_cdr_is_refused(server: Dashboard) -> None:
