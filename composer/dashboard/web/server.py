@@ -16,7 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
 from types import FrameType
-from typing import Any
+from typing import Any, cast
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -150,6 +150,27 @@ class _Server(uvicorn.Server):
                 connection.transport.abort()
 
 
+class _Transport:
+    """A transport that also ends while the other side does not read.
+
+    ``close`` of a transport of asyncio waits until everything was read.
+    """
+
+    def __init__(self, transport: asyncio.Transport, loop: asyncio.AbstractEventLoop) -> None:
+        self._transport = transport
+        self._loop = loop
+        self.write = transport.write
+
+    def close(self) -> None:
+        """Close; discard soon what is not read."""
+        if not self._transport.is_closing():
+            self._transport.close()
+            self._loop.call_later(_CLOSED_WITHIN_S, self._transport.abort)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+
 class _WebSocketProtocol(WebSocketsSansIOProtocol):
     """Does not wait long for the other side when a connection ends."""
 
@@ -157,13 +178,14 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
         super().__init__(*arguments, **options)
         self.close_timeout = _CLOSED_WITHIN_S
 
-    async def send(self, message: Any) -> None:
-        """Send a message. Soon after the last one, the connection ends even without a reader.
+    def connection_made(self, transport: Any) -> None:
+        """Begin a connection."""
+        super().connection_made(cast(asyncio.Transport, _Transport(transport, self.loop)))
 
-        Both this function and ``close`` of a transport wait until the other side has read.
-        """
+    async def send(self, message: Any) -> None:
+        """Send a message. The last one is not sent if earlier ones are not read in time."""
         if message["type"] == "websocket.close":
-            self.loop.call_later(self.close_timeout, self.transport.abort)
+            self.loop.call_later(self.close_timeout, self.transport.close)
         await super().send(message)
 
     def shutdown(self) -> None:

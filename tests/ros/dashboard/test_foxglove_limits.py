@@ -246,6 +246,15 @@ def test_the_end_does_not_wait_for_a_client_that_does_not_read(server: Dashboard
             send_forever(client)
 
 
+@pytest.mark.soak
+def test_a_client_that_reads_nothing_is_disconnected(server: Dashboard) -> None:
+    """It does not answer pings either: their time limit is 20 s, and they come every 20 s."""
+    with raw(server.address, max_queue=1, close_timeout=0, ping_interval=None) as client:
+        client.subscribe("/large")
+        connected = server.open_files()
+        wait_until(lambda: server.open_files() < connected, "the end", 60.0)
+
+
 def send_forever(client: Raw) -> None:
     while True:
         client.send(b"\xff" * 100_000)
