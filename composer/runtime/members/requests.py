@@ -290,10 +290,10 @@ class MemberRequests:
         refusal = "refused"
         try:
             answer = read_answer(pending.result(), self._document(sent))
-            if isinstance(answer, TimingReport):
-                self._on_timings(answer)
-            else:
+            if not isinstance(answer, TimingReport):
                 results = answer.results
+            elif sent.timings:  # else it is empty: the request has only brought goals
+                self._on_timings(answer)
         except ProtocolError as error:
             refusal = f"refused: {error}"
         for step, result in zip(sent.steps, results, strict=False):

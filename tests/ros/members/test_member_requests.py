@@ -253,6 +253,9 @@ def test_timings_and_goals_need_no_steps() -> None:
         wait_until(lambda: timings == [TimingReport(at_s=1.0)], "the timings")
         assert not requests.has_messages
         assert (process.goals, process.asked, process.steps) == ([GOALS], 1, [])
+        on.loop.run(lambda: requests.keep(GOALS))
+        wait_until(lambda: not requests.has_messages, "the goals")
+        assert timings == [TimingReport(at_s=1.0)], "the answer to goals is not the timings"
 
 
 def test_a_process_that_is_not_meant_neither_follows_nor_answers(
