@@ -50,6 +50,6 @@ def rules_folder() -> Path:
 
 
 def ament_prefixes(environment: Mapping[str, str] = os.environ) -> list[Path]:
-    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then that of this Python."""
+    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then this Python's."""
     listed = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return [Path(prefix) for prefix in dict.fromkeys((*filter(None, listed), sys.prefix))]

@@ -37,7 +37,7 @@ class GraphNames:
         """
         found = self._settled(lambda: self._graph.names(kind))
         if kind == "topic" and not self._session.others():
-            return ()  # they are those of this session
+            return ()  # they belong to this session
         return found if hidden else visible_names(found)
 
     def node(self, name: str, *, hidden: bool = False) -> NodeInfo:

@@ -137,7 +137,7 @@ class Bundle:
 
 
 def installed_prefixes() -> tuple[Prefix, ...]:
-    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then that of this Python."""
+    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then this Python's."""
     return tuple(map(Prefix, ament_prefixes()))
 
 

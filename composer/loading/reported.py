@@ -1,4 +1,4 @@
-"""What is reported: the diagnostics of a file, and those of several files together."""
+"""What is reported: the diagnostics of a file, and of several files together."""
 
 from __future__ import annotations
 

@@ -231,8 +231,8 @@ class Node:
     reactions: tuple[tuple[Event, Reaction], ...] = ()
     remappings: tuple[Remapping, ...] = ()
     executor: Located[str] | None = None
-    process: Located[str] | None = None  # not set: that of the system
-    log_level: Located[LogLevel] | None = None  # None: that of the run
+    process: Located[str] | None = None  # not set: as the system
+    log_level: Located[LogLevel] | None = None  # None: as the run
     required: bool = True  # False: the system is up without it
     depends_on: tuple[Dependency, ...] = ()
     autostart: Located[PrimaryState] | None = None

@@ -48,7 +48,7 @@ class InstalledProject:
 
 
 def installed_projects() -> tuple[InstalledProject, ...]:
-    """Return the installed projects, each package once, without those of other users."""
+    """Return the installed projects, each package once, but no projects of other users."""
     trusted = TrustedUsers.own()
     found: dict[str, InstalledProject] = {}
     for prefix in ament_prefixes():

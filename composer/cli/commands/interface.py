@@ -25,7 +25,7 @@ _WHEEL_PREFIX = "ros-"
 interface_app = command_group(
     """Show interface types, and build interface packages.
 
-    The types are those of installed packages and of the project, and the common types of ROS 2. To
+    Types come from installed packages, from the project, and from the common packages of ROS 2. To
     list and show types, ROS is not needed.
     """
 )
@@ -46,7 +46,7 @@ def list_interfaces(
     *,
     json: Json = False,
 ) -> None:
-    """List the types, or those of a package."""
+    """List all types, or the types of a package."""
     from composer.base.diagnostics import suggestion
 
     names = _names(_interfaces())
@@ -173,7 +173,7 @@ def _check(folders: tuple[Path, ...], packages: dict[str, Path | None]) -> None:
 def _chosen(
     folders: tuple[Path, ...], packages: list[str], *, install: bool
 ) -> dict[str, Path | None]:
-    """Return the folders of packages by their names; None for those of ROS. Raises CommandError."""
+    """Return the folders of packages by name; None for packages of ROS. Raises CommandError."""
     from composer.base.diagnostics import suggestion
     from composer.interfaces.sources import Bundle, find_packages, installed_prefixes
 

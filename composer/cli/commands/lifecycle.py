@@ -231,4 +231,4 @@ def _split(
     return words, transition
 
 
-add_system_commands(lifecycle_app)  # below those of ros2
+add_system_commands(lifecycle_app)  # below the commands of ros2

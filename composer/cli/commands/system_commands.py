@@ -1,4 +1,4 @@
-"""Commands to running systems: ``compose down``, and those of ``compose lifecycle``."""
+"""Commands to running systems: ``compose down``, and commands of ``compose lifecycle``."""
 
 from __future__ import annotations
 

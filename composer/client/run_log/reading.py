@@ -1,4 +1,4 @@
-"""Reads the log of a system: that of its run, and those of processes that its run does not log."""
+"""Reads the log of a system: of its run, and of processes that its run does not log."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from composer.client.shared_session import Sample, SampledTopic, SharedSession
     from composer.plan.drift import ObservedEndpoint
 
-#: Messages of these types are expected to be large; those of others are once one was.
+#: Messages of these types are expected to be large. Another type is large once a message was.
 LARGE_TYPES = frozenset(
     f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "PointCloud2", "PointCloud")
 ) | {"nav_msgs/msg/OccupancyGrid", "visualization_msgs/msg/MarkerArray"}
@@ -69,7 +69,7 @@ class ByteLimit:
 class TopicReader:
     """Reads a topic: finds its type and QoS, and follows changes of both.
 
-    Use it on the thread of feeds. Without a ``type_name``, the type is that of the publishers.
+    Use it on the thread of feeds. Without a ``type_name``, the publishers say the type.
     """
 
     #: Whether messages from before the subscription arrive, if publishers keep them.

@@ -21,7 +21,7 @@ MAX_DEPTH = 32
 #: Keys, values, maps and lists in a file, counting values repeated by aliases again.
 MAX_VALUES = 200_000
 
-#: Entries of a section of a system, such as its nodes, with those of the systems that it includes.
+#: Entries of a section of a system, such as its nodes, and of the systems that it includes.
 MAX_ENTRIES = 5_000
 
 #: Errors of one stage of checking a file.

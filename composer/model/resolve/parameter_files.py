@@ -1,6 +1,6 @@
 """Read ROS parameter files: parameter values by the full names of nodes.
 
-The format is that of ``rcl_yaml_param_parser``: a map of node names, each with ``ros__parameters``.
+The format follows ``rcl_yaml_param_parser``: a map of node names, each with ``ros__parameters``.
 ``*`` is one part of a name, ``**`` any number of parts. Namespaces and parameters with dots in
 their names may be nested maps.
 """

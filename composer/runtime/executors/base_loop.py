@@ -58,7 +58,7 @@ class TimerQueue:
         self._entries: list[tuple[float, int, ScheduledCall]] = []  # ascending: -due_s, -order
         self._order = itertools.count(0, -1)  # calls due at the same time keep their order
         self._sweep_at = _SWEEP_SIZE
-        self.next_s = inf  # no call is due before; possibly that of a canceled call
+        self.next_s = inf  # no call is due before; the call may be canceled
 
     def add(self, call: ScheduledCall) -> None:
         """Add a call."""

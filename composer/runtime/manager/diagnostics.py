@@ -21,7 +21,7 @@ from composer.runtime.protocol.reports import (
     SystemReport,
 )
 
-#: Most values are those of the message before, and making them again takes most of the time.
+#: Most values are as in the message before, and making them again takes most of the time.
 _KEPT_VALUES = 8192
 #: The name of the node is that of its status.
 _NODE_FIELDS = tuple(

@@ -20,7 +20,7 @@ class _Burst:
 
 #: Messages that are closer than this count as one burst.
 _BURST_S = 0.1
-#: A current rate is that of the messages of the last seconds.
+#: A current rate counts the messages of the last seconds.
 _WINDOW_S = 3.0
 #: Messages have stopped after this many times the length of the window.
 _SILENT_PERIODS = 3

@@ -178,7 +178,7 @@ class ParametersAnswer:
 
 @dataclass(frozen=True, slots=True)
 class ParametersQuery:
-    """Asks for the parameters of nodes, by their full names; None for those of all nodes."""
+    """Asks for the parameters of nodes, by their full names; None for all nodes."""
 
     nodes: tuple[str, ...] | None = None
     Answer: ClassVar = ParametersAnswer

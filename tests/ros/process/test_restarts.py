@@ -46,7 +46,7 @@ class Talker(Node):
         self.create_timer(0.05, lambda: self.publisher.publish(String(data="x")))
 """
 #: After 25 restarts, 125 more of a class take 0.7 MB: what malloc has handed out grows, the memory
-#: that tracemalloc counts does not. Fast DDS and rcl keep some kB of each node that was destroyed.
+#: that tracemalloc counts does not. So C code holds it.
 MEMORY_MB = 8.0
 SPARE_THREADS = 1
 
