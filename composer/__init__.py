@@ -1,7 +1,5 @@
 """Declare, prove and run a ROS 2 system: YAML in, real lifecycle nodes out, in one process."""
 
-from __future__ import annotations
-
 #: The name of the distribution on PyPI.
 DISTRIBUTION = "ros2-composer"
 
