@@ -39,6 +39,8 @@ _SAME_REQUEST_S = 0.1
 #: Exit codes after which a process is not started again: it cannot work.
 _USAGE, _CONFIG = 2, 78
 _FINAL = (_USAGE, _CONFIG, NO_WORKSPACE, NO_SETUP, NO_PYTHON)
+#: What the composer logs in a process begins with that.
+_OF_COMPOSER = f"[{PROGRAM_LOGGER}] "
 _GUARD = "composer.client.hosts.guard"
 _SESSIONS = "a host needs one for each process: increase MaxSessions in its sshd_config"
 
@@ -238,7 +240,7 @@ class Deployment:
             tail[:] = [*tail[-9:], text]
             level, logger, message = attribute_line(text, loggers, is_error=False)
             # The process that coordinates reports what the others say about states as well.
-            if logger != PROGRAM_LOGGER or level is not LogLevel.INFO:
+            if level is not LogLevel.INFO or not message.startswith(_OF_COMPOSER):
                 self._options.write(f"{item.label} | {text}")
                 self._options.log(item, level, logger, message)
 

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 
 from composer.model import LogLevel
-from composer.model.names import PROGRAM_LOGGER
 
 _LONGEST_LINE = 2000  # bytes
 _CUT = b" ..."
@@ -77,9 +76,10 @@ class OutputLines:
 def process_loggers(process: str, nodes: Iterable[str]) -> tuple[str, ...]:
     """Return the names that a process of a system may log with: its own, and those of its nodes.
 
-    ``nodes`` are full names.
+    ``nodes`` are full names. What the composer logs in the process is not among them, because
+    classes in the process can print the same: it has the name of the process.
     """
-    return process, PROGRAM_LOGGER, *(name.strip("/").replace("/", ".") for name in nodes)
+    return process, *(name.strip("/").replace("/", ".") for name in nodes)
 
 
 def attribute_line(

@@ -152,9 +152,9 @@ def test_lines_of_a_process(tmp_path: Path) -> None:
 
     asyncio.run(asyncio.wait_for(serve(tmp_path, forged_lines, run), 30.0))
     assert all(text.startswith("vision@jetson | ") for text in written)
-    assert {logger for _, logger, _ in logged} == {"vision", "camera", "compose"}
+    assert {logger for _, logger, _ in logged} == {"vision", "camera"}
     assert (LogLevel.INFO, "camera", "ready") in logged
-    assert (LogLevel.INFO, "compose", "ready") not in logged
+    assert (LogLevel.INFO, "vision", "[compose] ready") not in logged
     assert any(message.startswith("[planner] ") for _, _, message in logged)
     assert 0 < len(logged) < MOST_LINES
     assert max(map(len, written)) < LONGEST_LINE

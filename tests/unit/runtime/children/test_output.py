@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from composer.model import LogLevel
-from composer.runtime.children.output import OutputLines, attribute_line
+from composer.runtime.children.output import OutputLines, attribute_line, process_loggers
 
 
 def lines_of(*chunks: bytes, now_s: float = 0.0) -> list[str]:
@@ -72,3 +72,13 @@ def test_a_program_has_its_own_loggers_only(
     text: str, is_error: bool, expected: tuple[LogLevel, str, str]
 ) -> None:
     assert attribute_line(text, ("arm", "hand"), is_error=is_error) == expected
+
+
+@pytest.mark.parametrize("logger", ["compose", "other"])
+def test_a_process_speaks_only_for_itself_and_its_nodes(logger: str) -> None:
+    loggers = process_loggers("second", ["/left/arm"])
+    text = f"[2.0] [FATAL] [{logger}] /x failed"
+    expected = (LogLevel.FATAL, "second", f"[{logger}] /x failed")
+    assert attribute_line(text, loggers, is_error=True) == expected
+    own = "[INFO] [left.arm] ready"
+    assert attribute_line(own, loggers, is_error=True) == (LogLevel.INFO, "left.arm", "ready")
