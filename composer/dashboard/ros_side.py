@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import gc
 import logging
 import os
@@ -134,7 +135,7 @@ class RosSide:
                     self._thread, self._graph = None, None
                     self.state, self.message = "failed", str(error)
                     self._joined.set()
-        gc.collect()  # nodes are in reference cycles, and the next collection may be far off
+        _return_memory()
 
     def _run_feeds(self) -> None:
         """Join the ROS graph, and leave it when no browser is left."""
@@ -169,6 +170,17 @@ def _import() -> None:
         import composer.client.shared_session
         import composer.dashboard.observing.ros_graph
         import composer.runtime.middleware.dds_xml  # noqa: F401
+
+
+def _return_memory() -> None:
+    """Return the memory of a session to the operating system.
+
+    glibc keeps free memory: without this, any program grows by 0.2 MB each time it joins and leaves
+    the ROS graph.
+    """
+    gc.collect()  # nodes are in reference cycles, and the next collection may be far off
+    with suppress(AttributeError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _prepare() -> None:

@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +87,8 @@ def children(pid: int) -> list[int]:
     pids = [pid]
     for parent in pids:  # grows
         for task in Path(f"/proc/{parent}/task").iterdir():
-            pids += map(int, (task / "children").read_text(encoding="ascii").split())
+            with suppress(FileNotFoundError):  # the thread ends just now
+                pids += map(int, (task / "children").read_text(encoding="ascii").split())
     return pids
 
 
