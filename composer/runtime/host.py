@@ -3,7 +3,7 @@
 ::
 
     from composer.runtime.host import Host
-    from composer.runtime.host_options import HostOptions
+    from composer.runtime.host_options import HostOptions, TimeLimits
     from composer.runtime.process import start_refused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
@@ -34,16 +34,15 @@ from rclpy.utilities import get_rmw_implementation_identifier, try_shutdown
 
 from composer.model import LogLevel, Node, System
 from composer.model.names import PROGRAM_LOGGER, join
-from composer.plan import Fault, Plan
+from composer.plan import Plan
 from composer.runtime.children.discovery_server import discovery_servers
 from composer.runtime.executors.placement import (
     memory_excess,
     place_process,
     switch_threads_sooner,
 )
-from composer.runtime.host_options import HostOptions
+from composer.runtime.host_options import HostOptions, TimeLimits
 from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
-from composer.runtime.metrics.figures import merged_chains
 from composer.runtime.middleware.dds_profiles import use_large_system_profile
 from composer.runtime.middleware.environment import (
     ROS_ARGUMENTS,
@@ -54,33 +53,22 @@ from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
-from composer.runtime.process.libraries import leave_ros_graph, supports_fast_exit
 from composer.runtime.process.signals import stop_signals
 from composer.runtime.protocol.requests import Instance
 from composer.runtime.ros.message_sizes import sends_large_messages
 from composer.runtime.supervision import events
-from composer.runtime.supervision.commands import Commands, SystemStart
-from composer.runtime.supervision.events import NodeSummary, Outcome, Report, Reporter
+from composer.runtime.supervision.commands import Commands
+from composer.runtime.supervision.events import Outcome, Report, Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor
 from composer.runtime.supervision.main_queue import Command, Item, MainQueue
 from composer.runtime.supervision.node_factory import NodeFactory
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet
 from composer.runtime.supervision.reconciler import Reconciler
+from composer.runtime.supervision.start_and_end import SystemEnd, SystemStart
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 
-#: The longest share of the time for the tear-down that one step may take.
-_STEP_SHARE = 0.6
-_URGENT_S = 0.2
-#: This many nodes can be destroyed one by one within half a second.
-_FEW_NODES = 20
-#: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
-_SHORTEST_START_LIMIT_S = 5.0
-#: A phase that has a time limit and takes that much longer hangs: C code may hold the GIL forever,
-#: and then nothing in Python can end it. The last plan of a phase may be slow.
-_HANGS_AFTER_S = 60.0
-_MESSAGES_ARRIVE_WITHIN_S = 0.2
 _KEY_BYTES = 32
 
 
@@ -96,7 +84,7 @@ class Host:
         report: Report | None = None,
     ) -> None:
         self._system = system
-        self._up, self._down = up, down
+        self._up = up
         self._options = options or HostOptions()
         self._main_queue: MainQueue[Item] = MainQueue()
         self._reporter = Reporter(report, self._options.started_at_s)
@@ -114,30 +102,18 @@ class Host:
         )
         self._commands = Commands(system, self._node_set, self._supervisor, self._status)
         self._start = SystemStart(
-            system,
-            up,
-            self._node_set,
-            self._supervisor,
-            self._main_queue,
-            self._reporter,
-            self._status,
-            self._run_command,
-            self._options.all_or_nothing,
+            *(system, up, self._node_set, self._supervisor, self._main_queue),
+            *(self._reporter, self._status, self._run_command, self._options.all_or_nothing),
         )
+        self._end = SystemEnd(down, self._supervisor, self._options)
+        self._limits = TimeLimits(self._options)
         self._failed = False
-        self._is_end_limited = False  # the time to the end of the process
         self._is_created = False
-        self._summary: tuple[NodeSummary, ...] = ()
-        self._remarks: tuple[str, ...] = ()
         self._shutdown_commands: list[Command] = []
-        self._tear_down_end_s = math.inf
-        self._is_left_to_exit = False  # only the end of the process removes all nodes
-        self._uses_fast_exit = self._options.ends_process and len(system.nodes) > _FEW_NODES
-        self._has_left_graph = False
 
     def stop(self, reason: str) -> None:
         """Request a stop, from any thread or a signal handler. A second request is urgent."""
-        self._limit_end()
+        self._limits.limit_end()
         self._main_queue.request_stop(reason)
 
     def run(self) -> Outcome:
@@ -146,7 +122,7 @@ class Host:
         Raises StartRefused if the environment does not allow a start, or the system runs already.
         """
         prepare_environment(self._system.discovery)
-        if self._uses_fast_exit:
+        if self._end.uses_fast_exit:
             use_large_system_profile(os.environ)
         if self._system.discovery is not None and self._system.discovery.interfaces:
             from composer.runtime.middleware.dds_xml import use_interfaces  # noqa: PLC0415 - slow, rare
@@ -165,7 +141,7 @@ class Host:
         discovery = active_variables(self._system.discovery, os.environ)
         lock = hold_instance_lock(namespace, discovery, self._report_key)
         with lock, signals, servers:
-            self._limit_start()
+            self._limits.limit_start()
             try:
                 with self._segment():
                     manager = self._join(namespace)
@@ -173,9 +149,9 @@ class Host:
             finally:
                 if ends_process:
                     gc.unfreeze()
-                if not self._has_left_graph:  # otherwise there is nothing left to shut down
+                if not self._end.has_left_graph:  # otherwise there is nothing left to shut down
                     try_shutdown()
-        return self._outcome()
+        return self._end.outcome(has_failed=self._failed)
 
     def _segment(self) -> AbstractContextManager[None]:
         """Return the block in which this process joins the ROS graph."""
@@ -199,7 +175,7 @@ class Host:
             chains=self._node_set.chains,
             nodes=lambda: {node.full_name: node for node in tuple(self._node_set.nodes.values())},
             recreate=self._recreate,
-            expect_end=self._keep_entities,
+            expect_end=self._end.keep_entities,
             write_log=self._reporter.log,
         )
         use_sim_time = self._system.use_sim_time
@@ -219,19 +195,12 @@ class Host:
             if self._create(manager.process_context):
                 self._bring_up_and_supervise()
         finally:
-            self._limit_end()
-            self._tear_down()
-            self._close(manager)
-
-    # --- start
-
-    def _limit_start(self) -> None:
-        """Limit the next call that joins the ROS graph: signals are not handled during it."""
-        self._limit(max(self._options.grace_s, _SHORTEST_START_LIMIT_S))
-
-    def _limit_phase(self, phase_s: float) -> None:
-        """Limit a phase that may take this long, which may be infinite, with a minute to spare."""
-        self._limit(phase_s + _HANGS_AFTER_S if math.isfinite(phase_s) else None)
+            self._limits.limit_end()
+            self._end.tear_down(is_created=self._is_created)
+            self._end.destroy(self._shutdown_commands)
+            manager.retire(linger=bool(self._shutdown_commands))
+            if not self._end.leave_graph():
+                manager.destroy()
 
     def _longest_bring_up_s(self) -> float:
         """Return how long it may take, one step after the other, and the same for a roll-back.
@@ -242,13 +211,6 @@ class Host:
         once_s = steps_s if self._options.all_or_nothing else math.inf
         return min(once_s, self._options.bring_up_within_s) + steps_s
 
-    def _limit(self, limit_s: float | None) -> None:
-        """End the process after this time, unless the time to its end is limited already."""
-        if not self._is_end_limited:
-            self._options.end_within(limit_s)
-            if self._is_end_limited:  # meanwhile, by a signal or another thread
-                self._options.end_within(self._options.grace_s)
-
     def _make_listener(self, node: Node) -> NodeListener:
         return SupervisionListener(
             node, self._supervisor.reconciler.shared, self._main_queue, self._status, self._reporter
@@ -256,8 +218,8 @@ class Host:
 
     def _create(self, process: ProcessContext) -> bool:
         try:
-            self._node_set.create(process, self._limit_start)
-            self._limit_phase(self._longest_bring_up_s())
+            self._node_set.create(process, self._limits.limit_start)
+            self._limits.limit_phase(self._longest_bring_up_s())
         except CreationFailed as error:
             at_s = self._reporter.elapsed_s
             self._reporter.report(events.RollingBack(at_s, error.node, str(error)))
@@ -283,7 +245,7 @@ class Host:
                 monitor.system_is_up()
                 self._supervise()
         finally:
-            self._limit_end()
+            self._limits.limit_end()
             monitor.stop()
 
     def _bring_up(self) -> bool:
@@ -294,7 +256,7 @@ class Host:
 
     def _supervise(self) -> None:
         run_for_s = math.inf if self._options.run_for_s is None else self._options.run_for_s
-        self._limit_phase(run_for_s)
+        self._limits.limit_phase(run_for_s)
         self._supervisor.run(self._run_command, time.monotonic() + run_for_s)
         if not self._main_queue.stopping:
             self._main_queue.request_stop("--for elapsed")
@@ -338,82 +300,6 @@ class Host:
         if excess is not None and not self._main_queue.stopping:
             self._reporter.log(LogLevel.ERROR, PROGRAM_LOGGER, excess)
             self._fail(excess)
-
-    # --- end
-
-    def _limit_end(self) -> None:
-        """Limit the time from now to the end of the process, once."""
-        if not self._is_end_limited:
-            self._is_end_limited = True
-            self._options.end_within(self._options.grace_s)
-
-    def _tear_down(self) -> None:
-        if not self._main_queue.stopping:
-            self._main_queue.request_stop("unrecoverable error")
-        self._failed = self._failed or self._supervisor.has_failed_nodes
-        self._status.set_activity("stopping")
-        remarks = self._status.snapshot().remarks
-        # The reason says that of the node that has ended the system.
-        ended_by = self._stop_reason.partition(" failed")[0]
-        self._remarks = tuple(text for text in remarks if not text.startswith(f"{ended_by} is "))
-        self._reporter.report(events.Stopping(self._reporter.elapsed_s, self._stop_reason))
-        self._keep_entities()
-        stop_within_s = self._options.stop_within_s
-        self._tear_down_end_s = time.monotonic() + stop_within_s
-        self._node_set.limit_end(self._tear_down_end_s)
-        self._node_set.other_processes.on_stop()
-        if self._is_created:
-            limit_s = _STEP_SHARE * stop_within_s
-            if not self._supervisor.tear_down(self._down, self._tear_down_end_s, limit_s):
-                self._failed = True
-        end_s = time.monotonic() + _MESSAGES_ARRIVE_WITHIN_S
-        self._node_set.other_processes.wait_for_messages(end_s)
-        self._summary = self._node_set.summaries()
-        if self._options.fail_on_error and any(node.errors for node in self._summary):
-            self._failed = True
-
-    def _keep_entities(self) -> None:
-        """Leave the entities of the nodes to the end of the process, if that is faster."""
-        if self._uses_fast_exit and supports_fast_exit():
-            self._node_set.keep_entities()
-
-    def _close(self, manager: ManagerNode) -> None:
-        for item in (*self._shutdown_commands, *self._main_queue.drain()):
-            if isinstance(item, Command):
-                message = f"the system has stopped: {self._stop_reason}"
-                item.answer(item.name == "shutdown", message)
-            elif isinstance(item, Fault):
-                self._failed = True  # it was not handled
-        self._status.set_activity("stopped")
-        end_s = self._tear_down_end_s
-        if self._main_queue.urgent:
-            end_s = min(end_s, time.monotonic() + _URGENT_S)
-        self._node_set.stop_loops(end_s)
-        self._is_left_to_exit = not self._node_set.destroy(end_s)
-        self._failed = self._failed or self._node_set.has_unfinished()
-        manager.retire(linger=bool(self._shutdown_commands))
-        # A hung thread may run again and use what the fast exit has destroyed.
-        if self._is_left_to_exit and self._options.ends_process and not self._node_set.hung:
-            self._has_left_graph = leave_ros_graph()
-        if not self._has_left_graph:
-            manager.destroy()
-
-    def _outcome(self) -> Outcome:
-        others = self._node_set.other_processes
-        return Outcome(
-            exit_code=1 if self._failed else 0,
-            reason=self._stop_reason,
-            elapsed_s=self._reporter.elapsed_s,
-            nodes=self._summary,
-            hung=self._is_left_to_exit,
-            remarks=self._remarks,
-            callbacks=(*self._node_set.callbacks(), *others.callbacks()),
-            chains=merged_chains(self._node_set.chains(), others.chains()),
-        )
-
-    @property
-    def _stop_reason(self) -> str:
-        return self._main_queue.stop_reason or ""
 
 
 def _start_ros() -> None:

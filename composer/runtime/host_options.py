@@ -51,3 +51,39 @@ class HostOptions:
     process: Process | None = None
     report_key: str = ""
     member_command: Sequence[str] = ()
+
+
+#: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
+_SHORTEST_START_LIMIT_S = 5.0
+#: A phase that has a time limit and takes that much longer hangs: C code may hold the GIL forever,
+#: and then nothing in Python can end it. The last plan of a phase may be slow.
+_HANGS_AFTER_S = 60.0
+
+
+class TimeLimits:
+    """Ends the process if what runs does not return, by ``end_within`` of the options."""
+
+    def __init__(self, options: HostOptions) -> None:
+        self._options = options
+        self._is_end_limited = False  # the time to the end of the process
+
+    def limit_start(self) -> None:
+        """Limit the next call that joins the ROS graph: signals are not handled during it."""
+        self._limit(max(self._options.grace_s, _SHORTEST_START_LIMIT_S))
+
+    def limit_phase(self, phase_s: float) -> None:
+        """Limit a phase that may take this long, which may be infinite, with a minute to spare."""
+        self._limit(phase_s + _HANGS_AFTER_S if math.isfinite(phase_s) else None)
+
+    def limit_end(self) -> None:
+        """Limit the time from now to the end of the process, once."""
+        if not self._is_end_limited:
+            self._is_end_limited = True
+            self._options.end_within(self._options.grace_s)
+
+    def _limit(self, limit_s: float | None) -> None:
+        """End the process after this time, unless the time to its end is limited already."""
+        if not self._is_end_limited:
+            self._options.end_within(limit_s)
+            if self._is_end_limited:  # meanwhile, by a signal or another thread
+                self._options.end_within(self._options.grace_s)

@@ -29,7 +29,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Those that run here are awaited for longer.
-    monkeypatch.setattr("composer.runtime.supervision.commands._REPORTS_WITHIN_S", 0.0)
+    monkeypatch.setattr("composer.runtime.supervision.start_and_end._REPORTS_WITHIN_S", 0.0)
     path = tmp_path / "robot.yaml"
     # With this backoff, the process returns before the coordinator starts one in its place.
     text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
