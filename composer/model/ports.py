@@ -191,6 +191,8 @@ class Qos:
     policy_spans: tuple[tuple[str, Span], ...] = field(default=(), compare=False)
     known: bool = True  # False: based on an unknown profile, so the values are a guess
     inline: frozenset[str] = field(default=frozenset(), compare=False)  # policies set at the port
+    #: The policies that a parameter of the node sets; see ``model/qos_overrides.py``.
+    overridden: frozenset[str] = field(default=frozenset(), compare=False)
 
     def policy_span(self, policy: str) -> Span:
         """Return where ``policy`` was set, or the span of the whole profile."""

@@ -79,7 +79,7 @@ def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic
             rule = as_warning(CLASS_PORT, unless=item.is_certain(types[0].span))
             subjects = (type_subject(port),)
             yield Diagnostic(rule, message, port.interface.span, (label,), subjects=subjects)
-        elif len(same) == 1 and port.qos.known and port.qos.explicit:
+        elif len(same) == 1 and port.qos.known:
             yield from _different_qos(port, same[0], what, context)
 
 
@@ -101,13 +101,22 @@ def _different_qos(
     pairs = [(qos, other) if is_publisher else (other, qos) for other in ends]
     is_problem = any(incompatibilities(*pair) for pair in pairs)
     rule = replace(CLASS_PORT, severity=Severity.WARNING if is_problem else Severity.INFO)
-    for policy in _POLICIES:
+    for policy in _compared_policies(port, created):
         here, there = getattr(declared, policy), getattr(qos, policy)
         if here != there:
             message = f"{what} with {policy} {_value(there)}, not {_value(here)}"
             label = Label(created.span, "created here")
             yield Diagnostic(rule, message, port.qos.own_span(policy), (label,))
             return  # another profile, most likely
+
+
+def _compared_policies(port: Port, created: CreatedPort) -> list[str]:
+    """Return the policies to compare; a class without QoS overrides ignores their parameters."""
+    qos = port.qos
+    policies = _POLICIES if qos.explicit else ()
+    if created.has_qos_overrides:
+        return [policy for policy in policies if policy not in qos.overridden]
+    return [*policies, *sorted(qos.overridden.difference(policies))]
 
 
 def _value(policy: object) -> str:

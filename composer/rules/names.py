@@ -17,6 +17,7 @@ from composer.model.names import (
     remapped_name,
     topic_name_problem,
 )
+from composer.model.qos_overrides import PREFIX as QOS_OVERRIDES
 from composer.rules.analysis.context import Context, is_unresolved, location
 from composer.rules.analysis.formatting import a, free_name, safe_name
 from composer.rules.analysis.subjects import connection_subjects, namespace_subjects
@@ -139,6 +140,8 @@ def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
         names = {parameter.name.value for parameter in node.parameters}
         for parameter in node.parameters:
             name = parameter.name
+            if name.value.startswith(QOS_OVERRIDES):
+                continue  # it has the name of a topic
             problem = parameter_name_problem(name.value)
             if problem is not None and not is_unresolved(name.value):
                 better = ".".join(safe_name(part) for part in name.value.split(".") if part)

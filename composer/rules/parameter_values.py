@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion
+from composer.base.source import Located
+from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, Parameter, ParameterType
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.formatting import and_others
@@ -57,9 +60,14 @@ def check_parameter_range(context: Context) -> Iterator[Diagnostic]:
                 PARAMETER_VALUE,
                 f"parameter '{parameter.name}': {problem.message}",
                 value.span,
-                (Label(problem.limit.span, "the limit"),),
+                _label(problem.limit, value, "the limit"),
                 subjects=(("parameter", parameter.name.value),),
             )
+
+
+def _label(cause: Located[Any], value: Located[Plain], text: str) -> tuple[Label, ...]:
+    """Return a label for what is declared; those of QoS policies are declared nowhere."""
+    return () if cause.span == value.span else (Label(cause.span, text),)
 
 
 def _is_contradictory(parameter: Parameter) -> bool:
@@ -82,7 +90,7 @@ def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
             PARAMETER_VALUE,
             f"parameter '{parameter.name}' cannot be {describe(invalid)}",
             value.span,
-            (Label(choices.span, "the valid choices"),),
+            _label(choices, value, "the valid choices"),
             suggestion(str(invalid), [str(choice) for choice in choices.value]),
             (("parameter", parameter.name.value),),
         )

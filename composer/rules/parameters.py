@@ -19,8 +19,10 @@ from composer.base.diagnostics import (
 )
 from composer.base.source import Located, Span
 from composer.base.spelling import is_typo
-from composer.model import Node, Parameter, UnmatchedParameters
+from composer.model import ChannelKind, Node, Parameter, PortKind, UnmatchedParameters
 from composer.model.names import namespace_problem, split_node_name
+from composer.model.qos_overrides import PREFIX as QOS_OVERRIDES
+from composer.model.qos_overrides import overridable_policies
 from composer.model.resolve.parameter_files import PARAMETER_FILES
 from composer.rules.analysis.context import Context, behaviors, is_unresolved, part_of_path
 from composer.rules.analysis.earlier_errors import earlier_errors
@@ -111,6 +113,10 @@ def _unknown_values(node: Node) -> Iterator[Diagnostic]:
         is_map = first in types and not any(other.startswith(f"{first}.") for other in types)
         if unknown.section != "parameters" or first in maps:
             continue
+        if name.startswith(QOS_OVERRIDES):
+            if not any(is_unresolved(port.full_name) for port in node.ports):
+                yield _unknown_override(node, unknown.name)
+            continue
         if dot and is_map:
             maps.add(first)
             message = f"parameter '{first}' of node '{node.name}' is a {types[first]}, not a map"
@@ -123,6 +129,26 @@ def _unknown_values(node: Node) -> Iterator[Diagnostic]:
                 hint=suggestion(name, unknown.known),
                 relies_on=(("same node", node.name.value),),
             )
+
+
+def _unknown_override(node: Node, name: Located[str]) -> Diagnostic:
+    """Report a QoS override with the first part of its name that is wrong."""
+    topic, *rest = name.value.removeprefix(QOS_OVERRIDES).split(".")
+    kind, policy = (*rest, "", "")[:2]
+    ports = [port for port in node.visible_ports if port.kind.channel is ChannelKind.TOPIC]
+    kinds = [port.kind for port in ports if port.full_name == topic]
+    if not kinds:
+        topics = [port.full_name for port in ports if port.kind == kind]
+        problem = f"node '{node.name}' has no topic '{topic}'"
+        hint = suggestion(topic, topics or [port.full_name for port in ports])
+    elif kind not in kinds:
+        problem = f"node '{node.name}' has no {kind or 'port'} on '{topic}'"
+        hint = suggestion(kind, kinds)
+    else:
+        problem = f"the policy '{policy}' of a {kind} cannot be overridden"
+        hint = suggestion(policy, overridable_policies(PortKind(kind)))
+    causes = (("same node", node.name.value),)
+    return Diagnostic(UNKNOWN_PARAMETER, problem, name.span, hint=hint, relies_on=causes)
 
 
 def _parameter_uses(

@@ -104,11 +104,15 @@ def _is_offer_wrong(
 ) -> bool:
     """Return whether the offer is probably wrong, not the requests.
 
-    It is a guess: built-in types are not edited, several endpoints that agree are right more often
-    than one, the file of the system is nearer to what a user changes than a file that several
-    systems share, and transient-local is never requested by default.
+    It is a guess: an override by a parameter is the latest change, built-in types are not edited,
+    several endpoints that agree are right more often than one, the file of the system is nearer to
+    what a user changes than a file that several systems share, and transient-local is never
+    requested by default.
     """
     policy = problems[0].policy
+    overridden = [policy in ends[0].port.qos.overridden for ends in (offers, requests)]
+    if any(overridden) and not all(overridden):
+        return overridden[0]
     offer, request = (_origin(context, ends[0], policy) for ends in (offers, requests))
     if _Origin.BUILT_IN in (offer, request):
         return request is _Origin.BUILT_IN and offer is not _Origin.BUILT_IN

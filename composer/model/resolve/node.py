@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from collections.abc import Mapping as Map
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
@@ -38,6 +39,7 @@ from composer.model import (
     UnknownKey,
 )
 from composer.model.names import expand_name, remapped_name
+from composer.model.qos_overrides import override_names, with_overrides
 from composer.model.resolve.connections import PortConnection, PortConnections, connection_of
 from composer.model.resolve.declaration import (
     Declaration,
@@ -112,7 +114,13 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     is_passed_on = external is not None and not declared.only_declared
     gets_undeclared = declared.gets_undeclared or is_passed_on
     names = node_names(entry, tree, declared.implementation.executable, context.namespace)
-    given = _given_values(entry.name, tree, declared, context)
+    remappings = _remappings(tree.get("remappings"))
+    ports = place_ports(declared.ports, names, remappings, context.port_connections)
+    transforms = place_transforms(declared.transforms, names, remappings)
+    # The process has one subscription on /tf, which is not a node's.
+    transform_ports = () if transforms is None else transforms.publishers
+    overridable = frozenset(override_names((*ports, *transform_ports)))
+    given = _given_values(entry.name, tree, declared, context, overridable)
     parameters = node_parameters(
         declared.parameters,
         given,
@@ -121,7 +129,9 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         is_program=declared.implementation.executable is not None and external is None,
     )
     is_complete = made.complete and not declared.implementation.conflicting
-    remappings = _remappings(tree.get("remappings"))
+    overridden = partial(with_overrides, overrides=parameters.qos_overrides)
+    if transforms is not None:
+        transforms = replace(transforms, ports=tuple(map(overridden, transforms.ports)))
     lifecycle = tree.get("lifecycle")
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
     return Node(
@@ -146,9 +156,9 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         overridden_parameters=parameters.overridden_parameters,
         undeclared_parameters=parameters.undeclared_parameters,
         parameter_sections=parameters.sections,
-        ports=place_ports(declared.ports, names, remappings, context.port_connections),
+        ports=tuple(map(overridden, ports)),
         timers=declared.timers,
-        transforms=place_transforms(declared.transforms, names, remappings),
+        transforms=transforms,
         state=declared.state,
         reactions=declared.reactions,
         remappings=remappings,
@@ -171,7 +181,11 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
 
 
 def _given_values(
-    name: str, tree: Mapping, declared: Declaration, context: SystemContext
+    name: str,
+    tree: Mapping,
+    declared: Declaration,
+    context: SystemContext,
+    overridable: frozenset[str],
 ) -> GivenValues:
     """Return the values for the parameters of the node with the key ``name``."""
     is_inline = tree.entry("type") is None
@@ -183,6 +197,7 @@ def _given_values(
         context.parameter_sections,
         {} if is_inline else {item.name: item for item in entries(tree.get("parameters"))},
         context.overrides.by_node.get(name, {}),
+        overridable,
     )
 
 

@@ -15,11 +15,15 @@ from composer.base.source import Located, SourceFile
 from composer.language.tree import Entry
 from composer.model import USE_SIM_TIME, Node, UnmatchedParameters
 from composer.model.names import join
+from composer.model.qos_overrides import PREFIX, override_names
 
 ONE_PART = "*"
 ANY_PARTS = "**"
-#: Parameters that every ROS node declares, and that the composer ignores.
-_OF_EVERY_NODE = ("start_type_description_service", "qos_overrides.")
+#: How parameters begin that every ROS node declares, and that the composer ignores.
+_OF_EVERY_NODE = (
+    "start_type_description_service",
+    *(f"{PREFIX}{topic}." for topic in ("/clock", "/parameter_events", "/rosout")),
+)
 
 
 @dataclass(eq=False, slots=True)
@@ -198,6 +202,7 @@ class _Search:
         if pattern not in self._declared:
             nodes = self._matching.get(pattern, [])
             names = [parameter.name.value for node in nodes for parameter in node.parameters]
+            names += (name for node in nodes for name in override_names(node.visible_ports))
             are_known = bool(nodes) and all(
                 node.complete and not node.gets_undeclared for node in nodes
             )

@@ -27,6 +27,7 @@ from composer.model import (
     ParameterType,
     UnknownKey,
 )
+from composer.model.qos_overrides import PREFIX, override_parameter
 from composer.model.resolve.node_settings import NodeNames
 from composer.model.resolve.parameter_files import ParameterFiles
 
@@ -195,7 +196,8 @@ class GivenValues:
     """The values for a node by parameter. A later field takes precedence.
 
     ``system`` is ``use_sim_time`` of the system, ``own`` are the values of the node's entry.
-    ``in_files()`` are all sections of the files.
+    ``in_files()`` are all sections of the files. ``overridable`` are the parameters that override
+    the QoS of its ports.
     """
 
     system: Map[str, Entry]
@@ -203,16 +205,21 @@ class GivenValues:
     in_files: Callable[[], tuple[ParameterSection, ...]]
     own: Map[str, Entry]
     command_line: Map[str, Entry]
+    overridable: frozenset[str]
 
 
 @dataclass(frozen=True, slots=True)
 class NodeParameters:
-    """The parameters of a node, and what its program gets; see Node for the fields."""
+    """The parameters of a node, and what its program gets; see Node for the fields.
+
+    ``qos_overrides`` are those of ``parameters`` that override the QoS of a port, by name.
+    """
 
     parameters: tuple[Parameter, ...]
     overridden_parameters: tuple[Parameter, ...]
     undeclared_parameters: tuple[Parameter, ...]
     sections: tuple[ParameterSection, ...]
+    qos_overrides: Map[str, Parameter]
     unknown: tuple[UnknownKey, ...]
 
 
@@ -233,28 +240,50 @@ def node_parameters(
     is_program: bool,
 ) -> NodeParameters:
     """Return the parameters of a node with their values."""
-    known = None if gets_undeclared else frozenset(item.name.value for item in declared)
-    in_files = given.files.given(names.full_name, known)
+    known = frozenset(item.name.value for item in declared) | given.overridable
+    in_files = given.files.given(names.full_name, None if gets_undeclared else known)
     values = {**given.system, **in_files, **given.own, **given.command_line}
-    parameters = with_use_sim_time(declared, values)
+    overrides = _qos_overrides(declared, values, given.overridable)
+    others = [item for item in declared if item.name.value not in overrides]
+    unusable = [] if gets_undeclared else list(filter(_overrides_qos, others))
+    parameters = with_use_sim_time(tuple(item for item in others if item not in unusable), values)
     named = given.files.named(names.full_name)
     overridden = {name: entry for name, entry in named.items() if name in given.own}
-    others = (item for item in parameters if item.name.value in overridden)
-    valued = with_values(parameters, values)
+    replaced = (item for item in parameters if item.name.value in overridden)
+    valued = (*with_values(parameters, values), *overrides.values())
     passed: tuple[Parameter, ...] = ()
     if gets_undeclared:
-        passed = tuple(map(bare_parameter, undeclared(parameters, values)))
+        passed = tuple(map(bare_parameter, undeclared(valued, values)))
     own = ParameterSection(names.full_name, (*valued, *passed))
     sections: tuple[ParameterSection, ...] = (own,) if is_program else ()
     if is_program and gets_undeclared:
         sections = _all_sections(declared, given, own, are_kept=names.are_kept)
+    unknown = () if gets_undeclared else unknown_parameters(valued, values)
     return NodeParameters(
         valued,
-        with_values(others, overridden),
+        with_values(replaced, overridden),
         passed,
         sections,
-        () if gets_undeclared else unknown_parameters(parameters, values),
+        overrides,
+        (*(UnknownKey("parameters", item.name, ()) for item in unusable), *unknown),
     )
+
+
+def _overrides_qos(parameter: Parameter) -> bool:
+    return parameter.name.value.startswith(PREFIX)
+
+
+def _qos_overrides(
+    declared: Iterable[Parameter], values: Map[str, Entry], overridable: frozenset[str]
+) -> dict[str, Parameter]:
+    """Return the parameters with values that override the QoS of a port, by name.
+
+    They need no declaration, and a declaration counts as its default.
+    """
+    given = (bare_parameter(values[name]) for name in values.keys() & overridable)
+    found = {item.name.value: item for item in declared if item.name.value in overridable}
+    found |= {item.name.value: item for item in given}
+    return {name: override_parameter(item) for name, item in sorted(found.items())}
 
 
 def _all_sections(

@@ -52,13 +52,17 @@ _DURATIONS = {
 
 @dataclass(frozen=True, slots=True)
 class CreatedPort:
-    """A port that a class creates; what its source does not show is None."""
+    """A port that a class creates; what its source does not show is None.
+
+    ``has_qos_overrides`` is whether parameters may override its QoS.
+    """
 
     kind: PortKind
     name: str | None
     interface: str | None
     qos: QosProfile | None
     span: Span
+    has_qos_overrides: bool
 
 
 def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
@@ -75,6 +79,7 @@ def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
             scope.known(scope.interface, argument(call, 0, names[0])),
             scope.known(partial(qos_profile, scope), qos),
             span_of(call, scope.source),
+            any(keyword.arg == "qos_overriding_options" for keyword in call.keywords),
         )
 
 

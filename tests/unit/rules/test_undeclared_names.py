@@ -113,10 +113,7 @@ def test_parameter_files(
     ("node", "expected"),
     [
         (f"{PROGRAM}, parameters: {{'qos_overrides./words.publisher.depth': 3, 'a b': 1}}", []),
-        (
-            f"{WORDS}, parameters: {{'qos_overrides./words.publisher.depth': 3}}",
-            [("error", "invalid-name")],
-        ),
+        (f"{WORDS}, parameters: {{'a/b': 3}}", [("error", "invalid-name")]),
         ("executable: {command: [python3, -V], nodes: [base, base]}", []),
         (
             "executable: {command: [python3, -V], nodes: [base, front-left/wheel]}",

@@ -1,0 +1,210 @@
+"""QoS overrides: what a parameter of a node changes, what it cannot, and where that is reported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from composer.loading import load_bytes
+from composer.model import System
+from tests.unit.support.checking import diagnostics_in, quoted
+
+NODES = """\
+system: words
+{above}nodes:
+  talker:
+    parameters: {{{talker}}}
+    publishers: {{words: {{type: std_msgs/msg/String, qos: command}}}}
+    timers: {{tick: {{rate_hz: 1, publish: {{words: {{}}}}}}}}
+  listener:
+    parameters: {{{listener}}}
+    subscriptions: {{words: {{type: std_msgs/msg/String, qos: command, log: "{{message.data}}"}}}}
+"""
+PUBLISHER, SUBSCRIPTION = "qos_overrides./words.publisher", "qos_overrides./words.subscription"
+
+
+def words(talker: str = "", listener: str = "", above: str = "") -> str:
+    return NODES.format(talker=talker, listener=listener, above=above)
+
+
+def profile(text: str, node: str, folder: Path) -> dict[str, object]:
+    loaded = load_bytes(text.encode(), folder, shown="system.yaml")
+    assert isinstance(loaded.system, System)
+    found = loaded.system.node(node)
+    assert found is not None
+    changed = found.ports[0].qos
+    return {name: getattr(changed.profile, name) for name in changed.overridden}
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("depth: 3", {"depth": 3}),
+        ("depth: 0", {"depth": 0}),
+        ("history: keep_all", {"history": "keep_all"}),
+        ("reliability: BEST_EFFORT", {"reliability": "best_effort"}),
+        ("durability: transient_local", {"durability": "transient_local"}),
+        ("deadline: 2500000", {"deadline_ms": 2.5}),
+        ("deadline: 9223372036854775807", {"deadline_ms": None}),
+        ("lifespan: 1000000000", {"lifespan_ms": 1000.0}),
+        ("lifespan: 0", {"lifespan_ms": None}),
+        ("liveliness: manual_by_topic", {"liveliness": "manual_by_topic"}),
+        ("liveliness_lease_duration: 1000000", {"liveliness_lease_duration_ms": 1.0}),
+    ],
+)
+def test_policies(given: str, expected: dict[str, object], tmp_path: Path) -> None:
+    policy, _, value = given.partition(": ")
+    (tmp_path / "all.yaml").write_text(
+        f"/**: {{ros__parameters: {{qos_overrides: {{/words: {{publisher: {{{given}}}}}}}}}}}\n"
+    )
+    by_key = words(f"{PUBLISHER}.{policy}: {value}")
+    by_file = words(above="parameter_files: [all.yaml]\n")
+    for text in (by_key, by_file):
+        assert profile(text, "talker", tmp_path) == expected
+        assert profile(text, "listener", tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("talker", "listener", "place", "message", "hint"),
+    [
+        (
+            "qos_overrides./wrods.publisher.depth: 1",
+            "",
+            "qos_overrides./wrods.publisher.depth",
+            "node 'talker' has no topic '/wrods'",
+            "did you mean '/words'?",
+        ),
+        (
+            "qos_overrides.words.publisher.depth: 1",
+            "",
+            "qos_overrides.words.publisher.depth",
+            "node 'talker' has no topic 'words'",
+            "did you mean '/words'?",
+        ),
+        (
+            f"{SUBSCRIPTION}.depth: 1",
+            "",
+            f"{SUBSCRIPTION}.depth",
+            "node 'talker' has no subscription on '/words'",
+            "valid here: publisher",
+        ),
+        (
+            f"{PUBLISHER}.realiability: best_effort",
+            "",
+            f"{PUBLISHER}.realiability",
+            "the policy 'realiability' of a publisher cannot be overridden",
+            "did you mean 'reliability'?",
+        ),
+        (
+            f"{PUBLISHER}.avoid_ros_namespace_conventions: true",
+            "",
+            f"{PUBLISHER}.avoid_ros_namespace_conventions",
+            "the policy 'avoid_ros_namespace_conventions' of a publisher cannot be overridden",
+            "valid here: deadline, depth, durability, history, lifespan, liveliness, "
+            "liveliness_lease_duration, reliability",
+        ),
+        (
+            "",
+            f"{SUBSCRIPTION}.lifespan: 1000000",
+            f"{SUBSCRIPTION}.lifespan",
+            "the policy 'lifespan' of a subscription cannot be overridden",
+            "valid here: deadline, depth, durability, history, liveliness, "
+            "liveliness_lease_duration, reliability",
+        ),
+        (
+            f"{PUBLISHER}.history: keep_lost",
+            "",
+            "keep_lost",
+            f"parameter '{PUBLISHER}.history' cannot be the string 'keep_lost'",
+            "did you mean 'keep_last'?",
+        ),
+        (
+            f"{PUBLISHER}.depth: '3'",
+            "",
+            "'3'",
+            f"parameter '{PUBLISHER}.depth' must be of type integer, not the string '3'",
+            None,
+        ),
+        (
+            f"{PUBLISHER}.deadline: -1",
+            "",
+            "-1",
+            f"parameter '{PUBLISHER}.deadline': -1 is less than the minimum of 0",
+            None,
+        ),
+        (
+            f"{PUBLISHER}.reliability: best_effort",
+            "",
+            "best_effort",
+            "publisher 'talker.words' offers reliability best_effort on '/words', "
+            "but subscription 'listener.words' requests reliable",
+            "offer reliable, or request best_effort",
+        ),
+        (
+            "",
+            f"{SUBSCRIPTION}.durability: transient_local",
+            "transient_local",
+            "subscription 'listener.words' requests durability transient_local on '/words', "
+            "but publisher 'talker.words' offers volatile",
+            "offer transient_local, or request volatile",
+        ),
+    ],
+)
+def test_mistakes(
+    talker: str, listener: str, place: str, message: str, hint: str | None, tmp_path: Path
+) -> None:
+    (found,) = diagnostics_in(words(talker, listener), tmp_path)
+    assert (quoted(found), found.message, found.hint) == (place, message, hint)
+
+
+def test_an_override_takes_precedence_over_a_connection(tmp_path: Path) -> None:
+    connections = (
+        "connections: [{topic: /words, from: talker.words, to: listener.words, qos: command}]\n"
+    )
+    text = words(f"{PUBLISHER}.depth: 4", above=connections)
+    assert profile(text, "talker", tmp_path) == {"depth": 4}
+    assert diagnostics_in(text, tmp_path) == []
+
+
+def test_a_topic_that_no_node_has_is_reported_for_wildcards(tmp_path: Path) -> None:
+    values = "qos_overrides: {/wrods: {publisher: {depth: 3}}, /clock: {subscription: {depth: 1}}}"
+    (tmp_path / "all.yaml").write_text(f"/**: {{ros__parameters: {{{values}}}}}\n")
+    (found,) = diagnostics_in(words(above="parameter_files: [all.yaml]\n"), tmp_path)
+    assert found.hint == f"did you mean '{PUBLISHER}.depth'?"
+
+
+CLASS = """\
+from rclpy.node import Node
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import String
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.words = self.create_publisher(String, "words", 10{options})
+"""
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("", ["class 'Talker' creates publisher 'words' with depth 10, not 3"]),
+        (", qos_overriding_options=QoSOverridingOptions.with_default_policies()", []),
+    ],
+)
+def test_a_class_decides_whether_parameters_override_its_qos(
+    options: str, expected: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "talker.py").write_text(CLASS.format(options=options))
+    text = f"""\
+system: words
+nodes:
+  talker:
+    class: "talker:Talker"
+    parameters: {{{PUBLISHER}.depth: 3, qos_overrides./other.publisher_id.depth: 2}}
+    publishers: {{words: {{type: std_msgs/msg/String, external: true, qos: command}}}}
+"""
+    found = diagnostics_in(text, tmp_path)
+    assert [item.message for item in found if item.rule.name == "class-port"] == expected
+    assert not [item for item in found if item.severity.value == "error"]
