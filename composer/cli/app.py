@@ -27,6 +27,7 @@ COMMANDS = {
         "service",
         "action",
         "param",
+        "log-level",
         "interface",
         "doctor",
     ),
@@ -115,12 +116,13 @@ def _needed_commands(arguments: Sequence[str]) -> Sequence[str]:
 
 
 def _add(app: typer.Typer, name: str) -> None:
-    module = import_module(f"composer.cli.commands.{_OTHER_MODULES.get(name, name)}")
-    group = getattr(module, f"{name}_app", None)
+    word = name.replace("-", "_")
+    module = import_module(f"composer.cli.commands.{_OTHER_MODULES.get(name, word)}")
+    group = getattr(module, f"{word}_app", None)
     if group is not None:
         app.add_typer(group, name=name)
     else:
-        app.command(name, epilog=module.EPILOG)(getattr(module, name))
+        app.command(name, epilog=module.EPILOG)(getattr(module, word))
 
 
 def _print_version(requested: bool) -> None:

@@ -111,14 +111,15 @@ class Introspection:
 
     ``parameters``: the parameter services (rcl_interfaces); ``rosout``: the publisher of its log on
     /rosout; ``type_description``: the service of that name; ``lifecycle_services``: those of
-    lifecycle_msgs. The manager node serves parameters and lifecycle for nodes without these
-    services.
+    lifecycle_msgs; ``logger_services``: those for the levels of loggers (rcl_interfaces). The
+    manager node serves parameters, lifecycle and levels for nodes without these services.
     """
 
     parameters: bool = True
     rosout: bool = True
     type_description: bool = True
     lifecycle_services: bool = True
+    logger_services: bool = False
 
     @property
     def endpoints(self) -> int:
@@ -128,6 +129,7 @@ class Introspection:
             self.rosout,
             2 * self.type_description,
             10 * self.lifecycle_services,
+            4 * self.logger_services,
         )
         return 1 + sum(numbers)  # transition_event is always there
 

@@ -24,7 +24,7 @@ from composer.model import (
     member_system,
 )
 from composer.model.names import join
-from composer.plan.drift.snapshot import LIFECYCLE_SERVICES, PARAMETER_SERVICES
+from composer.plan.drift.snapshot import LIFECYCLE_SERVICES, LOGGER_SERVICES, PARAMETER_SERVICES
 
 _VERSION = "0.2.0"
 _MANAGER = "manager"
@@ -185,7 +185,8 @@ def _manager(namespace: str, system: System) -> Profile:
     profile.allow(PortKind.PUBLISHER, "/diagnostics", "state", "callbacks")
     profile.allow(PortKind.PUBLISHER, "/parameter_events", "/rosout", SELF_TEST_TOPICS)
     profile.allow(PortKind.SUBSCRIPTION, "/clock", SELF_TEST_TOPICS)
-    profile.allow(PortKind.SERVICE, *_COMMANDS, *PARAMETER_SERVICES, "get_type_description")
+    profile.allow(PortKind.SERVICE, *_COMMANDS, *PARAMETER_SERVICES, *LOGGER_SERVICES)
+    profile.allow(PortKind.SERVICE, "get_type_description")
     profile.allow(PortKind.SERVICE, "_instance_*")
     if any(node.introspection.left_to_manager for node in system.nodes):
         profile.allow(PortKind.SERVICE, "change_state")
@@ -228,6 +229,8 @@ def _profile(node: Node) -> Profile:
         profile.allow(PortKind.SERVICE, *PARAMETER_SERVICES)
     if offers.type_description:
         profile.allow(PortKind.SERVICE, "get_type_description")
+    if offers.logger_services:
+        profile.allow(PortKind.SERVICE, *LOGGER_SERVICES)
     if offers.lifecycle_services:
         profile.allow(PortKind.SERVICE, *LIFECYCLE_SERVICES)
         profile.allow(PortKind.PUBLISHER, "transition_event")

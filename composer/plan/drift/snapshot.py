@@ -26,11 +26,14 @@ LIFECYCLE_SERVICES = {
     "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
     "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
 }
+LOGGER_SERVICES = {
+    "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
+    "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
+}
 _TOOL_SERVICES = {
     **PARAMETER_SERVICES,
     **LIFECYCLE_SERVICES,
-    "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
-    "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
+    **LOGGER_SERVICES,
     "get_type_description": "type_description_interfaces/srv/GetTypeDescription",
 }
 #: Topics of every node for tools.

@@ -16,6 +16,7 @@ from rcl_interfaces.msg import Log as LogMessage
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import set_logger_level
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -31,6 +32,8 @@ from composer.runtime.metrics.statistics import Statistics
 _ROSOUT_QOS = QoSProfile(
     depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
 )
+#: The levels of all loggers of the process are kept by rcutils, as for any ROS node.
+_is_enabled = rclpy_implementation.rclpy_logging_logger_is_enabled_for
 #: Raised if the node or its rclpy context has been destroyed.
 _DESTROYED = (InvalidHandle, rclpy_implementation.RCLError)
 #: Minimum time between two log lines about errors of the same callback.
@@ -40,6 +43,16 @@ WARNING_PERIOD_S = 10.0
 
 #: Called with (level, name of the logger, message).
 Write: TypeAlias = Callable[[LogLevel, str, str], None]
+
+
+def logger_name(node: str) -> str:
+    """Return the name of the logger of a node with the full name ``node``."""
+    return node.strip("/").replace("/", ".")
+
+
+def set_level(node: str, level: LogLevel) -> None:
+    """Set the level of the logger of a node of this process, by its full name."""
+    set_logger_level(logger_name(node), SEVERITIES[level])
 
 
 def severity(level: LogLevel) -> int:
@@ -54,20 +67,19 @@ class Log:
     also searches the stack for its caller at every call, which takes longer than the rest.
     """
 
-    def __init__(self, node: Node, level: LogLevel, write: Write, *, rosout: bool = True) -> None:
-        """Log messages of at least ``level``. ``node`` must not have rcl's rosout publisher.
+    def __init__(self, node: Node, write: Write, *, rosout: bool = True) -> None:
+        """Log messages at the level of the node's logger. ``node`` must not have rcl's publisher.
 
         Without ``rosout``, to the console only.
         """
-        self._name = node.get_fully_qualified_name().strip("/").replace("/", ".")
-        self._lowest = SEVERITIES[level]
+        self._name = logger_name(node.get_fully_qualified_name())
         self._write = write
         self._clock = node.get_clock()
         self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS) if rosout else None
 
     def is_enabled_for(self, level: LogLevel) -> bool:
         """Return whether messages at ``level`` are logged."""
-        return SEVERITIES[level] >= self._lowest
+        return bool(_is_enabled(self._name, SEVERITIES[level]))
 
     def write(self, level: LogLevel, message: str, caller: FrameType | None = None) -> None:
         """Log ``message`` at ``level``; see :meth:`emit`."""

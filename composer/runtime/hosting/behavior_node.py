@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.parameter import Parameter
 
-from composer.model import LogLevel, Node, Port
+from composer.model import Node, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.adopted_node import AdoptedNode
 from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
@@ -30,7 +30,7 @@ class NodeOfBehavior:
     What is created with it is gated by the lifecycle state. None of it is a declared port.
     """
 
-    def __init__(self, owner: LocalNode, level: LogLevel, parameters: dict[str, Parameter]) -> None:
+    def __init__(self, owner: LocalNode, parameters: dict[str, Parameter]) -> None:
         """``parameters`` were set at run time; those that are set now are added at the end."""
         install()
         self._parameters = parameters
@@ -43,7 +43,7 @@ class NodeOfBehavior:
             ),
             InstanceSettings(
                 overrides=dict(parameters),
-                logger=HostedLogger(context.log, context.node.get_logger().name, level),
+                logger=HostedLogger(context.log, context.node.get_logger().name),
                 action_names={},
                 finish=lambda reason: context.error_log.error("node", reason),
                 request=lambda transition: context.error_log.error("node", transition),

@@ -17,7 +17,7 @@ from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter as RosParameter
 
 from composer.behavior import TransitionFailed
-from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, LogLevel, Node
+from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, Node
 from composer.model.interface_packages import how_to_get
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
@@ -75,7 +75,6 @@ class HostedNode(LocalNode):
         self._hosted = cast(HostedClass, model.hosted_class)
         super().__init__(model, loop, options, listener, statistics)
         self._entities = PortSet()
-        self._log_level: LogLevel = options.log_level
         self._instance: Instance | None = None
         #: The parameters as the model or the last instance has declared them, until the next one.
         self._declared: dict[str, RosParameter] = {}
@@ -221,7 +220,7 @@ class HostedNode(LocalNode):
             DeclaredPorts(self.model, partial(report_undeclared, self._context)),
             InstanceSettings(
                 overrides=self._overrides | self._kept,
-                logger=HostedLogger(self._context.log, logger_name, self._log_level),
+                logger=HostedLogger(self._context.log, logger_name),
                 action_names=action_names(self.model),
                 finish=self._finish,
                 request=self._request,

@@ -17,12 +17,11 @@ _LEVELS = {severity: level for level, severity in SEVERITIES.items()}
 
 
 class HostedLogger(RcutilsLogger):
-    """What ``get_logger`` returns. Its level is that of the run until the class sets another."""
+    """What ``get_logger`` returns."""
 
-    def __init__(self, log: Log, name: str, level: LogLevel) -> None:
+    def __init__(self, log: Log, name: str) -> None:
         super().__init__(name)
         self._log = log
-        self.set_level(LoggingSeverity(SEVERITIES[level]))
 
     def get_child(self, name: str) -> RcutilsLogger:
         """Return the logger ``<this name>.<name>``, which has the level of this one."""

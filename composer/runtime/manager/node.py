@@ -22,7 +22,6 @@ from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel
 from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.clock.clock import NodeTime
 from composer.runtime.clock.sim_time import SimTimeSource
@@ -36,6 +35,7 @@ from composer.runtime.manager.other_instances import OtherInstances
 from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.publishing import ReportPublisher, ReportSources
 from composer.runtime.manager.queries import ManagerQueries
+from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
@@ -138,9 +138,10 @@ class ManagerNode:
             start_parameter_services=False,  # see parameter_services.py
         )
         limit_type_descriptions(self._node)
-        self._log = Log(self._node, LogLevel.INFO, host.write_log)
+        self._log = Log(self._node, host.write_log)
         store = ProxyParameterStore(self._node, host.nodes)
         ParameterServices(self._node, store, self._log.warn)
+        LoggerServices(self._node, self._log.warn)
         self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
         self.process_context = ProcessContext(

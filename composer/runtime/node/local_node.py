@@ -29,6 +29,7 @@ from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
+from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
@@ -85,7 +86,7 @@ class LocalNode(ABC):
         self._start_state = ""  # of the current transition
         self._ros = self._make_ros_node()
         offers = model.introspection
-        log = Log(self._ros, options.log_level, listener.write_log, rosout=offers.rosout)
+        log = Log(self._ros, listener.write_log, rosout=offers.rosout)
         self._error_limit = _error_limit(model, listener)
         error_log = ErrorLog(log, self.statistics, listener.on_error, self._error_limit)
         self._context = NodeContext(
@@ -113,6 +114,8 @@ class LocalNode(ABC):
         offers = self.model.introspection
         if offers.parameters:
             ParameterServices(self._ros, NodeParameterStore(self._ros), self._context.log.warn)
+        if offers.logger_services:
+            LoggerServices(self._ros, self._context.log.warn)
         self.loop.add_node(self._ros)
         self.lifecycle = Lifecycle(
             self._context_of_transitions(),

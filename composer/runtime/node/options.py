@@ -10,7 +10,7 @@ from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel, Node
+from composer.model import Node
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.clock.sim_time import SimTimeSource
@@ -45,7 +45,6 @@ class NodeOptions:
     chains: Chains
     process: ProcessContext
     seen_messages: MessageSnapshots | None = None
-    log_level: LogLevel = LogLevel.INFO
     transition_timeout_s: float = 10.0
     system_is_up: bool = False
     make_library_node: Callable[[Any], Any] | None = None

@@ -19,9 +19,11 @@ from typing import Any
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.srv import (
     DescribeParameters,
+    GetLoggerLevels,
     GetParameters,
     GetParameterTypes,
     ListParameters,
+    SetLoggerLevels,
     SetParameters,
     SetParametersAtomically,
 )
@@ -151,6 +153,8 @@ _CHECKS: dict[Any, _Check] = {
     GetParameters: _check_names,
     GetParameterTypes: _check_names,
     DescribeParameters: _check_names,
+    GetLoggerLevels: _check_names,
+    SetLoggerLevels: _check_names,
     ListParameters: _check_prefixes,
     SetParameters: _check_parameters,
     SetParametersAtomically: _check_parameters,

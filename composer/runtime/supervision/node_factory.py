@@ -18,7 +18,7 @@ from composer.model import (
 )
 from composer.model.names import join
 from composer.runtime.callbacks.chains import Chains
-from composer.runtime.callbacks.log import Write
+from composer.runtime.callbacks.log import Write, set_level
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.exceptions import log_exception
@@ -100,13 +100,12 @@ class NodeFactory:
             router=self._router,
             process=self._process,
             seen_messages=self._seen_messages,
-            log_level=self._log_level_of(node),
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
-            make_library_node=partial(
-                NodeOfBehavior, level=self._log_level_of(node), parameters={}
-            ),
+            make_library_node=partial(NodeOfBehavior, parameters={}),
         )
+        if before is None:  # else the level may have been changed at run time
+            set_level(node.full_name, self._log_level_of(node))
         loop = self._loop_of(executor)
         kind = RunningNode if node.hosted_class is None else HostedNode
         return kind(node, loop, options, self._make_listener(node), statistics)

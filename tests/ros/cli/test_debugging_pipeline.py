@@ -124,6 +124,15 @@ def test_each_query_is_answered_without_the_graph(
     assert {item.name for item in timed.callbacks} == expected
 
 
+def test_log_levels() -> None:
+    before = json.loads(listed(("planner", "motor_controller"), "log-level", "--json"))
+    assert [level for node, level in before.items() if "manager" not in node] == ["info"] * 3
+    assert compose("log-level", "planner", "debug").stdout.split()[1] == "debug"
+    for node, level in (("planner", "debug"), ("motor_controller", "info")):
+        assert compose("log-level", node).stdout.split()[1] == level
+    assert "there is no node 'planer'" in compose("log-level", "planer").stderr
+
+
 def test_the_manager_sees_the_same_graph_as_a_new_node(session: Session, peer: Peer) -> None:
     peer.node.create_publisher(String, "/of_an_external_node", 10)
     names = GraphNames(session, Deadline(PATIENCE_S))

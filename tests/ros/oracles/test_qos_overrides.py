@@ -18,7 +18,7 @@ from composer.model import PortKind
 from composer.model.qos_overrides import overridable_policies
 from tests.ros.support.in_process import Peer, running, wait_until
 
-#: Not supported here: all topics are topics of ROS. INVALID is no policy.
+#: Not supported here: all topics are topics of ROS. INVALID stands for none.
 LEFT_OUT = {QoSPolicyKind.AVOID_ROS_NAMESPACE_CONVENTIONS, QoSPolicyKind.INVALID}
 VALUES = {
     "history": "keep_all",

@@ -18,6 +18,7 @@ system: robot
 introspection: {parameters: false, rosout: true}
 nodes:
   plain: {}
+  logger: {introspection: {logger_services: true}}
   own: {introspection: {parameters: true, lifecycle_services: false}}
   typed: {type: lean}
   both: {type: lean, introspection: {rosout: false}}
@@ -45,6 +46,7 @@ def test_everything_is_offered_by_default(tmp_path: Path) -> None:
     ("node", "expected"),
     [
         ("plain", Introspection(parameters=False)),
+        ("logger", Introspection(parameters=False, logger_services=True)),
         ("own", Introspection(lifecycle_services=False)),
         ("typed", Introspection(parameters=False, type_description=False)),
         ("both", Introspection(parameters=False, rosout=False, type_description=False)),

@@ -1,0 +1,63 @@
+"""``compose log-level``: the log levels of running nodes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from composer.cli.support.completion import complete_node
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
+from composer.cli.support.results import as_json, say_none_found
+from composer.cli.support.ros import ros_session
+from composer.cli.support.terminal import columns, write
+from composer.model import LogLevel
+
+EPILOG = examples(
+    "compose log-level                 the levels of all nodes",
+    "compose log-level planner         the level of a node",
+    "compose log-level planner debug   set it",
+)
+
+
+def log_level(
+    node: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NODE]",
+            help="The full name of a node, or its last part. Default: all nodes.",
+            autocompletion=complete_node,
+        ),
+    ] = None,
+    level: Annotated[
+        LogLevel | None,
+        typer.Argument(
+            metavar="[LEVEL]", help="debug, info, warn, error or fatal. Default: print it."
+        ),
+    ] = None,
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Print or set the log levels of running nodes.
+
+    It works in every lifecycle state. The level stays until the process of the node ends, also if
+    the node is restarted. Programs need the logger services of rclpy or rclcpp.
+    """
+    with ros_session("compose log-level", timeout) as (session, deadline):
+        from composer.client.logger_levels import LoggerLevels
+
+        levels = LoggerLevels(session, deadline)
+        found: dict[str, str | None]
+        if node is None:
+            found = levels.all()
+        elif level is None:
+            found = dict([levels.get(node)])
+        else:
+            found = {levels.set(node, level): level.value}
+    if json:
+        write(as_json(found, indent=2))
+    elif found:
+        write(columns([(name, text or "no response") for name, text in found.items()]))
+    else:
+        say_none_found("node")
