@@ -7,7 +7,7 @@ import pytest
 from composer.base.diagnostics import Severity
 from composer.base.resources import nodes_folder, systems_folder
 from composer.interfaces import Interfaces
-from composer.loading import load, load_bytes
+from composer.loading import load
 from composer.loading.reported import LoadResult
 from composer.model.resolve import OverrideOptions
 from composer.project.files import find_files
@@ -42,15 +42,6 @@ def write(folder: Path, text: str, name: str = "robot.yaml") -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def test_a_good_system_can_run(tmp_path: Path, interfaces: Interfaces) -> None:
-    loading = load(write(tmp_path, GOOD), interfaces=interfaces)
-    assert errors(loading) == []
-    assert loading.is_runnable
-    assert loading.system is not None
-    assert loading.system.name.value == "robot"
-    assert loading.source.text == GOOD
 
 
 @pytest.mark.parametrize(
@@ -116,23 +107,6 @@ def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: I
     assert "--namespace:1 invalid-name" in found
 
 
-def test_a_good_setting_is_taken(tmp_path: Path, interfaces: Interfaces) -> None:
-    loading = load(
-        write(tmp_path, GOOD),
-        overrides=OverrideOptions(("talker.speed=2",), "left"),
-        interfaces=interfaces,
-    )
-    assert errors(loading) == []
-    assert loading.system is not None
-    talker = loading.system.node("talker")
-    assert talker is not None
-    assert talker.full_name == "/left/talker"
-    speed = talker.parameter("speed")
-    assert speed is not None
-    assert speed.value is not None
-    assert speed.value.value == 2.0
-
-
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
@@ -151,19 +125,6 @@ def test_a_file_of_another_kind_has_a_diagnostic_and_no_system(
     assert not loading.is_runnable
     assert len(loading.diagnostics) == 1
     assert rule in {None, loading.diagnostics[0].rule.name}
-
-
-def test_a_missing_file_has_a_diagnostic(tmp_path: Path, interfaces: Interfaces) -> None:
-    loading = load(tmp_path / "missing.yaml", shown="missing.yaml", interfaces=interfaces)
-    assert loading.system is None
-    assert [str(diagnostic.primary) for diagnostic in loading.diagnostics] == ["missing.yaml:1:1"]
-
-
-def test_text_from_elsewhere_belongs_to_a_folder(tmp_path: Path, interfaces: Interfaces) -> None:
-    write(tmp_path, "node: camera\n", "nodes/camera.yaml")
-    text = b"system: robot\nnodes: {front: {type: camera}, back: {type: camra}}\n"
-    loading = load_bytes(text, tmp_path, shown="<stdin>", interfaces=interfaces)
-    assert errors(loading) == ["<stdin>:2 unknown-node-type"]
 
 
 def test_a_node_type_is_checked_alone(tmp_path: Path, interfaces: Interfaces) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Iterator
@@ -19,7 +18,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from composer.runtime.executors import actions
 from composer.runtime.executors.tasks import sleep
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line
+from tests.ros.support.loops import KINDS, Bench, bench, peer, wait_for_line
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
 
@@ -70,27 +69,6 @@ class serving:  # noqa: N801
     def __exit__(self, *_: object) -> None:
         self.on.loop.remove(self.server)
         self.server.destroy()
-
-
-@pytest.mark.usefixtures("server")
-class TestServer:
-    def test_a_goal_of_another_process_runs_with_feedback_to_its_result(self) -> None:
-        with peer("send_goal", "navigate", 1.0, "") as process:
-            seen = json.loads(last_line(process))
-        assert seen["status"] == GoalStatus.STATUS_SUCCEEDED
-        assert seen["message"] == "arrived"
-        assert seen["feedback"] == [0.0, 1.0, 2.0]
-
-    def test_a_goal_can_be_canceled(self) -> None:
-        with peer("send_goal", "navigate", 0.1, "cancel") as process:
-            seen = json.loads(last_line(process))
-        assert seen["canceling"] == 1
-        assert seen["status"] == GoalStatus.STATUS_CANCELED
-        assert seen["message"] == "canceled"
-
-    def test_a_goal_can_be_rejected(self) -> None:
-        with peer("send_goal", "navigate", 0.0, "") as process:
-            assert json.loads(last_line(process)) == {"accepted": False}
 
 
 def own_client(on: Bench) -> ActionClient:
@@ -271,6 +249,3 @@ class TestClient:
         result = handle.get_result_async()
         assert len(wait_for(handle.cancel_goal_async()).goals_canceling) == 1
         assert wait_for(result).status == GoalStatus.STATUS_CANCELED
-
-    def test_is_notified_of_a_rejection(self, client: ActionClient) -> None:
-        assert not wait_for(client.send_goal_async(Navigate.Goal(max_velocity=0.0))).accepted

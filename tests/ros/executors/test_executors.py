@@ -24,10 +24,6 @@ def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
         yield running
 
 
-def test_has_the_name_of_the_system_file(on: Bench) -> None:
-    assert on.loop.name == "default"
-
-
 def test_calls_from_another_thread_start_in_order(on: Bench) -> None:
     seen: list[int] = []
     lock = threading.Lock()
@@ -40,14 +36,6 @@ def test_calls_from_another_thread_start_in_order(on: Bench) -> None:
         on.loop.call_soon(lambda number=number: note(number))
     wait_until(lambda: len(seen) == 100)
     assert sorted(seen) == list(range(100))
-
-
-def test_calls_after_a_delay_and_not_before(on: Bench) -> None:
-    called_at: list[float] = []
-    begin = time.monotonic()
-    on.loop.call_later(0.05, lambda: called_at.append(time.monotonic()))
-    wait_until(lambda: called_at)
-    assert called_at[0] - begin >= 0.05
 
 
 def test_a_canceled_call_is_not_made(on: Bench) -> None:
@@ -126,16 +114,6 @@ def test_a_period_must_be_positive(on: Bench, period_s: float) -> None:
         on.loop.call_every(period_s, lambda: None)
 
 
-def test_runs_a_task_to_its_result(on: Bench) -> None:
-    async def work() -> str:
-        await sleep(on.loop, 0.02)
-        return "slept"
-
-    future = on.loop.run_task(work())
-    wait_until(future.done)
-    assert future.result() == "slept"
-
-
 def test_canceling_the_future_of_a_task_ends_the_coroutine(on: Bench) -> None:
     seen: list[str] = []
     begun: list[bool] = []
@@ -155,15 +133,6 @@ def test_canceling_the_future_of_a_task_ends_the_coroutine(on: Bench) -> None:
     assert on.reports == []
 
 
-def test_an_unawaited_task_reports_its_exception(on: Bench) -> None:
-    async def work() -> None:
-        raise ValueError("broken")
-
-    on.loop.run_task(work())
-    wait_until(lambda: on.reports)
-    assert [str(error) for _, error in on.reports] == ["broken"]
-
-
 @pytest.mark.parametrize("error", [ValueError, SystemExit, KeyboardInterrupt])
 def test_an_exception_in_a_call_is_reported_and_the_loop_continues(
     on: Bench, error: type[BaseException]
@@ -181,15 +150,6 @@ def test_an_exception_in_a_call_is_reported_and_the_loop_continues(
 
 
 class TestRun:
-    def test_returns_what_the_function_returns(self, on: Bench) -> None:
-        thread = on.loop.run(threading.get_ident, 5.0)
-        assert thread != threading.get_ident()
-
-    def test_raises_what_the_function_raises(self, on: Bench) -> None:
-        with pytest.raises(ZeroDivisionError):
-            on.loop.run(lambda: 1 / 0, 5.0)
-        assert on.reports == []
-
     def test_on_the_loop_it_calls_at_once(self, on: Bench) -> None:
         assert on.loop.run(lambda: on.loop.run(lambda: "inner", 5.0), 5.0) == "inner"
 

@@ -8,20 +8,16 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-import rclpy
-from builtin_interfaces.msg import Time
 from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import GetLoggerLevels, SetParameters
+from rcl_interfaces.srv import GetLoggerLevels
 from rclpy.lifecycle import LifecycleNode
-from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.runtime.executors.futures import Future, wrap_future
+from composer.runtime.executors.futures import wrap_future
 from composer.runtime.executors.tasks import sleep, within
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer
 
 ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
 
@@ -42,12 +38,6 @@ def call(on: Bench, client: Any, request: Any) -> Any:
     future = on.loop.run_task(ask())
     wait_until(future.done)
     return future.result()
-
-
-def test_a_request_of_another_process_is_answered(on: Bench) -> None:
-    on.serve(Trigger, "ask", lambda _, reply: reply(Trigger.Response(success=True, message="now")))
-    with peer("call", "ask", 3) as process:
-        assert json.loads(last_line(process)) == [[True, "now"]] * 3
 
 
 def test_responses_may_be_sent_later_and_in_any_order(on: Bench) -> None:
@@ -100,23 +90,6 @@ def test_if_the_callback_raises_the_client_gets_a_response(
     assert "service 'ask'" in on.reports[0][0]
 
 
-def test_a_client_gets_the_response_of_another_process(on: Bench) -> None:
-    client = on.client(Trigger, "ask")
-    with peer("serve", "ask") as process:
-        wait_for_line(process, "serving")
-        wait_until(client.service_is_ready)
-        seen: list[str] = []
-
-        def ask() -> None:  # again and again: the server may find the client later than that it
-            future = client.call_async(Trigger.Request())
-            future.add_done_callback(lambda done: seen.append(done.result().message))
-
-        timer = on.loop.call_every(0.2, ask)
-        wait_until(lambda: seen)
-        timer.cancel()
-    assert set(seen) == {"from the peer"}
-
-
 def test_a_call_without_a_response_times_out_and_is_forgotten(on: Bench) -> None:
     on.serve(Trigger, "ask", lambda _, reply: None)
     client = on.client(Trigger, "ask")
@@ -165,24 +138,6 @@ def test_an_exception_in_a_done_callback_is_reported(on: Bench) -> None:
     assert "fall_over" in on.reports[0][0]
 
 
-def test_a_hundred_calls_at_once_are_all_answered(on: Bench) -> None:
-    on.serve(Trigger, "ask", lambda _, reply: reply(Trigger.Response(success=True)))
-    client = on.client(Trigger, "ask")
-    wait_until(client.service_is_ready)
-
-    async def ask_all() -> int:
-        answers = 0
-        for _ in range(10):
-            futures = [client.call_async(Trigger.Request()) for _ in range(10)]
-            for future in futures:
-                answers += (await future).success
-        return answers
-
-    outcome: Future[int] = on.loop.run_task(ask_all())
-    wait_until(outcome.done)
-    assert outcome.result() == 100
-
-
 @pytest.fixture
 def managed(on: Bench) -> Iterator[None]:
     """A lifecycle node of rclpy, ``/managed``, on the same loop."""
@@ -214,14 +169,6 @@ class TestServicesOfALifecycleNode:
 
 
 class TestServicesOfEveryNode:
-    def test_parameters_can_be_set(self, on: Bench) -> None:
-        on.node.declare_parameter("speed", 1.0)
-        client = on.client(SetParameters, "bench/set_parameters")
-        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=2.5)
-        request = SetParameters.Request(parameters=[Parameter(name="speed", value=value)])
-        assert call(on, client, request).results[0].successful
-        assert on.node.get_parameter("speed").value == 2.5
-
     def test_logger_levels_can_be_read(self, on: Bench) -> None:
         client = on.client(GetLoggerLevels, "bench/get_logger_levels")
         answer = call(on, client, GetLoggerLevels.Request(names=["bench"]))
@@ -231,13 +178,6 @@ class TestServicesOfEveryNode:
         client = on.client(GetTypeDescription, "bench/get_type_description")
         request = GetTypeDescription.Request(type_name="std_srvs/srv/Trigger", type_hash="wrong")
         assert "parse type hash" in call(on, client, request).failure_reason
-
-    def test_the_clock_follows_simulated_time(self, on: Bench) -> None:
-        on.node.set_parameters([rclpy.parameter.Parameter("use_sim_time", value=True)])
-        publisher = on.node.create_publisher(Clock, "/clock", 10)
-        wait_until(publisher.get_subscription_count)
-        publisher.publish(Clock(clock=Time(sec=1234)))
-        wait_until(lambda: on.node.get_clock().now().nanoseconds == 1234 * 10**9)
 
     @pytest.mark.parametrize("kind", ["plain", "async"])
     def test_a_service_that_was_not_added_uses_its_own_callback(self, on: Bench, kind: str) -> None:

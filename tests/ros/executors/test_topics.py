@@ -2,62 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Iterator
 
 import pytest
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
-from std_msgs.msg import Int64, String
+from rclpy.qos import HistoryPolicy
+from std_msgs.msg import Int64
 
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer, wait_for_line
+from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer
 
 
 @pytest.fixture(params=KINDS)
 def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
     with bench(request.param) as running:
         yield running
-
-
-def test_messages_of_another_process_arrive_in_order(on: Bench) -> None:
-    seen: list[int] = []
-    on.subscribe(Int64, "numbers", lambda message: seen.append(message.data), depth=300)
-    with peer("flood", "numbers", 200, 300):
-        wait_until(lambda: len(seen) == 200)
-    assert sorted(seen) == list(range(200))
-    assert on.reports == []
-
-
-def test_messages_reach_another_process(on: Bench) -> None:
-    publisher = on.node.create_publisher(String, "texts", 1000)
-    numbers = iter(range(1_000_000))
-    with peer("collect", "texts", 5) as process:
-        wait_until(publisher.get_subscription_count)
-        timer = on.loop.call_every(
-            0.01, lambda: publisher.publish(String(data=f"text {next(numbers)}"))
-        )
-        seen = json.loads(last_line(process))
-        timer.cancel()
-    first = int(seen[0].removeprefix("text "))
-    assert seen == [f"text {first + further}" for further in range(5)]
-
-
-def test_a_late_joiner_gets_the_latched_messages(on: Bench) -> None:
-    with peer("latched", "state", "kept") as process:
-        wait_for_line(process, "published")
-        seen: list[str] = []
-        on.subscribe(
-            String,
-            "state",
-            lambda message: seen.append(message.data),
-            depth=1,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL,
-        )
-        wait_until(lambda: seen)
-    assert seen == ["kept"]
 
 
 def test_messages_from_before_the_subscription_was_added_are_served(on: Bench) -> None:
@@ -143,22 +103,6 @@ def test_a_slow_subscription_does_not_delay_a_timer(on: Bench) -> None:
         meanwhile = len(ticks) - before
     # Of about a hundred during a thousand messages of a millisecond, however fast the machine is.
     assert meanwhile > 20
-
-
-def test_qos_events_reach_their_callback(on: Bench) -> None:
-    policies: list[object] = []
-    on.node.create_subscription(
-        String,
-        "latched",
-        lambda _: None,
-        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
-        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=policies.append),
-    )
-    on.node.create_publisher(String, "latched", 10)
-    wait_until(lambda: policies)
-    assert policies[0].total_count == 1  # type: ignore[attr-defined]
-    time.sleep(0.05)  # no further event: there is no state to wait for
-    assert len(policies) == 1
 
 
 def test_entities_are_created_and_destroyed_during_a_flood(on: Bench) -> None:

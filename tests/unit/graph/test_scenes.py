@@ -63,18 +63,6 @@ def test_a_node_that_subscribes_to_itself_has_an_arrow_to_itself() -> None:
     assert [(edge.source, edge.target) for edge in edges] == [("node:/echo", "node:/echo")]
 
 
-def test_servers_stand_before_their_clients_in_the_bring_up() -> None:
-    text = """
-        system: shop
-        nodes:
-          client: {clients: {ask: {type: std_srvs/srv/Trigger}}}
-          server: {services: {ask: {type: std_srvs/srv/Trigger}}}
-    """
-    (edge,) = build_graph(scene_of([system_of(text)]), View.LIFECYCLE).edges
-    assert (edge.source, edge.target) == ("node:/server", "node:/client")
-    assert (edge.kind, edge.lines) == ("implied", ("serves /ask",))
-
-
 def ends(kind: PortKind, topic: str, **policies: object) -> tuple[ObservedEndpoint, ...]:
     return (ObservedEndpoint(kind, topic, STRING, QosProfile(**policies)),)  # type: ignore[arg-type]
 
@@ -143,13 +131,3 @@ def test_parameters_that_are_not_finite_are_yaml_text(tmp_path: Path) -> None:
     assert system is not None
     (vertex,) = build_graph(scene_of([system]), View.NODES).vertices
     assert dict(vertex.details)["parameters"] == {"a": "-.inf", "b": [".nan", ".inf", 2.0]}
-
-
-def test_nodes_in_a_program_are_noted() -> None:
-    system = system_of("""
-        system: robot
-        nodes: {base: {executable: {command: [base], nodes: [base, wheels, /lidar]}}}
-    """)
-    (base,) = build_graph(scene_of([system]), View.NODES).vertices
-    assert base.lines == ("base", "executable · with 2 more nodes")
-    assert dict(base.details)["inner_nodes"] == ["/wheels", "/lidar"]

@@ -41,57 +41,10 @@ TALK = """
 """
 
 
-def test_the_rate_comes_from_the_timer_and_its_parameter_and_the_profile_is_shown_once() -> None:
-    lines = arrows(drawn(TALK))
-    assert lines["node:/left/talker", "topic:/chatter"] == ("4 Hz", "sensor_data")
-    assert lines["topic:/chatter", "node:/right/listener"] == ()
-
-
 def test_a_timer_with_a_condition_promises_no_rate() -> None:
     text = TALK.replace("publish: {chatter", "when: count > 3, publish: {chatter")
     lines = arrows(drawn(text))
     assert lines["node:/left/talker", "topic:/chatter"] == ("sensor_data",)
-
-
-def test_namespaces_are_frames_and_one_that_holds_one_other_is_none() -> None:
-    text = """
-        system: nested
-        nodes:
-          one: {namespace: a/b/c}
-          two: {namespace: a/b/d}
-          three: {namespace: x/y/z}
-    """
-    clusters = {cluster.key: cluster.parent for cluster in drawn(text).clusters}
-    assert clusters == {"/a/b": "", "/a/b/c": "/a/b", "/a/b/d": "/a/b", "/x/y/z": ""}
-
-
-def test_connections_join_ports_and_say_both_profiles_where_they_differ() -> None:
-    text = TALK.replace(
-        "/chatter, qos: sensor_data}}\n      asker",
-        "/chatter, qos: {extends: sensor_data, depth: 2}}}\n      asker",
-    )
-    lines = arrows(drawn(text, View.CONNECTIONS))
-    assert lines["publisher:/left/talker.chatter", "subscription:/right/listener.chatter"] == (
-        "/chatter",
-        "String",
-        "4 Hz",
-        "sensor_data → best_effort, volatile, keep_last 2",
-    )
-    assert lines["client:/right/asker.ask", "service:/answerer.ask"] == ("/ask", "Trigger")
-
-
-def test_the_deployment_view_names_processes_and_their_hosts() -> None:
-    text = """
-        system: robot
-        hosts: {jetson: {address: 10.0.0.5}}
-        processes: {vision: {nodes: [camera], host: jetson}, control: {nodes: [arm]}}
-        nodes:
-          camera: {on_activate: {log: on}}
-          arm: {on_activate: {log: on}}
-    """
-    graph = drawn(text, View.DEPLOYMENT)
-    labels = [cluster.label for cluster in graph.clusters]
-    assert labels == ["process vision on jetson", "process control"]
 
 
 def test_the_position_of_a_diagnostic_is_marked() -> None:

@@ -23,65 +23,6 @@ def system_with(*nodes: str, head: str = "") -> str:
     return "\n".join(["system: robot", *([head] if head else []), "nodes:", *lines]) + "\n"
 
 
-def test_nodes_are_configured_then_activated_behind_what_they_depend_on() -> None:
-    system = system_of(
-        system_with(
-            "arm: {namespace: left, lifecycle: {depends_on: [base]}}",
-            "eye: {}",
-            "base: {lifecycle: {depends_on: {power: inactive}}}",
-            "power: {}",
-        )
-    )
-    plan = bring_up(system)
-    assert str(plan) == (
-        "#1 configure /eye: system autostart is active\n"
-        "#2 configure /power: base depends on it\n"
-        "#3 configure /base after #2: arm depends on it\n"
-        "#4 configure /left/arm after #3: system autostart is active\n"
-        "#5 activate /eye: system autostart is active\n"
-        "#6 activate /power: base depends on it\n"
-        "#7 activate /base: arm depends on it\n"
-        "#8 activate /left/arm after #7: system autostart is active"
-    )
-
-
-def test_tear_down_is_the_reverse_in_three_phases() -> None:
-    system = system_of(system_with("arm: {lifecycle: {depends_on: [base]}}", "base: {}", "eye: {}"))
-    plan = tear_down(system)
-    assert steps(plan) == [
-        f"{transition} {node}"
-        for transition in ("deactivate", "cleanup", "shutdown")
-        for node in ("eye", "arm", "base")
-    ]
-    assert set(causes(plan).values()) == {"system is shutting down"}
-    assert [step.number for step in plan.steps] == list(range(1, 10))
-    assert [(step.node, step.number, step.after) for step in plan.steps if step.after] == [
-        ("base", 3, (2,)),
-        ("base", 6, (5,)),
-        ("base", 9, (8,)),
-    ]
-
-
-def test_steps_of_a_phase_wait_only_for_what_they_depend_on() -> None:
-    system = system_of(
-        system_with(
-            "low: {}",
-            "left: {lifecycle: {depends_on: [low]}}",
-            "right: {lifecycle: {depends_on: {low: inactive}}}",
-            "top: {lifecycle: {depends_on: [left, right]}}",
-        )
-    )
-    configure, activate = bring_up(system).phases
-    assert [step.after for step in configure] == [(), (1,), (1,), (2, 3)]
-    assert [step.after for step in activate] == [(), (5,), (), (6, 7)]
-
-
-def test_independent_nodes_keep_the_order_they_are_declared_in() -> None:
-    names = ["z", "a", "m", "b"]
-    system = system_of(system_with(*(f"{name}: {{}}" for name in names)))
-    assert steps(bring_up(system))[:4] == [f"configure {name}" for name in names]
-
-
 @pytest.mark.parametrize(
     ("own", "given", "expected"),
     [
@@ -165,28 +106,6 @@ def test_nodes_that_serve_each_other_keep_the_order_they_are_declared_in() -> No
     assert steps(bring_up(system))[:2] == ["configure a", "configure b"]
 
 
-def test_a_node_that_calls_itself_does_not_wait() -> None:
-    system = system_of(
-        system_with(
-            "a: {services: {x: {type: x/srv/X}}, clients: {y: {type: x/srv/X, service: x}}}"
-        )
-    )
-    assert dependency_edges(system) == ()
-
-
-def test_cycles_are_found_each_once_and_shortest() -> None:
-    system = system_of(
-        system_with(
-            "free: {lifecycle: {depends_on: [a]}}",
-            "c: {lifecycle: {depends_on: [a]}}",
-            "b: {lifecycle: {depends_on: [c, a]}}",
-            "a: {lifecycle: {depends_on: [b, missing]}}",
-            "itself: {lifecycle: {depends_on: [itself]}}",
-        )
-    )
-    assert dependency_cycles(system) == (("c", "a", "b"), ("itself",))
-
-
 def test_a_plan_ends_even_where_dependencies_go_round_in_a_circle() -> None:
     system = system_of(
         system_with(
@@ -213,12 +132,6 @@ def test_a_long_chain_takes_no_time_and_no_stack() -> None:
     assert time.process_time() - start < 20.0
     assert steps(plan)[0] == f"configure n{count}"
     assert steps(plan)[count] == "configure n0"
-
-
-def test_a_system_without_nodes_has_an_empty_plan() -> None:
-    system = system_of("system: robot\n")
-    assert str(bring_up(system)) == ""
-    assert tear_down(system) == Plan(())
 
 
 def test_the_nodes_of_a_process_go_down_in_the_order_of_the_whole_system() -> None:

@@ -267,18 +267,6 @@ def test_policies(
     assert decision.reason == f"silent for 300 ms{hangs}"
 
 
-@pytest.mark.parametrize(
-    ("then", "action"), [("", OnFailure.ISOLATE), (", then: shutdown", OnFailure.SHUTDOWN)]
-)
-def test_a_node_is_given_up_after_its_last_restart(then: str, action: OnFailure) -> None:
-    system = robot(f"{{on_failure: restart, restart: {{max_attempts: 1{then}}}}}")
-    desired = DesiredState(states("aaaaa"), restarts={"sensor": (99.0,)})
-    decision = decide(system, desired, fault("sensor"), NOW_S)
-    assert decision is not None
-    assert (decision.action, decision.condition) == (action, "given up")
-    assert decision.reason == "silent for 300 ms; restarted once within 60 s before"
-
-
 def test_a_node_that_is_not_required_never_ends_the_system() -> None:
     system = robot("{on_failure: shutdown}", camera="{required: false}")
     desired = DesiredState(states("aaaaa"))

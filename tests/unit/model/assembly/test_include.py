@@ -65,15 +65,6 @@ def system_of(loading: LoadResult) -> System:
 QUIET = {"impossible-chain"}
 
 
-def test_everything_in_a_file_becomes_a_part(tmp_path: Path) -> None:
-    system = system_of(included(tmp_path, "camera.yaml"))
-    assert [node.full_name for node in system.nodes] == ["/driver", "/screen/viewer"]
-    assert [str(end.text) for end in system.connections[0].sinks] == ["viewer.image"]
-    assert [executor.name.value for executor in system.executors] == ["vision"]
-    assert [chain.name.value for chain in system.chains] == ["seen"]
-    assert system.name.value == "whole"
-
-
 def test_wildcards_of_a_parameter_file_apply_to_its_nodes_only(tmp_path: Path) -> None:
     rest = "nodes: {operator: {on_activate: {log: started}}}\n"
     system = system_of(included(tmp_path, "camera.yaml", rest))
@@ -319,19 +310,6 @@ def test_no_link_leads_out(tmp_path: Path) -> None:
     ]
 
 
-def test_a_file_that_is_included_twice_under_the_same_names(tmp_path: Path) -> None:
-    twice = "camera.yaml\n  - {file: camera.yaml, namespace: left}"
-    [diagnostic] = [
-        item for item in included(tmp_path, twice).diagnostics if item.rule.name not in QUIET
-    ]
-    assert (str(diagnostic.primary), diagnostic.rule.name) == (
-        "whole.yaml:4:12",
-        "duplicate-name",
-    )
-    by_name = "camera.yaml, prefix: a_}\n  - {file: camera.yaml, prefix: b_}"
-    system_of(included(tmp_path, "{file: " + by_name))
-
-
 @pytest.mark.parametrize(
     ("include", "rule"),
     [
@@ -359,21 +337,6 @@ connections:
     circle = "system: circle\ninclude: [whole.yaml]\n"
     loading = included(tmp_path, include, rest, broken="system: [\n", circle=circle)
     assert [line.split()[1] for line in reported(loading.diagnostics)] == [rule]
-
-
-def test_the_settings_of_the_project_hold_for_what_is_included(tmp_path: Path) -> None:
-    unheard = "system: part\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
-    files = {
-        "part": unheard + "qos: command}}}\n",
-        "composer": "ignore: [publisher-without-subscription]\n",
-    }
-    assert reported(included(tmp_path, "part.yaml", **files).diagnostics) == []
-
-
-def test_an_argument_with_a_wrong_name_is_reported_at_the_include(tmp_path: Path) -> None:
-    entry = "{for_each: {rate: [10, 20]}, file: camera.yaml, prefix: 'c${rate}_', variables: %s}"
-    loading = included(tmp_path, entry % "{rate_hzz: '${rate}'}")
-    assert reported(loading.diagnostics) == ["whole.yaml:3:86 unknown-variable"]
 
 
 def test_a_prefix_changes_keys_and_not_the_names_in_ros(tmp_path: Path) -> None:

@@ -35,18 +35,6 @@ def test_a_misspelled_section_is_the_only_report(tmp_path: Path, key: str, text:
     assert diagnostic.hint.startswith("did you mean '")
 
 
-def test_a_misspelled_section_of_a_node_type_is_the_only_report(tmp_path: Path) -> None:
-    (tmp_path / "nodes").mkdir()
-    (tmp_path / "nodes" / "speaker.yaml").write_text(
-        "node: speaker\n"
-        "publshers: {talk: {type: std_msgs/msg/String, external: true, qos: command}}\n"
-        "timers: {tick: {rate_hz: 1, publish: {talk: {data: hello}}}}\n"
-    )
-    (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {type: speaker}}\n")
-    [diagnostic] = load(tmp_path / "a.yaml").diagnostics
-    assert diagnostic.message == "'publshers' is not a key of a node type"
-
-
 SAID_OF_COPIES = {
     "a cycle": "nodes:\n  a: {lifecycle: {depends_on: [b]}}\n  b: {lifecycle: {depends_on: [a]}}\n",
     "a relative name": "nodes:\n  a: {services: {ask: {type: std_srvs/srv/Trigger, "

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-from pathlib import Path
-
-from composer.model import ChannelKind, Delivery, Isolation, System
+from composer.model import Delivery, Isolation, System
 from tests.unit.support.resolving import quoted, system_of
 
 NODES = """\
@@ -53,30 +51,6 @@ def test_a_remapping_matches_by_the_expanded_name() -> None:
     assert (quoted(first.source.span), quoted(first.target.span)) == ("y", "w")
 
 
-def test_a_connection_names_its_ports() -> None:
-    system = system_of(
-        NODES
-        + """\
-    connections:
-      - {topic: data, from: a.out, to: [b.in], qos: odometry}
-      - {service: /ask, server: a.ask, clients: b.ask}
-    """
-    )
-    names = full_names(system)
-    assert (names["a.out"], names["b.in"]) == ("/robot1/data", "/robot1/data")
-    assert (names["a.ask"], names["b.ask"]) == ("/ask", "/ask")
-    data, ask = system.connections
-    assert (data.kind, str(data.name), str(data.qos)) == (ChannelKind.TOPIC, "data", "odometry")
-    assert [(end.node, end.port) for end in (*ask.sources, *ask.sinks)] == [
-        ("a", "ask"),
-        ("b", "ask"),
-    ]
-    assert quoted(data.sinks[0].text.span) == "b.in"
-    port = system.port(data.sources[0])
-    assert port is not None
-    assert port.full_name == "/robot1/data"
-
-
 def test_a_connections_profile_wins_over_the_ports() -> None:
     system = system_of(
         NODES + "    connections:\n      - {topic: data, from: a.out, to: b.in, qos: odometry}\n"
@@ -90,14 +64,6 @@ def test_a_connections_profile_wins_over_the_ports() -> None:
         assert quoted(end.qos.span) == "odometry"
         assert quoted(end.qos.policy_span("depth")) == "1"
     assert [reference.name.value for reference in system.qos_references].count("odometry") == 1
-
-
-def test_a_connection_may_write_its_profile_out() -> None:
-    system = system_of(
-        NODES + "    connections:\n      - {topic: data, from: a.out, to: b.in, qos: {depth: 2}}\n"
-    )
-    assert system.nodes[0].ports[0].qos.profile.depth == 2
-    assert system.connections[0].qos is None
 
 
 def test_an_unknown_name_in_a_connection_stays_as_written() -> None:
@@ -129,27 +95,6 @@ def test_of_two_connections_of_a_port_the_first_counts() -> None:
     out = system.nodes[0].port("out")
     assert out is not None
     assert out.qos.profile.depth == 1
-
-
-def test_ports_of_types_are_joined_as_those_of_inline_nodes(tmp_path: Path) -> None:
-    (tmp_path / "relay.yaml").write_text(
-        "node: relay\nsubscriptions: {in: {type: x/msg/X}}\npublishers: {out: {type: x/msg/X}}\n"
-    )
-    system = system_of(
-        """\
-        system: robot
-        nodes: {one: {type: relay}, two: {type: relay, namespace: far}}
-        connections:
-          - {topic: /between, from: one.out, to: two.in}
-        """,
-        tmp_path,
-    )
-    assert full_names(system) == {
-        "one.out": "/between",
-        "one.in": "/in",
-        "two.out": "/far/out",
-        "two.in": "/between",
-    }
 
 
 def test_a_connection_says_how_its_ports_are_joined_and_others_follow_the_system() -> None:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.source import Located, SourceFile
+from composer.base.source import SourceFile
 from composer.language.document import parse_document
-from composer.model import Dependency, Event, ExecutorKind, PortKind, PrimaryState
+from composer.model import Event, PortKind
 from composer.model.resolve import resolve
 from composer.project import Project
 from composer.project.node_types import NodeTypes
@@ -32,45 +32,6 @@ on_activate: {log: ready}
 def nodes(tmp_path: Path) -> Path:
     (tmp_path / "camera.yaml").write_text(CAMERA)
     return tmp_path
-
-
-def test_a_system_says_what_is_in_it() -> None:
-    system = system_of("""\
-        system: robot
-        description: Two nodes.
-        executors:
-          control: {kind: single_threaded}
-          perception: {kind: multi_threaded, threads: 4}
-          rest: {cpus: [1, 3], priority: 50}
-        lifecycle: {autostart: inactive}
-        nodes:
-          talker: {executor: control, description: Talks.}
-          listener:
-        """)
-    assert system.name.value == "robot"
-    assert quoted(system.span) == "robot"
-    assert system.description == "Two nodes."
-    assert [(item.name.value, item.kind, item.threads) for item in system.executors] == [
-        ("control", ExecutorKind.SINGLE_THREADED, 2),
-        ("perception", ExecutorKind.MULTI_THREADED, 4),
-        ("rest", ExecutorKind.EVENTS, 2),
-    ]
-    assert [(item.cpus, item.priority) for item in system.executors] == [
-        ((), None),
-        ((), None),
-        ((1, 3), 50),
-    ]
-    assert system.autostart is PrimaryState.INACTIVE
-    talker, listener = system.nodes
-    assert (talker.name.value, talker.description, str(talker.executor)) == (
-        "talker",
-        "Talks.",
-        "control",
-    )
-    assert quoted(talker.span) == "talker"
-    assert listener.executor is None
-    assert system.node("listener") is listener
-    assert system.node("missing") is None
 
 
 def test_namespaces_are_below_the_systems_unless_absolute() -> None:
@@ -102,26 +63,6 @@ def test_the_command_lines_namespace_takes_the_place_of_the_systems() -> None:
     assert (span.file.path, quoted(span)) == ("--namespace", "robot2")
 
 
-def test_dependencies_are_a_list_or_a_map() -> None:
-    system = system_of("""\
-        system: robot
-        nodes:
-          a: {lifecycle: {depends_on: [b, missing]}}
-          b: {lifecycle: {depends_on: {c: inactive, d: active}, autostart: unconfigured}}
-        """)
-    a, b = system.nodes
-    assert [item.node.value for item in a.depends_on] == ["b", "missing"]
-    assert {item.state for item in a.depends_on} == {PrimaryState.ACTIVE}
-    span = a.span
-    assert b.depends_on == (
-        Dependency(Located("c", span), PrimaryState.INACTIVE),
-        Dependency(Located("d", span), PrimaryState.ACTIVE),
-    )
-    assert quoted(a.depends_on[0].node.span) == "b"
-    assert b.autostart is not None
-    assert b.autostart.value is PrimaryState.UNCONFIGURED
-
-
 def test_a_type_gives_a_node_what_it_is_made_of(nodes: Path) -> None:
     system = system_of(
         """\
@@ -144,20 +85,6 @@ def test_a_type_gives_a_node_what_it_is_made_of(nodes: Path) -> None:
     assert [timer.name.value for timer in front.timers] == ["shoot"]
     assert [(name.value, value) for name, value in front.state] == [("count_of_pictures", 0)]
     assert [event for event, _ in front.reactions] == [Event.ACTIVATE]
-
-
-def test_variables_make_types_different(nodes: Path) -> None:
-    system = system_of(
-        """\
-        system: robot
-        nodes:
-          front: {type: camera}
-          back: {type: camera, variables: {message_type: sensor_msgs/msg/Image}}
-        """,
-        nodes,
-    )
-    types = [str(node.ports[0].interface) for node in system.nodes]
-    assert types == ["std_msgs/msg/String", "sensor_msgs/msg/Image"]
 
 
 def test_an_instance_refines_what_its_type_has(nodes: Path) -> None:
@@ -184,40 +111,6 @@ def test_an_instance_refines_what_its_type_has(nodes: Path) -> None:
     assert front.timers[0].reaction is not None
     assert [value for _, value in front.state] == [7]
     assert dict(front.reactions)[Event.ACTIVATE].span.file.path == "robot.yaml"
-
-
-def test_what_the_type_lacks_is_unknown(nodes: Path) -> None:
-    system = system_of(
-        """\
-        system: robot
-        nodes:
-          front:
-            type: camera
-            parameters: {rate: 3}
-            publishers: {picture: {qos: state}}
-            subscriptions: {image: {qos: state}}
-            timers: {shot: {rate_hz: 5}}
-        """,
-        nodes,
-    )
-    assert [(item.section, item.name.value, item.known) for item in system.nodes[0].unknown] == [
-        ("publishers", "picture", ("image",)),
-        ("subscriptions", "image", ()),
-        ("timers", "shot", ("shoot",)),
-        ("parameters", "rate", ("rate_hz",)),
-    ]
-    assert quoted(system.nodes[0].unknown[0].name.span) == "picture"
-
-
-def test_of_an_unknown_type_nothing_is_known() -> None:
-    system = system_of("""\
-        system: robot
-        nodes:
-          front: {type: camra, parameters: {rate: 3}, publishers: {image: {qos: state}}}
-        """)
-    (front,) = system.nodes
-    assert (str(front.type_name), front.type_found, front.complete) == ("camra", False, False)
-    assert (front.ports, front.parameters, front.unknown) == ((), (), ())
 
 
 def test_a_type_file_with_errors_reports_them_once_and_is_incomplete(nodes: Path) -> None:
@@ -257,16 +150,6 @@ def test_an_error_in_an_expression_of_a_type_is_reported_once(nodes: Path) -> No
         nodes,
     )
     assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-expression"]
-
-
-def test_a_node_type_alone_is_a_system_of_one(nodes: Path) -> None:
-    system = system_of(CAMERA, nodes)
-    assert system.node_type
-    assert system.name.value == "camera"
-    (camera,) = system.nodes
-    assert camera.full_name == "/camera"
-    assert camera.type_name is None
-    assert camera.ports[0].interface.value == "std_msgs/msg/String"
 
 
 def test_a_variable_without_value_makes_nothing_wrong() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from composer.language.tree import Plain
 from composer.model import Parameter, System
-from tests.unit.support.resolving import quoted, system_of
+from tests.unit.support.resolving import system_of
 
 
 def parameters(system: System) -> dict[str, Parameter]:
@@ -15,31 +15,6 @@ def parameters(system: System) -> dict[str, Parameter]:
 
 def start_value(parameter: Parameter) -> Plain:
     return parameter.value.value if parameter.value is not None else None
-
-
-def test_a_declaration_describes_the_whole_parameter() -> None:
-    system = system_of("""\
-        system: robot
-        nodes:
-          robot:
-            parameters:
-              speed: {type: double, default: 1, unit: m/s, minimum: 0, maximum: 5.5, step: 1,
-                choices: [1, 2.5], read_only: true, description: How fast.}
-              name: {type: string}
-        """)
-    speed = parameters(system)["speed"]
-    assert (speed.type.value, speed.unit, speed.description) == ("double", "m/s", "How fast.")
-    assert speed.read_only
-    limits = (speed.minimum, speed.maximum, speed.step)
-    assert [limit.value if limit else None for limit in limits] == [0, 5.5, 1]
-    assert speed.choices is not None
-    assert speed.choices.value == (1.0, 2.5)
-    assert speed.default is not None
-    assert speed.value is speed.default
-    assert (speed.default.value, quoted(speed.default.span)) == (1.0, "1")
-    assert isinstance(speed.default.value, float)
-    name = parameters(system)["name"]
-    assert (name.value, name.default) == (None, None)
 
 
 def test_a_system_gives_values_to_what_its_type_declares(tmp_path: Path) -> None:

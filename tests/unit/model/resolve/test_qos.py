@@ -69,14 +69,6 @@ def test_every_policy_knows_where_it_was_decided() -> None:
     assert quoted(inline.policy_span("depth")) == "1"
 
 
-def test_every_use_of_a_name_is_remembered_known_or_not() -> None:
-    system = system_of(PROFILES)
-    names = sorted(reference.name.value for reference in system.qos_references)
-    assert names == ["fast", "fast", "nothing", "sensor_data", "slow", "state"]
-    unknown = port(system, "unknown").qos
-    assert (unknown.profile, quoted(unknown.span)) == (PRESETS["command"], "nothing")
-
-
 def test_profiles_that_extend_each_other_in_a_circle_still_give_something() -> None:
     system = system_of("""\
         system: robot
@@ -99,15 +91,3 @@ def test_a_long_chain_of_profiles_is_resolved() -> None:
     text = "\n".join(["system: robot", "qos_profiles:", *lines, "  p5000: {depth: 3}"])
     system = system_of(text + "\nnodes: {robot: {}}\n")
     assert {named.qos.profile.depth for named in system.qos_profiles} == {3}
-
-
-def test_values_of_the_wrong_kind_are_left_out() -> None:
-    system = system_of("""\
-        system: robot
-        qos_profiles:
-          odd: {depth: many, reliability: sure, history: 3, deadline_ms: soon, depht: 3}
-          list: [1]
-        nodes: {robot: {publishers: {a: {type: x/msg/X, qos: [fast]}}}}
-        """)
-    assert [named.qos.profile for named in system.qos_profiles] == [QosProfile()]
-    assert port(system, "a").qos.explicit is False

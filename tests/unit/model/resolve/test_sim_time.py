@@ -8,7 +8,7 @@ import pytest
 
 from composer.language.tree import Plain
 from composer.loading import load
-from composer.model import USE_SIM_TIME, System, TimerClock
+from composer.model import USE_SIM_TIME, System
 from composer.model.resolve import OverrideOptions
 
 TYPE = """\
@@ -47,11 +47,6 @@ def value(system: System, name: str) -> Plain:
         return None
     assert (parameter.type.value, parameter.value is not None) == ("bool", True)
     return parameter.value.value if parameter.value is not None else None
-
-
-def test_a_node_without_the_parameter_has_no_value(tmp_path: Path) -> None:
-    text = "system: s\nnodes: {inline: {}, other: {type: plain}}\n"
-    assert values(tmp_path, text) == {"inline": None, "other": None}
 
 
 def test_any_node_may_say_it_though_its_type_does_not_declare_it(tmp_path: Path) -> None:
@@ -106,18 +101,3 @@ def test_what_an_included_file_says_holds_for_its_own_nodes(tmp_path: Path) -> N
     text = "system: s\ninclude: [robot.yaml]\nnodes: {outside: {}}\n"
     assert values(tmp_path, text, robot=robot) == OF_ALL | {"outside": None}
     assert not loaded(tmp_path, text, OverrideOptions(), robot=robot).use_sim_time
-
-
-def test_a_variable_may_stand_for_it(tmp_path: Path) -> None:
-    text = 'system: s\nvariables: {sim: true}\nuse_sim_time: "${sim}"\nnodes: {a: {}}\n'
-    assert values(tmp_path, text) == {"a": True}
-
-
-def test_a_timer_says_what_it_goes_by(tmp_path: Path) -> None:
-    text = """\
-system: s
-nodes:
-  a: {timers: {usual: {period_ms: 1, log: x}, watchdog: {period_ms: 1, clock: steady, log: x}}}
-"""
-    node = loaded(tmp_path, text, OverrideOptions()).nodes[0]
-    assert [timer.clock for timer in node.timers] == [TimerClock.ROS, TimerClock.STEADY]

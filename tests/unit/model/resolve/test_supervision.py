@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.model import OnFailure, PortKind, PrimaryState, RestartBudget, Supervision, Watch
+from composer.model import OnFailure, PrimaryState, RestartBudget, Supervision, Watch
 from composer.model.dependencies import dependency_edges
 from tests.unit.support.resolving import quoted, system_of
 
@@ -34,13 +34,6 @@ def of(name: str) -> Supervision:
     return node.supervision
 
 
-def test_what_the_system_says_holds_for_nodes_that_say_nothing() -> None:
-    assert of("plain") == system_of(SYSTEM).supervision
-    assert of("plain").policy is OnFailure.RESTART
-    assert of("plain").timeout_ms == 2000
-    assert of("plain").restart == RestartBudget(max_attempts=3, backoff_ms=100)
-
-
 def test_a_node_overrides_it_key_by_key() -> None:
     own = of("own")
     assert (own.timeout_ms, own.policy) == (500, OnFailure.SHUTDOWN)
@@ -56,12 +49,6 @@ def test_a_node_overrides_it_key_by_key() -> None:
     assert own.watch.callback_ms.value == 50
 
 
-def test_one_limit_for_all_publishers_together() -> None:
-    watch = of("whole").watch
-    assert watch.topics == ()
-    assert [limit.value for limit in (watch.silence_ms, watch.callback_ms) if limit] == [300, 9]
-
-
 def test_without_a_word_nodes_that_fail_are_isolated_and_nothing_is_watched() -> None:
     system = system_of("system: robot\nnodes: {a: {}}\n")
     assert system.nodes[0].supervision == Supervision()
@@ -69,11 +56,6 @@ def test_without_a_word_nodes_that_fail_are_isolated_and_nothing_is_watched() ->
     assert system.supervision.watch == Watch()
     assert system.supervision.timeout_ms == 10_000
     assert system.namespace == "/"
-
-
-def test_the_namespace_of_a_system_is_absolute_and_the_command_line_wins() -> None:
-    assert system_of(SYSTEM).namespace == "/fleet/one"
-    assert system_of(SYSTEM, namespace="/two").namespace == "/two"
 
 
 @pytest.mark.parametrize(
@@ -101,20 +83,3 @@ def test_implied_dependencies_can_be_switched_off(switch: str, implied: set[str]
     assert {edge.on for edge in edges if edge.implied} == implied
     declared = [edge for edge in edges if not edge.implied]
     assert [(edge.on, edge.state) for edge in declared] == [("power", PrimaryState.INACTIVE)]
-
-
-def test_ports_and_timers_that_live_while_their_node_is_inactive() -> None:
-    node = system_of(
-        """
-        system: robot
-        nodes:
-          power:
-            publishers:
-              voltage: {type: std_msgs/msg/Float64, always_on: true}
-              current: {type: std_msgs/msg/Float64}
-            timers: {tick: {period_ms: 100, always_on: true}, tock: {period_ms: 100}}
-        """
-    ).nodes[0]
-    living = {port.name.value: port.always_on for port in node.ports_of(PortKind.PUBLISHER)}
-    assert living == {"voltage": True, "current": False}
-    assert [timer.always_on for timer in node.timers] == [True, False]
