@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import Trigger
 
-from composer.model import PrimaryState
 from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import (
     BroughtUp,
-    CallbackFailed,
     NodeFailed,
     NodeTransitionFailed,
     RollingBack,
@@ -63,23 +61,6 @@ def test_up_in_dependency_order_and_down_in_reverse(tmp_path: Path, peer: Peer) 
     assert [node.state for node in outcome.nodes] == ["finalized"] * 3
 
 
-def test_a_stopped_system_leaves_the_ros_graph(tmp_path: Path, peer: Peer) -> None:
-    with running(CHAIN, tmp_path, planner=WELL):
-        wait_until(lambda: "sensor" in peer.node.get_node_names(), "the node in the graph")
-    wait_until(lambda: "sensor" not in peer.node.get_node_names(), "the node out of the graph")
-
-
-@pytest.mark.parametrize(
-    ("autostart", "state"), [(PrimaryState.INACTIVE, "inactive"), (None, "active")]
-)
-def test_the_bring_up_ends_in_the_autostart_state(
-    tmp_path: Path, peer: Peer, autostart: PrimaryState | None, state: str
-) -> None:
-    with running(CHAIN, tmp_path, autostart=autostart, planner=WELL) as system:
-        assert peer.state("/planning/planner") == state
-        assert system.reported(BroughtUp)[0].active == (3 if state == "active" else 0)
-
-
 @pytest.mark.parametrize(
     ("handler", "body", "reason"),
     [
@@ -115,13 +96,6 @@ def test_a_failing_bring_up_is_rolled_back_in_reverse(
     if transition == "activate":
         assert "/control/motor active" not in system.states()
         assert "/sensor active" in system.states()
-
-
-def test_a_behavior_that_cannot_be_imported_fails_the_bring_up(tmp_path: Path) -> None:
-    module = "import no_such_module"
-    system = RunningSystem(system_of(CHAIN, tmp_path, planner=module), TOGETHER, None)
-    assert system.end().exit_code == 1
-    assert "ModuleNotFoundError" in system.reported(RollingBack)[0].reason
 
 
 def test_a_system_stops_after_its_run_time(tmp_path: Path) -> None:
@@ -314,15 +288,3 @@ def test_a_fault_that_was_not_handled_before_the_stop_counts(tmp_path: Path, pee
         peer.client(Trigger, "/both/manager/pause").call_async(Trigger.Request())
         system.wait_for_log("slow")
         assert system.stop().exit_code == 1
-
-
-def test_a_failing_listener_does_not_affect_the_system(tmp_path: Path) -> None:
-    system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), HostOptions(), None)
-    wait_until(lambda: system.reported(BroughtUp))
-
-    def fail(_: object) -> None:
-        raise BrokenPipeError
-
-    system.host._reporter._listener = fail
-    assert system.stop().exit_code == 0
-    assert not system.reported(CallbackFailed)

@@ -52,11 +52,6 @@ def set_velocity(value: float) -> None:
     assert listed((str(value),), "param", "set", PLANNER, "max_velocity", str(value))
 
 
-def go_to(state: str) -> None:
-    done = repeated(lambda done: done.returncode == 0, "lifecycle", "set", PLANNER, "--to", state)
-    assert done.returncode == 0, done.stderr
-
-
 def test_a_system_without_differences(pipeline: Running) -> None:
     done = compared([], "systems/pipeline.yaml")
     assert done.stderr == "pipeline: runs as declared\n"
@@ -69,19 +64,6 @@ def test_a_changed_parameter_is_reported_with_its_declaration(pipeline: Running)
     assert "declared at " in done.stdout
     assert "planner.yaml:" in done.stdout
     set_velocity(1.0)
-
-
-def test_a_cleaned_up_node_is_reported_with_its_missing_endpoints(
-    pipeline: Running,
-) -> None:
-    go_to("unconfigured")
-    missing = [
-        f"{PLANNER}: lifecycle state is unconfigured, declared active",
-        f"{PLANNER}: subscription /sensor_data is missing",
-        f"{PLANNER}: service /plan_trajectory is missing",
-    ]
-    compared(missing, "systems/pipeline.yaml")
-    go_to("active")
 
 
 def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) -> None:
@@ -135,37 +117,6 @@ def test_a_starting_system_is_not_reported(tmp_path: Path) -> None:
         # On a busy machine, a start may take longer than the default grace time.
         limits = ("--grace", "15", "--timeout", "25")
         compared([], "systems/talker_listener.yaml", "--ignore", "/*/*", *limits)
-
-
-def test_an_empty_graph_is_reported_in_time() -> None:
-    missing = ["/talker: the node does not exist", "/listener: the node does not exist"]
-    compared(missing, "systems/talker_listener.yaml", "--timeout", "4", "--ignore", "*")
-
-
-DECLARED = """
-system: talk
-nodes:
-  talker:
-    publishers: {chatter: {type: std_msgs/msg/String, qos: command}}
-    timers: {tick: {period_ms: 100, publish: {chatter: {data: hello}}}}
-  listener: {subscriptions: {chatter: {type: std_msgs/msg/String, qos: sensor_data}}}
-"""
-
-
-def test_different_qos_and_similar_names_are_reported(tmp_path: Path) -> None:
-    declared, other = tmp_path / "declared.yaml", tmp_path / "other.yaml"
-    declared.write_text(DECLARED)
-    changed = DECLARED.replace("command", "sensor_data").replace("  listener:", "  listner:")
-    other.write_text(changed)
-    messages = [
-        "/twin/talker: reliability of publisher /twin/chatter is best_effort, declared reliable",
-        "/twin/listener: the node does not exist",
-        "/twin/listner: the node exists, but is not declared",
-    ]
-    with running(tmp_path / "log.txt", str(other), "--namespace", "/twin") as run:
-        run.wait_for("2 of 2 nodes active")
-        done = compared(messages, declared, "--namespace", "/twin", "--ignore", "/[!t]*")
-    assert "'/twin/listner' exists: did you mean that?" in done.stdout
 
 
 def test_start_options_apply_to_the_comparison(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import signal
 import subprocess
@@ -15,16 +14,11 @@ from tests.cli.compose import compose as in_process
 from tests.ros.support.commands import (
     PATIENCE_S,
     compose,
-    expect_error,
     listed,
-    repeated_until,
     running,
     start,
 )
 from tests.ros.support.in_process import Peer, wait_until
-
-#: For a command that is sent once: a process may not be scheduled for a moment.
-PATIENTLY = ("--timeout", "20")
 
 
 @pytest.fixture
@@ -72,59 +66,6 @@ def first_row_of_the_summary(text: str) -> list[str]:
 
 def sent_by_the_first_node(text: str) -> int:
     return int(first_row_of_the_summary(text)[3])
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_shuts_down_in_reverse_order(log: Path, number: int) -> None:
-    with running(log, "pipeline") as run:
-        run.wait_for("3 of 3 nodes active")
-        code, out, err = run.stop(number)
-    assert (code, without_errors_of_dds(out)) == (0, [])
-    assert "Traceback" not in err
-    assert states_in(err)[6:9] == [
-        "/control/motor_controller inactive",
-        "/planning/planner inactive",
-        "/perception/sensor_simulator inactive",
-    ]
-
-
-def test_a_node_is_deactivated_and_activated_from_another_process(log: Path) -> None:
-    with running(log, "pipeline") as run:
-        run.wait_for("3 of 3 nodes active")
-        expected = dict.fromkeys(
-            ["/control/motor_controller", "/perception/sensor_simulator", "/planning/planner"],
-            "active",
-        )
-        text = repeated_until(
-            lambda text: json.loads(text) == expected, "lifecycle", "nodes", "--json"
-        )
-        assert json.loads(text) == expected
-        done = compose("lifecycle", "set", "planner", "deactivate", *PATIENTLY)
-        assert done.returncode == 0, done.stderr
-        assert done.stderr == (
-            "note: active nodes depend on this: /control/motor_controller; "
-            "--dependents deactivates them first\n"
-        )
-        assert done.stdout == "/planning/planner: active -> inactive\n"
-        run.wait_for("[compose] /planning/planner inactive")
-        assert listed(("\n",), "lifecycle", "get", "planner") == "inactive\n"
-        possible = {"activate", "cleanup", "shutdown"}
-        assert set(listed(("activate",), "lifecycle", "list", "planner").split()) == possible
-        reason = "'configure' is not possible: /planning/planner is inactive"
-        refused = expect_error(reason, "lifecycle", "set", "planner", "configure")
-        assert "available transitions: " in refused
-        done = compose("lifecycle", "set", "/planning/planner", "activate", *PATIENTLY)
-        assert done.returncode == 0, done.stderr
-        assert run.stop()[0] == 0
-
-
-def test_autostart_and_namespace(log: Path) -> None:
-    arguments = ("pipeline", "--autostart", "inactive", "--namespace", "/robot1")
-    with running(log, *arguments) as run:
-        run.wait_for("0 of 3 nodes active")
-        get = ("lifecycle", "get", "/robot1/planning/planner")
-        assert listed(("\n",), *get) == "inactive\n"
-        assert run.stop()[0] == 0
 
 
 def test_simulated_time_can_be_enabled_and_disabled(log: Path) -> None:
@@ -219,14 +160,6 @@ def test_run_in_the_background_gets_the_same_options(monkeypatch: pytest.MonkeyP
     options += ("--await-processes",)
     assert in_process("run", "systems/pipeline.yaml", "--wait", *options).code == 0
     assert set(options) < set(given)
-
-
-def test_an_invalid_environment_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
-    for arguments in (["run", "systems/minimal.yaml", "--for", "1"], ["lifecycle", "nodes"]):
-        done = compose(*arguments)
-        assert done.returncode == 1
-        assert "compose: ROS_DOMAIN_ID is '-1'" in done.stderr
 
 
 def test_a_missing_interface_package_is_reported_before_the_start(

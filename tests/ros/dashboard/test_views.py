@@ -22,25 +22,6 @@ def _nodes(data: Any) -> dict[str, Any]:
     return {node["name"]: node for node in data["nodes"]}
 
 
-def test_the_graph_has_both_and_measured_rates(page: Browser) -> None:
-    picture = page.until(
-        page.subscribe("graph"),
-        lambda data: {f"node:{PLANNER}", f"node:{TALKER}"} <= data["things"].keys(),
-    )
-    assert picture["svg"].startswith("<defs>")
-    live = page.subscribe("graph.live")
-    publisher = f"publisher:{SIMULATOR}./sensor_data"
-    data = page.until(
-        live, lambda data: (data["edges"].get(publisher, {}).get("rate_hz") or 0) > 20
-    )
-    assert data["nodes"][PLANNER]["state"] == "active"
-    assert publisher in picture["things"]
-    # No system reports the rate of the hand-written node, so it is measured.
-    page.until(
-        live, lambda data: 30 < (data["topics"].get("/lab/count", {}).get("rate_hz") or 0) < 70
-    )
-
-
 def test_nodes_have_states_figures_and_places(page: Browser, pipeline: RunningSystem) -> None:
     channel = page.subscribe("nodes")
     data = page.until(
@@ -79,15 +60,6 @@ def test_topics_have_endpoints_and_figures(page: Browser) -> None:
     assert data["figures"]["/sensor_data"]["mean_bytes"] > 700
 
 
-def test_a_topic_is_echoed_at_a_limited_rate(page: Browser) -> None:
-    channel = page.subscribe("echo", topic="/sensor_data", max_hz=5)
-    data = page.until(channel, lambda data: data["messages"])
-    assert set(data["messages"][0]["value"]["pose"]["pose"]) == {"position", "orientation"}
-    page.wait(lambda: any(update["dropped"] > 5 for update in page.updates))
-    latched = page.until(page.subscribe("echo", topic="/lab/text"), lambda data: data["messages"])
-    assert latched["messages"][0]["value"] == {"data": "x" * 200}
-
-
 SILENT = """
 system: silent
 introspection: {rosout: false}
@@ -116,17 +88,6 @@ def test_services_for_tools_are_hidden(page: Browser) -> None:
     assert not any(part in item["name"] for item in data["services"] for part in hidden)
     everything = page.subscribe("services", hidden=True)
     page.until(everything, lambda data: all(part in str(data["services"]) for part in hidden))
-
-
-def test_the_result_of_a_goal(page: Browser) -> None:
-    sent = page.subscribe(
-        "goal",
-        action="/lab/navigate",
-        type="composer_interfaces/action/Navigate",
-        goal={"target": {"x": 1.0}, "max_velocity": 1.0},
-    )
-    finished = page.until(sent, lambda data: data["status"] == "succeeded")
-    assert finished["result"]["distance_traveled"] == 2.5
 
 
 TEXT = {"topic": "/lab/in", "type": "std_msgs/msg/String"}

@@ -8,11 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetLoggerLevels
-from rclpy.lifecycle import LifecycleNode
 from std_srvs.srv import Trigger
-from type_description_interfaces.srv import GetTypeDescription
 
 from composer.runtime.executors.futures import wrap_future
 from composer.runtime.executors.tasks import sleep, within
@@ -138,46 +135,11 @@ def test_an_exception_in_a_done_callback_is_reported(on: Bench) -> None:
     assert "fall_over" in on.reports[0][0]
 
 
-@pytest.fixture
-def managed(on: Bench) -> Iterator[None]:
-    """A lifecycle node of rclpy, ``/managed``, on the same loop."""
-    node = LifecycleNode("managed")
-    on.loop.add_node(node)
-    yield
-    on.loop.remove_node(node)
-    node.destroy_node()
-
-
-@pytest.mark.usefixtures("managed")
-class TestServicesOfALifecycleNode:
-    def test_lifecycle_services_answer(self, on: Bench) -> None:
-        client = on.client(GetState, "managed/get_state")
-        assert call(on, client, GetState.Request()).current_state.label == "unconfigured"
-
-    @pytest.mark.parametrize("transition_id", [3, 250])
-    def test_an_illegal_transition_is_refused_and_the_loop_continues(
-        self, on: Bench, transition_id: int
-    ) -> None:
-        client = on.client(ChangeState, "managed/change_state")
-        request = ChangeState.Request()
-        request.transition.id = transition_id
-        assert not call(on, client, request).success
-        wait_until(lambda: on.reports)  # on several threads the response may be faster
-        assert len(on.reports) == 1
-        state = call(on, on.client(GetState, "managed/get_state"), GetState.Request())
-        assert state.current_state.label == "unconfigured"
-
-
 class TestServicesOfEveryNode:
     def test_logger_levels_can_be_read(self, on: Bench) -> None:
         client = on.client(GetLoggerLevels, "bench/get_logger_levels")
         answer = call(on, client, GetLoggerLevels.Request(names=["bench"]))
         assert [level.name for level in answer.levels] == ["bench"]
-
-    def test_type_descriptions_can_be_read(self, on: Bench) -> None:
-        client = on.client(GetTypeDescription, "bench/get_type_description")
-        request = GetTypeDescription.Request(type_name="std_srvs/srv/Trigger", type_hash="wrong")
-        assert "parse type hash" in call(on, client, request).failure_reason
 
     @pytest.mark.parametrize("kind", ["plain", "async"])
     def test_a_service_that_was_not_added_uses_its_own_callback(self, on: Bench, kind: str) -> None:

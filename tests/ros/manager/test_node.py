@@ -21,7 +21,7 @@ from composer.runtime.process import StartRefused
 from composer.runtime.protocol.codec import decode
 from composer.runtime.protocol.reports import CallbackFigures, NodeReport, SystemReport
 from composer.runtime.ros.manager_interface import STATE_QOS
-from composer.runtime.supervision.events import RolledBack, RollingBack, StateChanged
+from composer.runtime.supervision.events import StateChanged
 from composer.runtime.supervision.status import Status
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
@@ -214,59 +214,6 @@ def test_states_are_published_latched_on_change_and_every_second(
             lambda: diagnostics[-1].status[0].level == DiagnosticStatus.ERROR, "the diagnostics"
         )
         assert "/fleet/planner is isolated" in diagnostics[-1].status[0].message
-
-
-DIAMOND = """
-system: diamond
-lifecycle: {autostart: unconfigured}
-nodes:
-  top: {lifecycle: {depends_on: [left_3, right_3]}}
-  left_3: {lifecycle: {depends_on: [left_2]}}
-  left_2: {lifecycle: {depends_on: [middle]}}
-  right_3: {lifecycle: {depends_on: [right_2]}}
-  right_2: {lifecycle: {depends_on: [middle]}}
-  middle:
-    behavior: planner:Planner
-    parameters: {fault: ""}
-    lifecycle: {depends_on: [left, right]}
-  left: {lifecycle: {depends_on: [left_0]}}
-  right: {lifecycle: {depends_on: [low]}}
-  left_0: {lifecycle: {depends_on: [low]}}
-  low: {}
-"""
-
-
-def test_the_start_of_a_diamond_with_a_failing_node_is_rolled_back(
-    tmp_path: Path, peer: Peer
-) -> None:
-    with running(DIAMOND, tmp_path, planner=PLANNER) as system:
-        assert peer.set_parameter("/middle", "fault", "activate") == ""
-        success, message = command(peer, "startup_all_or_nothing", "/diamond")
-        assert not success
-        assert message.startswith("/middle: activate failed: ValueError: no map")
-        rolling = system.reported(RollingBack)[0]
-        assert (rolling.node, rolling.reason) == (
-            "/middle", "activate failed: ValueError: no map",
-        )  # fmt: skip
-        changes = system.reported(StateChanged)
-        up = [event.node for event in changes if event.state == "active"]
-        assert set(up) == {"/low", "/right", "/left_0", "/left"}
-        down = [
-            event.node
-            for event in changes
-            if event.elapsed_s > rolling.elapsed_s and event.transition == "deactivate"
-        ]
-        assert down == list(reversed(up))
-        assert set(system.reported(RolledBack)[0].nodes) == {
-            f"/{name}" for name in
-            ("top", "left_3", "left_2", "right_3", "right_2", "left", "right", "left_0", "low")
-        }  # fmt: skip
-        for name in ("low", "middle", "top"):
-            assert peer.state(f"/{name}") == "unconfigured"
-
-        assert peer.set_parameter("/middle", "fault", "") == ""
-        assert command(peer, "startup", "/diamond") == (True, "10 of 10 nodes active")
-        assert system.stop().exit_code == 0
 
 
 def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) -> None:

@@ -14,12 +14,12 @@ from std_msgs.msg import String
 
 from composer.model import ExecutorKind
 from composer.plan import STOPPED, SystemGoals
-from composer.runtime.children.child_processes import Child, ChildProcesses
+from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.sources import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
-from composer.runtime.members.context import MemberContext, MemberLife, ProcessUnavailable
+from composer.runtime.members.context import MemberContext
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
@@ -323,16 +323,6 @@ def test_the_error_says_why_a_process_has_not_reported(
             reason = "it is not in the ROS graph, and another process holds its instance lock"
         expected = f"process 'acting' has not reported within 0 s: {reason}"
         assert str(start.exception()) == expected
-        process.close()
-
-
-def test_a_process_that_has_not_reported_is_asked_for_nothing(tmp_path: Path) -> None:
-    """Another one, of another computer, would follow the request."""
-    with bench(ExecutorKind.EVENTS) as on:
-        process = silent_process(on, tmp_path, "unused")
-        process._life = MemberLife("key", child=Child(1))
-        with pytest.raises(ProcessUnavailable, match="has not reported yet"):
-            process.request("/arm", "shutdown")
         process.close()
 
 

@@ -276,37 +276,3 @@ def test_a_handler_that_never_ends_is_an_error(tmp_path: Path, peer: Peer) -> No
         assert not peer.change("/subject", "configure")
         assert peer.state("/subject") == "unconfigured"
     assert "on_configure: TransitionTimeout: timed out after 0.2 s" in system.log_text()
-
-
-def test_cycles_leave_nothing_behind(tmp_path: Path, peer: Peer) -> None:
-    """Count entities; test_lifecycle_process checks the process and the ROS graph."""
-    text = """
-    system: cycles
-    nodes:
-      cycled:
-        subscriptions: {input: {type: std_msgs/msg/String, external: true, log: x}}
-        publishers: {output: {type: std_msgs/msg/String, external: true}}
-        services: {trigger: {type: std_srvs/srv/Trigger, external: true}}
-        clients: {ask: {type: std_srvs/srv/Trigger, external: true}}
-        action_servers: {serve: {type: composer_interfaces/action/Navigate, external: true}}
-        action_clients: {send: {type: composer_interfaces/action/Navigate, external: true}}
-        timers: {tick: {period_ms: 1000, log: x}}
-    """
-    with running(text, tmp_path) as system:
-        node = system.node("cycled")
-        ros = node._ros
-
-        def entities() -> int:
-            kinds = (ros.publishers, ros.subscriptions, ros.clients, ros.services, ros.waitables)
-            return sum(len(list(kind)) for kind in kinds)
-
-        full = entities()
-        for _ in range(20):
-            for transition in ("deactivate", "cleanup"):
-                assert peer.change("/cycled", transition)
-            empty = entities()
-            for transition in ("configure", "activate"):
-                assert peer.change("/cycled", transition)
-            assert entities() == full
-        assert empty <= full - 6
-        assert not node._context.tasks

@@ -81,7 +81,7 @@ def pipeline() -> Path:
     return systems_folder() / "pipeline.yaml"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP])
 def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Signals) -> None:
     with compose_run(tmp_path, pipeline()) as run:
         run.wait_for("3 of 3 nodes active")

@@ -15,11 +15,10 @@ import rclpy
 from action_msgs.msg import GoalStatus
 from composer_interfaces.action import Navigate
 from rcl_interfaces.srv import GetParameters
-from rclpy.action import ActionClient, ActionServer
+from rclpy.action import ActionServer
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Int64, String
+from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 
 PATIENCE_S = 60.0
@@ -64,25 +63,6 @@ def flood(node: Node, topic: str, count: str, depth: str) -> object:
     return int(count)
 
 
-def collect(node: Node, topic: str, count: str) -> object:
-    """Subscribe and return the first ``count`` texts."""
-    seen: list[str] = []
-    node.create_subscription(String, topic, lambda message: seen.append(message.data), 1000)
-    until = time.monotonic() + PATIENCE_S
-    while len(seen) < int(count) and time.monotonic() < until:
-        rclpy.spin_once(node, timeout_sec=0.1)
-    return seen
-
-
-def latched(node: Node, topic: str, text: str) -> object:
-    """Publish one transient-local message and stay until standard input closes."""
-    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    node.create_publisher(String, topic, qos).publish(String(data=text))
-    print("published", flush=True)
-    sys.stdin.read()
-    return text
-
-
 def call(node: Node, name: str, times: str) -> object:
     """Call a Trigger service ``times`` times at once."""
     client = node.create_client(Trigger, name)
@@ -90,52 +70,6 @@ def call(node: Node, name: str, times: str) -> object:
     wait_until_known(node)
     futures = [client.call_async(Trigger.Request()) for _ in range(int(times))]
     return [[(answer := finished(node, future)).success, answer.message] for future in futures]
-
-
-def serve(node: Node, name: str) -> object:
-    """Serve a Trigger service until killed."""
-
-    def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = True
-        response.message = "from the peer"
-        return response
-
-    node.create_service(Trigger, name, answer)
-    print("serving", flush=True)
-    rclpy.spin(node)
-    return None
-
-
-def send_goal(node: Node, name: str, max_velocity: str, cancel: str) -> object:
-    """Send a Navigate goal; with ``cancel``, cancel it after the first feedback."""
-    client = ActionClient(node, Navigate, name)
-    assert client.wait_for_server(PATIENCE_S)
-    wait_until_known(node)
-    seen: list[float] = []
-    handle = finished(
-        node,
-        client.send_goal_async(
-            Navigate.Goal(max_velocity=float(max_velocity)),
-            feedback_callback=lambda message: seen.append(message.feedback.progress_percent),
-        ),
-    )
-    if not handle.accepted:
-        return {"accepted": False}
-    # Once it has the result, rclpy drops the feedback that is still to be taken.
-    until = time.monotonic() + PATIENCE_S
-    while len(seen) < (1 if cancel else 3) and time.monotonic() < until:
-        rclpy.spin_once(node, timeout_sec=0.1)
-    canceling = 0
-    if cancel == "cancel":
-        canceling = len(finished(node, handle.cancel_goal_async()).goals_canceling)
-    end = finished(node, handle.get_result_async())
-    return {
-        "accepted": True,
-        "canceling": canceling,
-        "status": end.status,
-        "message": end.result.message,
-        "feedback": seen,
-    }
 
 
 def navigate(node: Node, name: str) -> object:
@@ -169,7 +103,7 @@ def navigate(node: Node, name: str) -> object:
     return GoalStatus.STATUS_UNKNOWN
 
 
-ROLES = (flood, collect, latched, call, serve, send_goal, navigate)
+ROLES = (flood, call, navigate)
 
 
 def main() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +11,6 @@ import pytest
 from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor, _ObservedCallback
 from composer.runtime.supervision.main_queue import SharedDesiredState
-from tests.ros.support.in_process import system_of
 
 
 @pytest.mark.parametrize(
@@ -32,24 +30,3 @@ def test_a_late_check_counts_at_most_as_two(passed_s: float, counted_s: float) -
     assert observed.interrupted_s is not None
     for since_s in (observed.since_s, observed.interrupted_s):
         assert now_s + passed_s - since_s == pytest.approx(counted_s)
-
-
-WATCHED = """
-system: robot
-lifecycle: {watch: {topic_silence_ms: 500}}
-processes: {sensing: {nodes: [camera]}}
-nodes:
-  camera: {publishers: {out: {type: std_msgs/msg/String}}}
-  driver: {publishers: {out: {type: std_msgs/msg/String}}, executable: {command: driver}}
-  arm: {publishers: {out: {type: std_msgs/msg/String}}}
-"""
-
-
-def test_silence_is_checked_where_it_can_be_known(tmp_path: Path) -> None:
-    """Another process checks its nodes itself, and what executables send is not known."""
-    models = {node.name.value: node for node in system_of(WATCHED, tmp_path).nodes}
-    nodes = {name: SimpleNamespace(model=model) for name, model in models.items()}
-    node_set: Any = SimpleNamespace(nodes=nodes, loops={}, hung=set())
-    monitor = HealthMonitor(node_set, SharedDesiredState(), print, Reporter(None))
-    assert models.keys() == {"camera", "driver", "arm"}
-    assert monitor._silences.keys() == {"arm"}
