@@ -16,7 +16,7 @@ BEHAVIOR = Statements.read("behavior")
 
 
 def is_checked(statement: str) -> bool:
-    """Return whether the statement needs no types of numpy, which is optional, or they are known."""
+    """Return whether the statement needs no numpy, or numpy is installed."""
     return "self.filter." not in statement or find_spec("numpy") is not None
 
 
