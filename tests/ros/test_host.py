@@ -128,7 +128,7 @@ nodes:
 """
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 def test_a_hanging_callback_does_not_delay_the_end(tmp_path: Path, peer: Peer, kind: str) -> None:
     text = HANGING.replace("KIND", kind)
     module = HANG.format(handler="on_tick")

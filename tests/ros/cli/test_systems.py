@@ -25,7 +25,6 @@ from tests.ros.support.commands import (
     expect_errors,
     listed,
     output_of,
-    repeated,
     repeated_until,
     start,
 )
@@ -342,24 +341,3 @@ def test_a_failed_bring_up_ends_the_background_process(path: Path) -> None:
     # The limit is long enough to reach the node that hangs on a busy machine.
     late = "rolling back because of /fleet/planner: bring-up timed out after 5 s"
     expect_error(late, "run", path, "--timeout", 5, "--set", "planner.fault=hang", "--grace", 3)
-
-
-def test_the_second_of_two_hosts_shuts_down(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two hosts do not share lock files; separate runtime folders have the same effect."""
-    first_folder, second_folder = path.parent / "first", path.parent / "second"
-    for folder in (first_folder, second_folder):
-        folder.mkdir()
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(first_folder))
-    first = Robot(path)
-    try:
-        monkeypatch.setenv("XDG_RUNTIME_DIR", str(second_folder))
-        # It is refused within its first 5 s; later, it only warns of the other one.
-        done = repeated(lambda done: done.returncode == 1, "run", path, "--for", 10)
-        refusal = done.stderr
-        assert done.returncode == 1, refusal
-        assert "shutting down: system '/fleet/robot' already runs in ROS domain" in refusal
-        assert f"process {first.pid}" in refusal
-        assert first.is_alive()
-        assert first.states()["/fleet/motor"] == "active"
-    finally:
-        first.kill()

@@ -122,56 +122,6 @@ def group_of(on: Bench, subscription: object) -> SourceGroup:
     return on.loop._group_of[subscription]
 
 
-def takes_of(group: SourceGroup) -> list[bool]:
-    """Return a list that records, for each take of the group's source, whether it took an item."""
-    takes: list[bool] = []
-    source: Any = group.sources[0]
-    take = source.take
-
-    def counted() -> Any:
-        taken = take()
-        takes.append(taken is not None)
-        return taken
-
-    source.take = counted
-    return takes
-
-
-def test_messages_that_a_full_queue_dropped_are_not_taken_again(on: Bench) -> None:
-    seen: list[int] = []
-    subscription = on.subscribe(
-        Int64, "numbers", lambda message: seen.append(message.data), depth=3
-    )
-    takes = takes_of(group_of(on, subscription))
-    publisher = on.node.create_publisher(Int64, "numbers", 50)
-    wait_until(publisher.get_subscription_count)
-
-    def publish() -> None:
-        for number in range(50):
-            publisher.publish(Int64(data=number))
-
-    on.loop.run(publish, 10.0)
-    wait_until(lambda: seen[-1:] == [49])
-    on.loop.run(lambda: None, 5.0)
-    assert seen == [47, 48, 49]
-    assert takes.count(True) == 3
-    assert takes.count(False) <= 2, "one take from the empty queue, and perhaps one at the start"
-
-
-def test_a_message_needs_a_single_take(on: Bench) -> None:
-    seen: list[int] = []
-    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
-    publisher = on.node.create_publisher(Int64, "numbers", 10)
-    wait_until(publisher.get_subscription_count)
-    for _ in range(2):  # a full round, so that earlier messages have been taken
-        on.loop.run(lambda: None, 5.0)
-    takes = takes_of(group_of(on, subscription))
-    for number in range(20):
-        publisher.publish(Int64(data=number))
-        wait_until(lambda number=number: seen[-1:] == [number])
-    assert takes == [True] * 20
-
-
 class RaisingOnce(tuple[EntitySource, ...]):
     """Sources whose first iteration raises, as an asynchronous exception would."""
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import gc
 from pathlib import Path
 
-import pytest
 from std_msgs.msg import Int64
 
 from composer.model import PrimaryState
+from composer.runtime.supervision.events import NodeFailed
 from tests.ros.support import node_classes
 from tests.ros.support.in_process import Peer, running, wait_until
 from tests.ros.support.node_classes import history
@@ -127,41 +127,36 @@ def test_a_handler_can_refuse_a_transition(tmp_path: Path, peer: Peer) -> None:
         system.wait_for_log("on_configure refused the transition: on_configure returned FAILURE")
 
 
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("SpinsInConstructor", "spins its node in its constructor or a transition"),
-        ("MakesSecondNode", "creates a second node, 'helper'"),
-        ("HasOwnArguments", "command-line arguments of its own; use 'remappings'"),
-        ("HasOwnContext", "a context of its own; a hosted node joins the context of the system"),
-        ("CallsInitTwice", "the class calls Node.__init__ twice"),
-        ("HasWaitable", "has a waitable of its own, Waitable; run it as an 'executable'"),
-        ("Exits", "the constructor ends the process: SystemExit(3)"),
-        ("NotANode", "is not derived from rclpy's Node"),
-        ("Missing", "has no class 'Missing'"),
-        ("WantsArguments", "missing 1 required positional argument: 'port'"),
-        ("NeverReturns", "timed out after 0.3 s"),
-    ],
-)
-def test_what_cannot_be_hosted_is_refused_with_the_reason(
-    tmp_path: Path, name: str, reason: str
-) -> None:
-    timeout_ms = 300 if name == "NeverReturns" else 20_000
-    text = f"""
-    system: refused
-    nodes:
-      refused:
-        class: tests.ros.support.refused_classes:{name}
-        lifecycle: {{timeout_ms: {timeout_ms}}}
-    """
+REFUSED = [
+    ("SpinsInConstructor", "spins its node in its constructor or a transition"),
+    ("MakesSecondNode", "creates a second node, 'helper'"),
+    ("HasOwnArguments", "command-line arguments of its own; use 'remappings'"),
+    ("HasOwnContext", "a context of its own; a hosted node joins the context of the system"),
+    ("CallsInitTwice", "the class calls Node.__init__ twice"),
+    ("HasWaitable", "has a waitable of its own, Waitable; run it as an 'executable'"),
+    ("Exits", "the constructor ends the process: SystemExit(3)"),
+    ("NotANode", "is not derived from rclpy's Node"),
+    ("Missing", "has no class 'Missing'"),
+    ("WantsArguments", "missing 1 required positional argument: 'port'"),
+    ("NeverReturns", "timed out after 0.3 s"),
+]
+
+
+def test_what_cannot_be_hosted_is_refused_with_the_reason(tmp_path: Path) -> None:
+    text = "system: refused\nexecutors: {own: {}}\nnodes:\n"
+    for name, _ in REFUSED:
+        slow = name == "NeverReturns"
+        keys = f"lifecycle: {{timeout_ms: {300 if slow else 20_000}}}{', executor: own' * slow}"
+        text += f"  {name}: {{class: tests.ros.support.refused_classes:{name}, {keys}}}\n"
     with running(text, tmp_path) as system:
         outcome = system.end()
     assert outcome.exit_code == 1
-    assert reason in system.log_text()
-    if name == "NeverReturns":
-        assert "constructor has not returned; it is at" in system.log_text()
-    elif name != "WantsArguments":
-        assert "Traceback" not in system.log_text()
+    reasons = {node: event.reason for event in system.reported(NodeFailed) for node in event.nodes}
+    log = system.log_text()
+    for name, reason in REFUSED:
+        assert reason in reasons[f"/{name}"] or (name == "NeverReturns" and reason in log)
+    assert "constructor has not returned; it is at" in log
+    assert "Traceback" not in log
 
 
 def test_a_declared_type_that_the_class_does_not_have_is_refused(tmp_path: Path) -> None:

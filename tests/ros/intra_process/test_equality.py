@@ -74,7 +74,7 @@ def text_of(delivery: str, executor: str) -> str:
 
 
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
-@pytest.mark.parametrize("executor", ["events", "single_threaded"])
+@pytest.mark.parametrize("executor", ["events", "multi_threaded"])
 def test_every_combination_of_qos_delivers_the_same_in_process_and_by_dds(
     tmp_path: Path, executor: str, delivery: str
 ) -> None:

@@ -61,7 +61,7 @@ def test_concurrent_publishers_lose_no_message_uncounted(
         assert {number % 5000 for number in received} & {4999}  # the last one arrives
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 def test_a_flood_neither_fills_the_loop_nor_delays_later_messages(
     tmp_path: Path, kind: str
 ) -> None:

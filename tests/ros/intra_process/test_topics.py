@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -58,7 +57,7 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
     wait_until(is_counted, "the number of matched subscriptions")
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 def test_local_messages_are_shared_and_external_nodes_receive_them_too(
     tmp_path: Path, join_externally: Callable[[], Peer], kind: str
 ) -> None:
@@ -233,54 +232,6 @@ def test_a_publisher_that_is_not_active_reaches_no_local_subscription(tmp_path: 
         wait_until(lambda: 5 in numbers(near.received))
         assert numbers(near.received) == [0, 1, 5]
         assert system.node("source").statistics.sent == 3
-
-
-def test_an_overtaken_check_does_not_hide_an_external_subscription(tmp_path: Path) -> None:
-    """Two threads publish around a match: one counts before it, the other after it."""
-    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        port = system.node("source")._entities.publishers["numbers"]
-        publisher = port.gated
-        overtaking = threading.Thread(target=publisher._check_external)
-
-        def count_matched() -> int:
-            if threading.current_thread() is overtaking:
-                return 3
-            overtaking.start()
-            overtaking.join(0.2)  # unless it waits for the lock
-            return 2
-
-        publisher._count_matched = count_matched
-        publisher._check_external()
-        overtaking.join()
-        assert publisher._has_external
-
-
-def test_a_subscription_that_joins_during_a_check_is_not_an_external_one(tmp_path: Path) -> None:
-    """The matches are counted before a local subscription joins, the local ones after it."""
-    with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
-        publisher = system.node("source")._entities.publishers["numbers"].gated
-        near, far = publisher._subscriptions
-        publisher.leave(far)
-        joining, is_checked = (
-            threading.Thread(target=publisher.join, args=(far,)),
-            threading.Event(),
-        )
-
-        def count_matched() -> int:
-            if threading.current_thread() is joining:
-                is_checked.wait()  # until the result of the first check is read
-                return 3
-            joining.start()
-            wait_until(lambda: publisher._subscriptions == (near, far))
-            return 2  # near, and an external one
-
-        publisher._count_matched = count_matched
-        publisher._check_external()
-        has_external = publisher._has_external
-        is_checked.set()
-        joining.join()
-        assert has_external
-        assert publisher._has_external
 
 
 def test_the_generation_changes_before_and_after_the_flag_is_set(

@@ -72,16 +72,8 @@ def test_services_and_events_report_every_state_and_transition(tmp_path: Path, p
     ]
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
-def test_invalid_requests_are_refused_and_change_nothing(
-    tmp_path: Path, peer: Peer, kind: str
-) -> None:
-    text = f"""
-    system: subject
-    executors: {{default: {{kind: {kind}}}}}
-    nodes: {{subject: {{}}}}
-    """
-    with running(text, tmp_path) as system:
+def test_invalid_requests_are_refused_and_change_nothing(tmp_path: Path, peer: Peer) -> None:
+    with running("{system: subject, nodes: {subject: {}}}", tmp_path) as system:
         for transition in (
             0, 99, 255, Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CONFIGURE,
             Transition.TRANSITION_CREATE, Transition.TRANSITION_DESTROY,

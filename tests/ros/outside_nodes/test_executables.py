@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from lifecycle_msgs.msg import State, TransitionEvent
@@ -16,7 +15,6 @@ from lifecycle_msgs.srv import GetState
 from std_msgs.msg import String
 
 from composer.runtime.host_options import HostOptions
-from composer.runtime.manager.other_instances import Instance
 from composer.runtime.supervision.events import (
     BroughtUp,
     NodeFailed,
@@ -24,7 +22,6 @@ from composer.runtime.supervision.events import (
     RollingBack,
     StateChanged,
 )
-from tests.ros.support.external_processes import soon_missed
 from tests.ros.support.in_process import (
     Peer,
     RunningSystem,
@@ -77,14 +74,6 @@ def pid_of(system: RunningSystem, node: str) -> int:
 
 def has_ended(pid: int) -> bool:
     return not Path("/proc", str(pid)).exists()
-
-
-def wait_for_failure(system: RunningSystem, node: str) -> NodeFailed:
-    def failures() -> list[NodeFailed]:
-        return [event for event in system.reported(NodeFailed) if node in event.nodes]
-
-    wait_until(failures, f"a fault of {node}")
-    return failures()[0]
 
 
 def printed_by(*words: str) -> str:
@@ -148,7 +137,7 @@ def test_kill_is_noticed_and_dependents_pause_until_the_restart(name: str, tmp_p
     with running(ROBOT, tmp_path) as system:
         full_name = system.node(name).full_name
         os.kill(pid_of(system, name), signal.SIGKILL)
-        failed = wait_for_failure(system, full_name)
+        failed = system.wait_for_failure(full_name)
         # Noticed by the end of the process: it is in the ROS graph for another 20 s.
         assert failed.reason == "its process was ended by SIGKILL"
         assert failed.consequence == "restart 1 in 0.1 s"
@@ -282,7 +271,7 @@ nodes:
             "/base inactive",
             "/base active",
         ]
-        failed = wait_for_failure(system, "/driver")
+        failed = system.wait_for_failure("/driver")
         assert "within 1.5 s; its process was ended" in failed.reason
         wait_until(lambda: system.node("user").state == "inactive", "the configuration")
         assert system.node("viewer").state == "unconfigured"
@@ -303,138 +292,6 @@ nodes:
         assert changes == ["/calibrate", "/arm"]
         assert system.node("calibrate").state == "active"
         assert not system.reported(NodeFailed)
-
-
-EXTERNAL = """
-system: robot
-nodes:
-  lidar:
-    external: {ready_timeout_ms: TIMEOUT}
-    publishers: {scan: {type: std_msgs/msg/String}}
-    services: {reset: {type: std_srvs/srv/Trigger}}
-  filter:
-    lifecycle: {depends_on: [lidar]}
-    subscriptions: {scan: {type: std_msgs/msg/String, log: "{message.data}"}}
-"""
-
-
-def test_an_external_node_is_awaited_and_observed(tmp_path: Path) -> None:
-    process = start_external(tmp_path)
-    try:
-        with running(EXTERNAL.replace("TIMEOUT", "20000"), tmp_path) as system:
-            assert system.states()[-2:] == ["/lidar active", "/filter active"]
-            system.wait_for_log("tick")
-            process.send_signal(signal.SIGINT)
-            process.wait(10)
-            failed = wait_for_failure(system, "/lidar")
-            assert failed.reason == "it has disappeared from the ROS graph"
-            wait_until(lambda: system.node("filter").state == "inactive", "the pause")
-            process = start_external(tmp_path)
-            wait_until(lambda: system.node("filter").state == "active", "the return")
-            system.stop()
-            assert process.poll() is None  # never ended by the system
-    finally:
-        process.kill()
-        process.wait()
-
-
-@pytest.mark.parametrize("is_required", [True, False])
-def test_a_system_is_up_without_an_external_node_and_takes_it_in_later(
-    is_required: bool, tmp_path: Path
-) -> None:
-    text = EXTERNAL.replace("TIMEOUT", "300") + "  other: {}\n"
-    if not is_required:
-        text = text.replace("  lidar:\n", "  lidar:\n    required: false\n")
-    process = None
-    try:
-        with running(text, tmp_path) as system:
-            (up,) = system.reported(BroughtUp)
-            assert str(up).startswith("1 of 3 nodes active after ")
-            assert str(up).endswith(" s, waiting for /lidar")
-            assert up.is_complete is not is_required
-            failed = wait_for_failure(system, "/lidar")
-            missing = "it has no publisher /scan, service /reset after 0.3 s"
-            assert failed.reason.startswith(f"activate failed: {missing}")
-            assert failed.is_tolerated is not is_required
-            assert [system.node(name).state for name in ("other", "filter")] == [
-                "active",
-                "inactive",
-            ]
-            process = start_external(tmp_path)
-            wait_until(lambda: system.node("filter").state == "active", "the arrival")
-            assert system.reported(NodeFailed) == [failed]
-            assert system.stop().exit_code == 0
-    finally:
-        if process is not None:
-            process.kill()
-            process.wait()
-
-
-def test_the_end_does_not_wait_for_an_absent_node(tmp_path: Path) -> None:
-    text = EXTERNAL.replace("TIMEOUT", "60000").replace(
-        "  lidar:\n", "  lidar:\n    required: false\n"
-    )
-    with running(text, tmp_path) as system:
-        wait_until(lambda: system.node("lidar").state == "activating", "the wait for it")
-        outcome = system.stop()
-        assert outcome.exit_code == 0
-        assert [node.state for node in outcome.nodes] == ["finalized"] * 2
-        assert outcome.remarks == ("waiting for /lidar",)
-
-
-ELSEWHERE = """
-system: robot
-nodes: {lidar: {name: NAME, namespace: elsewhere, external: {ready_timeout_ms: 300}}}
-"""
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        (
-            EXTERNAL.replace("TIMEOUT", "300"),
-            "no publisher /scan, service /reset after 0.3 s; start",
-        ),
-        (ELSEWHERE, "ROS graph after 0.3 s; there is /NAME instead: write 'namespace: /'"),
-    ],
-)
-def test_an_absent_external_node_fails_a_bring_up_that_is_all_or_nothing(
-    text: str, reason: str, tmp_path: Path, peer: Peer
-) -> None:
-    name = peer.node.get_name()
-    options = HostOptions(all_or_nothing=True)
-    with running(text.replace("NAME", name), tmp_path, options=options) as system:
-        assert system.end().exit_code == 1
-    assert reason.replace("NAME", name) in str(system.reported(RollingBack)[0])
-
-
-def test_a_refused_system_leaves_an_external_node_as_it_is(tmp_path: Path, peer: Peer) -> None:
-    """Another computer runs the system already, with the same node."""
-    text = "{system: robot, nodes: {some_managed_driver: {external: {lifecycle: managed}}}}"
-    driver, state = (
-        [sys.executable, PROGRAMS / "managed_driver.py"],
-        "/some_managed_driver/get_state",
-    )
-    with subprocess.Popen(driver, stderr=subprocess.DEVNULL) as process:
-        try:
-            with running(text, tmp_path) as system:
-                assert peer.call(GetState, state).current_state.label == "active"
-                older = Instance("elsewhere", 4321, 3600.0)
-                system.host._on_older_instance("/robot", older)
-                assert "already runs" in system.end().reason
-                assert peer.call(GetState, state).current_state.label == "active"
-        finally:
-            process.kill()
-
-
-def start_external(folder: Path) -> subprocess.Popen[Any]:
-    names = ("-r", "__node:=lidar", "-r", "words:=scan", "-p", "rate:=20.0")
-    return subprocess.Popen(
-        [sys.executable, PROGRAMS / "driver.py", "--ros-args", *names],
-        env={**os.environ, **soon_missed(folder)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
 
 
 TWO_NODES = f"""

@@ -118,7 +118,7 @@ class Caller(Behavior):
 """
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 def test_calls_and_sleeps_end_when_the_node_leaves_active(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:

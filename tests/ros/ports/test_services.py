@@ -117,7 +117,7 @@ class Handled(Behavior):
         await self.clock.sleep(0.001)
         OUTCOME
 """
-KINDS = ["events", "single_threaded", "multi_threaded"]
+KINDS = ["events", "multi_threaded"]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -178,7 +178,7 @@ class Faulty(Behavior):
 """
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 def test_an_exception_of_a_handler_is_logged_and_contained(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:

@@ -7,88 +7,32 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
-from textwrap import dedent
 
 import pytest
 
-from composer.base.resources import systems_folder
 from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 from composer.runtime.process.instance_lock import socket_path
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import end_limit_s
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem
 
-PATIENCE_S = 50.0
-
-
-class Running:
-    """A ``compose run`` in a process of its own, with its output in a file."""
-
-    def __init__(self, process: subprocess.Popen[bytes], output: Path) -> None:
-        self.process = process
-        self._output = output
-
-    def text(self) -> str:
-        return self._output.read_text(encoding="utf-8")
-
-    def wait_for(self, part: str) -> None:
-        until_s = time.monotonic() + PATIENCE_S
-        while True:
-            has_ended = self.process.poll() is not None  # then the output is complete
-            if part in self.text():
-                return
-            assert not has_ended, f"ended: {self.text()}"
-            assert time.monotonic() < until_s, f"no '{part}' in {self.text()}"
-            time.sleep(0.002)
-
-    def end(self, *, repeat_signal: bool = False) -> tuple[int, float]:
-        """Wait for the end, maybe with repeated Ctrl-C; return the exit code and the duration."""
-        began_s = time.monotonic()
-        while repeat_signal and time.monotonic() < began_s + PATIENCE_S:
-            with suppress(subprocess.TimeoutExpired):
-                self.process.wait(0.15)
-                break
-            self.process.send_signal(signal.SIGINT)
-        try:
-            code = self.process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self.process.send_signal(signal.SIGABRT)  # prints the stacks of all threads
-            self.process.wait()
-            raise AssertionError(f"does not end: {self.text()}") from None
-        return code, time.monotonic() - began_s
+PIPELINE = "systems/pipeline.yaml"
 
 
-@contextmanager
-def compose_run(folder: Path, *arguments: object, **environment: str) -> Iterator[Running]:
-    path = folder / "output.txt"
-    with path.open("wb") as output:
-        process = subprocess.Popen(
-            [*COMPOSE, "run", *map(str, arguments)],
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=output,
-            env={**os.environ, "PYTHONFAULTHANDLER": "1", **environment},
-        )
-    try:
-        yield Running(process, path)
-    finally:
-        process.kill()
-        process.wait()
-
-
-def pipeline() -> Path:
-    return systems_folder() / "pipeline.yaml"
+def compose_run(system: str | Path, *options: str) -> RunningSystem:
+    """Run a system in a new interpreter."""
+    return RunningSystem(str(system), *options, program=COMPOSE)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP])
-def test_a_signal_ends_the_pipeline_in_order(tmp_path: Path, number: signal.Signals) -> None:
-    with compose_run(tmp_path, pipeline()) as run:
+def test_a_signal_ends_the_pipeline_in_order(number: signal.Signals) -> None:
+    with compose_run(PIPELINE) as run:
         run.wait_for("3 of 3 nodes active")
-        run.process.send_signal(number)
-        code, took_s = run.end()
-    text = run.text()
-    assert code == 0, text
+        code, took_s = run.stop(number)
+    text = run.output
+    assert code == 0
     assert took_s < end_limit_s()
     assert f"shutting down: {number.name}" in text
     assert "Traceback" not in text
@@ -128,15 +72,20 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
     path = tmp_path / "hanging.yaml"
     path.write_text(HANGING, encoding="utf-8")
     path.with_suffix(".py").write_text(HANGING_MODULE, encoding="utf-8")
-    with compose_run(tmp_path, path) as run:
-        run.wait_for("[hanging] hanging")
+    with compose_run(path) as run:
+        run.wait_for(r"\[hanging\] hanging")
         run.process.send_signal(signal.SIGINT)
         run.wait_for("shutting down: SIGINT")
-        code, took_s = run.end(repeat_signal=repeat_signal)
-    assert code == 1, run.text()
-    assert took_s < end_limit_s()
-    assert "/hanging is stuck and did not deactivate in" in run.text()
-    assert "on_tick" in run.text()
+        began_s = time.monotonic()
+        while repeat_signal and time.monotonic() < began_s + PATIENCE_S:
+            with suppress(subprocess.TimeoutExpired):
+                run.process.wait(0.15)
+                break
+            run.process.send_signal(signal.SIGINT)
+        assert run.wait() == 1
+        assert time.monotonic() - began_s < end_limit_s()
+    assert "/hanging is stuck and did not deactivate in" in run.output
+    assert "on_tick" in run.output
 
 
 @pytest.mark.parametrize(
@@ -155,15 +104,15 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
     ],
 )
 def test_an_invalid_environment_is_refused(
-    tmp_path: Path, variables: dict[str, str], words: str
+    variables: dict[str, str], words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    system = systems_folder() / "minimal.yaml"
-    with compose_run(tmp_path, system, "--for", 1, **variables) as run:
-        code, _ = run.end()
-    assert code == 1, run.text()
-    assert words in run.text()
-    assert "Traceback" not in run.text()
-    assert "internal error" not in run.text()
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    with compose_run("systems/minimal.yaml", "--for", "1") as run:
+        assert run.wait() == 1
+    assert words in run.output
+    assert "Traceback" not in run.output
+    assert "internal error" not in run.output
 
 
 def incomplete_ports(domain_id: int) -> Iterator[Path]:
@@ -179,24 +128,21 @@ def incomplete_ports(domain_id: int) -> Iterator[Path]:
             yield port
 
 
-def test_the_same_signal_twice_at_once_counts_once(tmp_path: Path) -> None:
-    with compose_run(tmp_path, pipeline()) as run:
+def test_the_same_signal_twice_at_once_counts_once() -> None:
+    with compose_run(PIPELINE) as run:
         run.wait_for("3 of 3 nodes active")
         run.process.send_signal(signal.SIGINT)
-        run.process.send_signal(signal.SIGINT)  # as forwarded by make, timeout or a launcher
-        code, _ = run.end()
-    assert code == 0, run.text()
-    assert "stuck" not in run.text()
+        assert run.stop(signal.SIGINT)[0] == 0  # as forwarded by make, timeout or a launcher
+    assert "stuck" not in run.output
 
 
 def test_incomplete_shared_memory_of_a_killed_process_does_not_hang_a_system(
-    tmp_path: Path, ros_domain_id: int
+    ros_domain_id: int,
 ) -> None:
     left = tuple(incomplete_ports(ros_domain_id))
     try:
-        with compose_run(tmp_path, pipeline(), "--for", 0.1) as run:
-            code, _ = run.end()
-        assert code == 0, run.text()
+        with compose_run(PIPELINE, "--for", "0.1") as run:
+            assert run.wait() == 0
         # Whether one that remains hangs a participant depends on which ports it opens.
         assert not [port for port in left if port.exists()]
     finally:
@@ -204,45 +150,39 @@ def test_incomplete_shared_memory_of_a_killed_process_does_not_hang_a_system(
             port.unlink(missing_ok=True)
 
 
-def test_node_logs_reach_the_terminal_at_their_level(tmp_path: Path) -> None:
+LOUD = """
+system: loud
+nodes:
+  loud:
+    namespace: robot
+    on_configure: {log: {level: debug, message: "a debug line"}}
+    on_activate: {log: {level: warn, message: "a warning"}}
+"""
+
+
+@pytest.mark.parametrize("level", ["info", "debug"])
+def test_node_logs_reach_the_terminal_at_their_level(level: str, tmp_path: Path) -> None:
     path = tmp_path / "loud.yaml"
-    path.write_text(
-        dedent(
-            """
-            system: loud
-            nodes:
-              loud:
-                namespace: robot
-                on_configure: {log: {level: debug, message: "a debug line"}}
-                on_activate: {log: {level: warn, message: "a warning"}}
-            """
-        ),
-        encoding="utf-8",
-    )
-    with compose_run(tmp_path, path, "--for", 0.1, "--log-level", "info") as run:
-        assert run.end()[0] == 0
-    assert "] [WARN] [robot.loud] a warning\n" in run.text()
-    assert "a debug line" not in run.text()
-    with compose_run(tmp_path, path, "--for", 0.1, "--log-level", "debug") as run:
-        assert run.end()[0] == 0
-    assert "] [DEBUG] [robot.loud] a debug line\n" in run.text()
+    path.write_text(LOUD, encoding="utf-8")
+    with compose_run(path, "--for", "0.1", "--log-level", level) as run:
+        assert run.wait() == 0
+    assert "] [WARN] [robot.loud] a warning\n" in run.output
+    assert ("] [DEBUG] [robot.loud] a debug line\n" in run.output) is (level == "debug")
+
+
+TURNER = """
+import sys
+
+class Turner:
+    def on_activate(self):
+        self.log.info(f"interval {sys.getswitchinterval():g}")
+"""
 
 
 def test_threads_take_turns_soon(tmp_path: Path) -> None:
     path = tmp_path / "turns.yaml"
     path.write_text("system: turns\nnodes: {turner: {behavior: 'turner:Turner'}}\n", "utf-8")
-    tmp_path.joinpath("turner.py").write_text(
-        dedent(
-            """
-            import sys
-
-            class Turner:
-                def on_activate(self):
-                    self.log.info(f"interval {sys.getswitchinterval():g}")
-            """
-        ),
-        encoding="utf-8",
-    )
-    with compose_run(tmp_path, path, "--for", 0.1) as run:
-        assert run.end()[0] == 0
-    assert "] interval 0.001\n" in run.text()
+    path.with_name("turner.py").write_text(TURNER, encoding="utf-8")
+    with compose_run(path, "--for", "0.1") as run:
+        assert run.wait() == 0
+    assert "] interval 0.001\n" in run.output

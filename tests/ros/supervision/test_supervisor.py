@@ -89,7 +89,7 @@ RESTART_CHANGES = [
 ]
 
 
-@pytest.mark.parametrize("kind", ["events", "single_threaded", "multi_threaded"])
+@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [

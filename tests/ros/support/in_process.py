@@ -40,6 +40,7 @@ from composer.runtime.supervision.events import (
     BroughtUp,
     Event,
     Logged,
+    NodeFailed,
     NodeSummary,
     Outcome,
     StateChanged,
@@ -123,6 +124,14 @@ class RunningSystem:
         """Return the state changes, in order: ``/talker active``."""
         changes = [str(event) for event in self.reported(StateChanged)]
         return changes if node is None else [text for text in changes if text.startswith(node)]
+
+    def wait_for_failure(self, node: str) -> NodeFailed:
+        """Return the first fault of a node."""
+
+        def failures() -> list[NodeFailed]:
+            return [event for event in self.reported(NodeFailed) if node in event.nodes]
+
+        return wait_until(failures, f"a fault of {node}")[0]
 
     def node(self, name: str) -> RunningNode:
         """Return a node of the system by its key."""

@@ -95,10 +95,14 @@ class RunningSystem:
         """Send a signal; return the exit code and the time until the exit, in seconds."""
         sent_s = time.monotonic()
         self.process.send_signal(number)
+        code = self.wait()
+        return code, time.monotonic() - sent_s
+
+    def wait(self) -> int:
+        """Wait until the process ends and its output is read; return the exit code."""
         code = self.process.wait(timeout=PATIENCE_S)
-        took_s = time.monotonic() - sent_s
         self._reader.join()
-        return code, took_s
+        return code
 
     def _end(self) -> None:
         """Stop the process; a killed one would stay in the ROS graph until its lease expires."""
