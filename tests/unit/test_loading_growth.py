@@ -100,7 +100,7 @@ def test_many_valid_nodes(tmp_path: Path, nodes: Callable[[int], str]) -> None:
         assert len(loading.system.nodes) == count + 1
         assert loading.diagnostics == []
 
-    assert_linear(validate, 500, 4_000)
+    assert_linear(validate, 250, 2_000)
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_many_included_nodes(tmp_path: Path) -> None:
         assert len(loading.system.nodes) == 5 * count
         assert loading.diagnostics == []
 
-    assert_linear(validate, 100, 800)
+    assert_linear(validate, 50, 400)
 
 
 #: By name: the begin of a file, a part that is repeated up to the size, and the end. A ``#`` in it
@@ -131,7 +131,6 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
     "quotes in braces": ('nodes: {x: {on_activate: {log: "', "{'} ", '"}}}\n'),
     "variables": ("nodes: {x: {on_activate: {log: '", "${a#} ", "'}}}\n"),
     "escapes": ("nodes: {x: {state: {a: [", '"\\a", ', "]}}}\n"),
-    "ignore comments": ("nodes: {x: {}}\n", "# compose: ignore[RC5]\n", ""),
     "ignored rules": ("nodes: {x: {}} # compose: ignore[", "RC5#, ", "]\n"),
     "ignore comments in quotes": ("nodes: {x: {}} ", "# compose: ignore[", "'\"\n"),
     "misspelt types": ("nodes:\n", "  n#: {publishers: {t: {type: std_msgs/msg/Flot#}}}\n", ""),
@@ -149,7 +148,7 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("begin", "part", "end"), LARGE_FILES.values(), ids=LARGE_FILES)
 def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
-    """Up to a megabyte, also beyond the limits."""
+    """Also beyond the limits."""
 
     def validate(size: int) -> None:
         parts = size // len(part.replace("#", "10000"))
@@ -157,7 +156,7 @@ def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
         content = f"system: large\n{begin}{text}{end}".encode()
         load_bytes(content, tmp_path, shown="large.yaml")
 
-    assert_linear(validate, 100_000, 1_000_000)
+    assert_linear(validate, 50_000, 400_000)
 
 
 def test_loading_pauses_the_cycle_collection_only_while_it_runs(tmp_path: Path) -> None:
