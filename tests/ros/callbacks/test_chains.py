@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.protocol.reports import ChainFigures
 from tests.ros.support.in_process import RunningSystem, running, wait_until
 
 BRAKE = """
@@ -40,15 +39,15 @@ class Detector:
 """
 
 
-def chain(system: RunningSystem, name: str) -> ChainFigures:
-    return next(item for item in system.host._node_set.chains() if item.chain == name)
+def count(system: RunningSystem, name: str) -> int:
+    return next(item.count for item in system.chains() if item.chain == name)
 
 
 @pytest.mark.parametrize("more", ["", ", delivery: dds", ", isolation: copy"])
 def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_path: Path) -> None:
     with running(BRAKE.format(more=more), tmp_path, detector=DETECTOR) as system:
-        wait_until(lambda: chain(system, "stop").count > 10)
-        counted = chain(system, "stop").count  # first: both grow
+        wait_until(lambda: count(system, "stop") > 10)
+        counted = count(system, "stop")  # first: both grow
         # A message without new data does not count.
         assert counted <= system.node("lidar").sent("scan")
     reported = {item.chain: item for item in system.stop().chains}

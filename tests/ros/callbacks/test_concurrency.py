@@ -107,8 +107,7 @@ def test_messages_that_arrive_while_a_node_is_inactive_do_not_wait_for_it(
             self.log.info(f"end {message.data}")
     """
     with running(text, tmp_path, resting=module) as system:
-        source, sink = (system.node(name) for name in ("source", "sink"))
-        output = source._entities.senders["output"]
+        output = system.sender("source", "output")
         output.publish(Int64(data=0))
         system.wait_for_log("begin 0")
         system.change("sink", "deactivate")
@@ -117,7 +116,7 @@ def test_messages_that_arrive_while_a_node_is_inactive_do_not_wait_for_it(
         system.change("sink", "activate")
         output.publish(Int64(data=3))
         assert "begin 3" not in system.log_text()  # one at a time, including earlier ones
-        sink._behavior.release.set_result(None)
+        system.behavior("sink").release.set_result(None)
         system.wait_for_log("end 3")
         counted = system.summary("/sink")
     words = [f"{word} {number}" for number in (0, 3) for word in ("begin", "end")]
@@ -156,7 +155,7 @@ def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> N
             self.log.info(f"met {message.data}")
     """
     with running(text, tmp_path, overlapping=module) as system:
-        output = system.node("source")._entities.senders["output"]
+        output = system.sender("source", "output")
         output.publish(Int64(data=0))
         output.publish(Int64(data=1))
         for number in range(2):

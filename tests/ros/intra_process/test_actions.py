@@ -82,11 +82,11 @@ connections:
 
 def go(system: RunningSystem, max_velocity: float) -> Any:
     """Make the client send a goal and return its behavior; 0 m/s never arrives."""
-    client = system.node("client")
-    client._behavior.feedback.clear()
-    client._behavior.sent = None
-    client._context.spawn(client._behavior.go(max_velocity))
-    return client._behavior
+    client = system.behavior("client")
+    client.feedback.clear()
+    client.sent = None
+    system.spawn("client", client.go(max_velocity))
+    return client
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
@@ -111,7 +111,7 @@ def test_goals_have_the_same_outcomes_in_process_and_by_dds(
 
         go(system, 0.0)
         wait_until(lambda: client.feedback and client.sent)  # feedback may arrive first
-        system.node("client")._context.spawn(client.turn_back())
+        system.spawn("client", client.turn_back())
         wait_until(lambda: len(client.outcomes) == 3)
         assert client.outcomes[-1] == ("canceled", "turned back")
 

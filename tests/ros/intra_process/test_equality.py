@@ -80,12 +80,12 @@ def test_every_combination_of_qos_delivers_the_same_in_process_and_by_dds(
 ) -> None:
     with running(text_of(delivery, executor), tmp_path, table=MODULE) as system:
         source = system.node("source")
-        source.loop.run(lambda: source._behavior.send(TABLE, SENT))
+        source.loop.run(lambda: system.behavior("source").send(TABLE, SENT))
         for name, (_, _, wanted) in TABLE.items():
             sink = system.behavior(name)
             wait_until(lambda sink=sink, wanted=wanted: len(sink.received) >= len(wanted), name)
         # Sent last, by the same path: late or duplicate messages would have arrived before.
-        source.loop.run(lambda: source._behavior.send(["deep"], 1))
+        source.loop.run(lambda: system.behavior("source").send(["deep"], 1))
         deep = system.behavior("deep")
         wait_until(lambda: len(deep.received) == SENT + 1)
         received = {name: [item.data for item in system.behavior(name).received] for name in TABLE}
@@ -93,7 +93,7 @@ def test_every_combination_of_qos_delivers_the_same_in_process_and_by_dds(
             name: [*wanted, 0] if name == "deep" else list(wanted)
             for name, (_, _, wanted) in TABLE.items()
         }
-        same = any(message is source._behavior.sent[0] for message in deep.received)
+        same = any(message is system.behavior("source").sent[0] for message in deep.received)
         assert same is (delivery == "auto")
 
 
@@ -120,13 +120,12 @@ def test_a_connection_may_require_copies_or_dds(tmp_path: Path) -> None:
     options = HostOptions(log_level=LogLevel.DEBUG)
     with running(COPIED, tmp_path, options=options, table=MODULE) as system:
         source = system.node("source")
-        publishers = source._entities.senders
         sinks = {name: system.behavior(name) for name in ("shared", "copied", "by_dds")}
 
         def publish_and_change() -> None:
             for name in sinks:
                 message = Int64(data=1)
-                publishers[name].publish(message)
+                system.sender("source", name).publish(message)
                 message.data = 2
 
         source.loop.run(publish_and_change)
@@ -182,7 +181,7 @@ class Changer(Behavior):
 def test_each_receiver_has_its_own_copy_even_of_latched_messages(tmp_path: Path) -> None:
     with running(OF_THEIR_OWN, tmp_path, own=CHANGERS) as system:
         source = system.node("source")
-        source.loop.run(source._behavior.send)
+        source.loop.run(system.behavior("source").send)
         system.change("late", "configure", "activate")
         names = ("first", "second", "late")
         wait_until(lambda: all(system.behavior(name).received for name in names))
@@ -209,11 +208,11 @@ def test_a_connection_overrides_the_system(tmp_path: Path, whole: str, one: str)
     text = OVERRIDDEN.format(whole=whole, one=one)
     with running(text, tmp_path, table=MODULE) as system:
         source = system.node("source")
-        source.loop.run(lambda: source._behavior.send(["one", "two"], 1))
+        source.loop.run(lambda: system.behavior("source").send(["one", "two"], 1))
         sinks = [system.behavior(name) for name in ("one", "two")]
         wait_until(lambda: all(sink.received for sink in sinks))
         same = [
             sink.received[0] is sent
-            for sink, sent in zip(sinks, source._behavior.sent, strict=True)
+            for sink, sent in zip(sinks, system.behavior("source").sent, strict=True)
         ]
         assert same == [one == "auto", whole == "auto"]

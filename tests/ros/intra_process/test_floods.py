@@ -20,8 +20,8 @@ def test_a_flood_keeps_messages_within_the_depth_and_counts_the_rest(
     with running(text, tmp_path, counting=MODULE) as system:
         send(system, 1000)
         near = system.node("near")
-        wait_until(lambda: len(near._behavior.received) == depth)
-        assert numbers(near._behavior.received) == list(range(1000 - depth, 1000))
+        wait_until(lambda: len(system.behavior("near").received) == depth)
+        assert numbers(system.behavior("near").received) == list(range(1000 - depth, 1000))
         assert near.statistics.dropped == 1000 - depth
 
 
@@ -30,8 +30,8 @@ def test_without_a_depth_no_message_of_a_flood_is_dropped(tmp_path: Path) -> Non
     with running(text, tmp_path, counting=MODULE) as system:
         send(system, 5000)
         near = system.node("near")
-        wait_until(lambda: len(near._behavior.received) == 5000)
-        assert numbers(near._behavior.received) == list(range(5000))
+        wait_until(lambda: len(system.behavior("near").received) == 5000)
+        assert numbers(system.behavior("near").received) == list(range(5000))
         assert near.statistics.dropped == 0
 
 
@@ -53,8 +53,8 @@ def test_concurrent_publishers_lose_no_message_uncounted(
             writer.start()
         for writer in writers:
             writer.join()
-        wait_until(lambda: len(far._behavior.received) + far.statistics.dropped == 20_000)
-        received = numbers(far._behavior.received)
+        wait_until(lambda: len(system.behavior("far").received) + far.statistics.dropped == 20_000)
+        received = numbers(system.behavior("far").received)
         for k in range(4):
             from_one = [number for number in received if number // 5000 == k]
             assert from_one == sorted(from_one)
@@ -73,8 +73,8 @@ def test_a_flood_neither_fills_the_loop_nor_delays_later_messages(
             send(system, 500)  # from the thread of another loop
         assert len(far.loop._calls) < 120  # its depth, and few other calls
         release.set()
-        wait_until(lambda: len(far._behavior.received) + far.statistics.dropped == 10_000)
-        assert numbers(far._behavior.received)[-100:] == list(range(9_900, 10_000))
+        wait_until(lambda: len(system.behavior("far").received) + far.statistics.dropped == 10_000)
+        assert numbers(system.behavior("far").received)[-100:] == list(range(9_900, 10_000))
         for number in range(10_000, 10_003):
             send(system, 1)
-            wait_until(lambda n=number: numbers(far._behavior.received)[-1] == n)
+            wait_until(lambda n=number: numbers(system.behavior("far").received)[-1] == n)

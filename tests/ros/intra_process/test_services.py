@@ -82,8 +82,7 @@ REFUSED = (False, "/server is inactive, not active")
 
 
 def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = None) -> None:
-    client = system.node("client")
-    client._context.spawn(client._behavior.ask(data, timeout_ms))
+    system.spawn("client", system.behavior("client").ask(data, timeout_ms))
 
 
 def outcomes(system: RunningSystem, count: int) -> list[Any]:
@@ -155,7 +154,7 @@ def test_concurrent_calls_end_each_at_its_own_timeout(tmp_path: Path) -> None:
         text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
     ) as system:
         client = system.node("client")
-        client._context.spawn(client._behavior.ask_at_once((90.0, 30.0, 60.0)))
+        system.spawn("client", system.behavior("client").ask_at_once((90.0, 30.0, 60.0)))
         results = outcomes(system, 3)
         assert results == [
             ("CallTimeout", limit, f"service '/ask' did not answer within {limit:g} ms")
@@ -169,8 +168,10 @@ def test_a_failed_call_that_is_not_awaited_is_logged(tmp_path: Path, delivery: s
     text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
     with running(text, tmp_path, asking=MODULE) as system:
         client = system.node("client")
-        wait_until(client._behavior.clients.ask._has_server, "the server, which DDS discovers")
-        client.loop.run(client._behavior.ask_and_go)
+        wait_until(
+            system.behavior("client").clients.ask._has_server, "the server, which DDS discovers"
+        )
+        client.loop.run(system.behavior("client").ask_and_go)
         line = system.wait_for_log("did not answer")
         counted = system.summary("/client").errors
     assert line == "client 'ask': service '/ask' did not answer within 20 ms"
@@ -196,9 +197,9 @@ def test_both_endpoints_have_the_same_objects_unless_isolated(
 def test_a_copied_request_is_as_it_was_when_sent(tmp_path: Path) -> None:
     text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto") + COPIED
     with running(text, tmp_path, asking=MODULE) as system:
-        client, server = (system.node(name) for name in ("client", "server"))
-        client._context.spawn(client._behavior.ask_and_change())
-        wait_until(lambda: client._behavior.answers)
-        assert [request.data for request in server._behavior.asked] == [True]
-        server._behavior.answers[0].message = "changed afterwards"
-        assert client._behavior.answers[0].message == "request 1"
+        client, server = (system.behavior(name) for name in ("client", "server"))
+        system.spawn("client", client.ask_and_change())
+        wait_until(lambda: client.answers)
+        assert [request.data for request in server.asked] == [True]
+        server.answers[0].message = "changed afterwards"
+        assert client.answers[0].message == "request 1"

@@ -143,16 +143,16 @@ def test_messages_in_transit_are_dropped_when_the_subscriber_leaves_active(tmp_p
         wait_until(lambda: near.statistics.dropped == 3)
         system.change("near", "activate")
         send(system, 2)
-        wait_until(lambda: len(near._behavior.received) == 2)
-        assert numbers(near._behavior.received) == [3, 4]
+        wait_until(lambda: len(system.behavior("near").received) == 2)
+        assert numbers(system.behavior("near").received) == [3, 4]
         # A node that is cleaned up has no subscription, so no message is kept for it.
         system.change("near", "deactivate", "cleanup")
         send(system, 2)
         wait_until(lambda: len(system.behavior("far").received) == 7)
         system.change("near", "configure", "activate")
         send(system, 1)
-        wait_until(lambda: len(near._behavior.received) == 1)
-        assert numbers(near._behavior.received) == [7]
+        wait_until(lambda: len(system.behavior("near").received) == 1)
+        assert numbers(system.behavior("near").received) == [7]
         assert near.statistics.dropped == 3
         far = system.behavior("far")
         wait_until(lambda: len(far.received) == 8)

@@ -45,7 +45,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
         moves = coordinate_and_pause(path, peer)
         with split(tmp_path, text) as system:  # another one, and the pause goes on
             assert system.node("camera").pid is None
-            assert system.host._status.without_nodes.activity == "paused"
+            assert system.report().activity == "paused"
             assert states(system) == {"inactive"}
             assert not moves
             assert peer.call(Trigger, "/lab/robot/manager/resume").success

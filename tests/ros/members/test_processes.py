@@ -96,11 +96,10 @@ def test_up_in_order_data_flows_and_down(
         assert b"ROLE=sensing\0" in environment
         assert b"ROS_SECURITY_ENCLAVE_OVERRIDE=/lab/robot/sensing\0" in environment
 
-        reported = system.host._status.snapshot  # with the rates that the processes report
         wait_until(
-            lambda: all((node.sent_hz or 0) > 1 for node in reported().nodes[:2]), "the rates"
+            lambda: all((node.sent_hz or 0) > 1 for node in system.report().nodes[:2]), "the rates"
         )
-        known = [(node.host, node.pid) for node in reported().nodes]
+        known = [(node.host, node.pid) for node in system.report().nodes]
         host = socket.gethostname()
         others = [(host, str(pid)) for pid in pids]
         assert known == [*others, ("", str(os.getpid()))]

@@ -13,7 +13,6 @@ from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions
 from std_srvs.srv import Trigger
 
-from composer.runtime.supervision.events import NodeFailed
 from composer.runtime.supervision.interruption import CallbackInterrupted
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
@@ -190,23 +189,6 @@ def test_every_outcome_of_a_handler_leads_to_a_primary_state(
     assert "cause: SystemExit" in log
     if transition != "shutdown":
         assert f"on_{transition} refused the transition: not now" in log
-
-
-def test_an_error_in_on_error_finalizes_the_node(tmp_path: Path, peer: Peer) -> None:
-    module = """
-    from composer.behavior import Behavior
-
-    class Subject(Behavior):
-        def on_configure(self): raise ValueError("first")
-        def on_error(self, cause): raise RuntimeError(f"second, after {cause}")
-    """
-    with running(SUBJECT, tmp_path, subject=module) as system:
-        assert not peer.change("/subject", "configure")
-        assert peer.state("/subject") == "finalized"
-        assert peer.call(Trigger, "/trigger").success
-        wait_until(lambda: system.reported(NodeFailed), "the failure, before the stop")
-    assert "on_error: RuntimeError: second, after first" in system.log_text()
-    assert system.end().exit_code == 1
 
 
 def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) -> None:

@@ -110,9 +110,8 @@ def test_up_and_down_in_order_with_names_and_parameters(tmp_path: Path, peer: Pe
         wait_until(lambda: "ready" in system.log(), "a line of its logger, without level and name")
         system.wait_for_log("tick")
         system.wait_for_log("managed")
-        reported = system.host._status.snapshot
         known = [str(pid) for pid in (*pids, os.getpid())]
-        wait_until(lambda: [node.pid for node in reported().nodes] == known, "the processes")
+        wait_until(lambda: [node.pid for node in system.report().nodes] == known, "the processes")
 
         # As other ROS nodes see it.
         echoed = peer.listen(String, "/echo")

@@ -132,29 +132,6 @@ def test_a_handler_gets_the_declared_response_and_returns_its_own(
     assert (plain.message, deferred.message) == ("fine", "fine")
 
 
-@pytest.mark.parametrize(
-    ("outcome", "reason"),
-    [
-        ("raise ValueError('no such thing')", ": ValueError: no such thing"),
-        ("raise SystemExit(1)", ": SystemExit: 1"),
-        ("return None", " returned None, not a Trigger.Response"),
-        ("return 'nonsense'", " returned 'nonsense', not a Trigger.Response"),
-    ],
-)
-def test_a_failing_handler_sends_a_response(
-    tmp_path: Path, peer: Peer, outcome: str, reason: str
-) -> None:
-    module = MODULE.replace("OUTCOME", outcome)
-    with running(HANDLED.replace("KIND", "events"), tmp_path, handled=module) as system:
-        answers = {name: peer.call(Trigger, f"/{name}") for name in ("plain", "deferred")}
-        assert peer.call(SetBool, "/set", SetBool.Request(data=True)).success
-        counted = system.summary("/handled")
-    for name, answer in answers.items():
-        assert (answer.success, answer.message) == (False, f"on_{name}{reason}")
-        assert f"on_{name}" in system.log_text()
-    assert counted.errors == 2
-
-
 def test_pending_requests_are_refused_when_the_node_leaves_active(
     tmp_path: Path, peer: Peer
 ) -> None:

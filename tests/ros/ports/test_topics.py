@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 
@@ -148,51 +147,3 @@ def test_ports_are_attributes_of_a_behavior(tmp_path: Path) -> None:
     with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
         names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
         assert system.log() == [*names, f"no publisher 'plan'; available: {', '.join(names)}"]
-
-
-FAULTY = """
-system: faulty
-executors: {shared: {kind: KIND}}
-nodes:
-  faulty:
-    executor: shared
-    behavior: faulty:Faulty
-    subscriptions:
-      input: {type: std_msgs/msg/Int64, external: true, set: {last: "{message.data}"}}
-    state: {last: 0}
-  healthy:
-    executor: shared
-    subscriptions:
-      input: {type: std_msgs/msg/Int64, external: true, log: "healthy {message.data}"}
-"""
-FAULTY_MODULE = """
-from composer.behavior import Behavior
-
-class Faulty(Behavior):
-    def on_input(self, message):
-        if message.data == 1:
-            raise ValueError("one is too much")
-        if message.data == 2:
-            raise SystemExit(3)
-        self.log.info(f"faulty {message.data}")
-"""
-
-
-@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-def test_an_exception_of_a_handler_is_logged_and_contained(
-    tmp_path: Path, peer: Peer, kind: str
-) -> None:
-    text = FAULTY.replace("KIND", kind)
-    with running(text, tmp_path, faulty=FAULTY_MODULE) as system:
-        source = peer.publisher(Int64, "/input")
-        wait_until(lambda: source.get_subscription_count() == 2)
-        for number in (1, 2, 3):
-            source.publish(Int64(data=number))
-        system.wait_for_log("faulty 3")
-        system.wait_for_log("healthy 3")
-        fault = system.wait_for_log("one is too much")
-        counted = system.summary("/faulty")
-    assert fault.startswith("on_input: ValueError: one is too much\nTraceback")
-    assert 'raise ValueError("one is too much")' in fault
-    assert counted.errors == 2
-    assert system.end().exit_code == 0

@@ -51,7 +51,7 @@ class Listener(Behavior):
 def send(system: RunningSystem, count: int) -> None:
     """Make the source publish ``number`` messages at once, in a callback of its loop."""
     source = system.node("source")
-    source.loop.run(lambda: source._behavior.send(count))
+    source.loop.run(lambda: system.behavior("source").send(count))
 
 
 def numbers(messages: list[Any]) -> list[int]:

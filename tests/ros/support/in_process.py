@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -35,6 +35,7 @@ from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.middleware.shared_memory import remove_incomplete_ports
 from composer.runtime.node.node import RunningNode
+from composer.runtime.protocol.reports import ChainFigures, SystemReport
 from composer.runtime.ros_graph.graph import servers_of
 from composer.runtime.supervision.events import (
     BroughtUp,
@@ -140,6 +141,26 @@ class RunningSystem:
     def behavior(self, name: str) -> Any:
         """Return the behavior of a node, which exists from configure to cleanup."""
         return self.node(name)._behavior
+
+    def ros_node(self, name: str) -> Node:
+        """Return the node of rclpy that a node of the system has."""
+        return self.node(name)._context.node
+
+    def spawn(self, name: str, work: Coroutine[Any, Any, object]) -> None:
+        """Run a coroutine as one of a behavior's."""
+        self.node(name)._context.spawn(work)
+
+    def sender(self, node: str, publisher: str) -> Any:
+        """Return a publisher as a behavior has it."""
+        return self.node(node)._entities.senders[publisher]
+
+    def report(self) -> SystemReport:
+        """Return what the system reports about itself."""
+        return self.host._status.snapshot()
+
+    def chains(self) -> tuple[ChainFigures, ...]:
+        """Return how long data has taken on the chains."""
+        return self.host._node_set.chains()
 
     def port(self, node: str, name: str) -> Any:
         """Return a port of a configured node."""

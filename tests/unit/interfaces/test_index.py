@@ -77,11 +77,6 @@ def test_what_does_not_exist_is_not_found(name: str) -> None:
     assert BUNDLED.problem(name) is None
 
 
-def test_a_service_is_not_a_message() -> None:
-    assert BUNDLED.message("std_srvs/srv/Trigger") is None
-    assert BUNDLED.message("std_msgs/msg/String") is not None
-
-
 def test_project_wins_over_installed_wins_over_the_snapshot(tmp_path: Path) -> None:
     project = find_packages([package(tmp_path / "a", "std_msgs", msg_String="bool ours")])
     installed = prefix(tmp_path / "b", "std_msgs", msg_String="bool theirs", msg_Bool="bool theirs")
@@ -110,13 +105,6 @@ def test_packages_are_found_below_a_folder_but_not_where_builds_are(tmp_path: Pa
     assert Interfaces([found]).names("srv") == ("one_msgs/srv/B",)
     assert Interfaces([found]).names("action") == ("one_msgs/action/C",)
     assert find_packages([tmp_path / "missing"]).packages() == frozenset()
-
-
-def test_the_projects_own_interfaces_are_found() -> None:
-    interfaces = Interfaces([find_packages([Path(__file__).parents[3] / "interfaces"])])
-    assert interfaces.packages() == {"composer_interfaces"}
-    found = interfaces.find("composer_interfaces/srv/PlanTrajectory")
-    assert found == BUNDLED.find("composer_interfaces/srv/PlanTrajectory")
 
 
 def test_a_definition_that_cannot_be_read_says_why(tmp_path: Path) -> None:
@@ -210,20 +198,6 @@ def test_a_package_without_msg_text_is_read_from_its_type_description(tmp_path: 
 def test_other_json_is_not_a_type_description(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         read_description("a_msgs/msg/A", text)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "control_msgs/action/FollowJointTrajectory",
-        "example_interfaces/srv/AddTwoInts",
-        "nav2_msgs/action/FollowGPSWaypoints",
-        "tf2_msgs/msg/TFMessage",
-        "vision_msgs/msg/Detection2DArray",
-    ],
-)
-def test_packages_that_are_not_on_pypi_are_known_without_ros(name: str) -> None:
-    assert BUNDLED.find(name) is not None
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from bisect import bisect
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -20,8 +19,6 @@ from composer.cli.support.callback_tables import (
 from composer.client.systems.system_reports import with_processes
 from composer.runtime.metrics.figures import figures, rates
 from composer.runtime.metrics.statistics import (
-    BATCH_SIZE,
-    BOUNDS_S,
     CallbackStatistics,
     Histogram,
     Statistics,
@@ -52,23 +49,6 @@ def test_a_percentile_is_right_within_a_tenth(scale_s: float) -> None:
     assert durations.count == 1000
     assert durations.mean_s == pytest.approx(sum(times_s) / 1000)
     assert durations.longest_s == times_s[-1]
-
-
-def test_a_flushed_batch_is_counted_in_the_right_buckets() -> None:
-    random = Random(3)
-    kinds = (
-        lambda: random.choice(BOUNDS_S),
-        lambda: random.uniform(0.0, 1e-5),
-        lambda: random.uniform(0.0, 200.0),
-    )
-    durations, one_by_one = Histogram(), [0] * (len(BOUNDS_S) + 1)
-    for _ in range(100):
-        times_s = [random.choice(kinds)() for _ in range(random.randint(1, BATCH_SIZE))]
-        for time_s in times_s:
-            one_by_one[bisect(BOUNDS_S, time_s)] += 1
-        durations.batch.extend(times_s)
-        durations.flush()
-    assert durations._buckets == one_by_one
 
 
 def test_values_beyond_the_scale_are_counted() -> None:
