@@ -26,9 +26,9 @@ KILL_PERIOD_S = 3.0
 KILLS = 10
 #: The system, its dashboard, the launcher, the executable and the other process.
 PROCESSES = 5
-#: Of the system, and of the dashboard next to it, which joins and leaves the ROS graph. In 100 kills
-#: they take 3 and 2 MB. A plain rclpy program that joins and leaves takes 9 MB, and 0.5 MB if it
-#: stays: glibc keeps free memory, which the dashboard returns.
+#: Of the system, and of the dashboard next to it, which joins and leaves the ROS graph. In 100
+#: kills they take 3 and 2 MB. A plain rclpy program that joins and leaves takes 9 MB, and 0.5 MB
+#: if it stays: glibc keeps free memory, which the dashboard returns.
 MEMORY_MB, DASHBOARD_MB = 8.0, 4.0
 SPARE_THREADS = 2
 
