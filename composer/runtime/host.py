@@ -23,7 +23,6 @@ from __future__ import annotations
 import gc
 import math
 import os
-import time
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 
@@ -86,10 +85,11 @@ class Host:
         self._system = system
         self._up = up
         self._options = options or HostOptions()
-        self._main_queue: MainQueue[Item] = MainQueue()
-        self._reporter = Reporter(report, self._options.started_at_s)
+        self._clock = self._options.clock
+        self._main_queue: MainQueue[Item] = MainQueue(self._clock)
+        self._reporter = Reporter(report, self._clock, self._options.started_at_s)
         key = self._options.report_key
-        self._status = Status(system, is_child=bool(key))
+        self._status = Status(system, self._clock, is_child=bool(key))
         is_member = self._options.process is not None
         self._report_key = key or (os.urandom(_KEY_BYTES).hex() if is_member else "")
         factory = NodeFactory(
@@ -237,7 +237,11 @@ class Host:
 
     def _bring_up_and_supervise(self) -> None:
         monitor = HealthMonitor(
-            self._node_set, self._supervisor.reconciler.shared, self._main_queue.put, self._reporter
+            self._node_set,
+            self._supervisor.reconciler.shared,
+            self._main_queue.put,
+            self._reporter,
+            self._clock,
         )
         monitor.start()
         try:
@@ -257,7 +261,7 @@ class Host:
     def _supervise(self) -> None:
         run_for_s = math.inf if self._options.run_for_s is None else self._options.run_for_s
         self._limits.limit_phase(run_for_s)
-        self._supervisor.run(self._run_command, time.monotonic() + run_for_s)
+        self._supervisor.run(self._run_command, self._clock.monotonic() + run_for_s)
         if not self._main_queue.stopping:
             self._main_queue.request_stop("--for elapsed")
 

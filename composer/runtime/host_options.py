@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Process
+from composer.runtime.clock.clock import COMPUTER, Clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class HostOptions:
     return from the middleware and, with a minute to spare, the bring-up and a run of ``run_for_s``.
     ``ends_process`` promises that the process ends after the run, by ``os._exit`` if the outcome
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
-    by ``time.monotonic()``; by default, from when the host is created.
+    by ``clock``; by default, from when the host is created. ``clock`` is that of the whole system.
     """
 
     run_for_s: float | None = None
@@ -48,6 +49,7 @@ class HostOptions:
     ends_process: bool = False
     on_alive: Callable[[], None] = lambda: None
     started_at_s: float | None = None
+    clock: Clock = COMPUTER
     process: Process | None = None
     report_key: str = ""
     member_command: Sequence[str] = ()

@@ -18,6 +18,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from composer.model import Node, PrimaryState
 from composer.model.dependencies import dependency_edges
 from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
 from composer.runtime.supervision.commands import Commands
@@ -316,7 +317,7 @@ class NotedQueue(MainQueue[Item]):
     """A queue that notes when each fault was noticed."""
 
     def __init__(self, world: World) -> None:
-        super().__init__()
+        super().__init__(COMPUTER)
         self._world = world
         self.length = 0
         self.noticed: dict[int, int] = {}
@@ -357,8 +358,8 @@ class Supervision(RuleBasedStateMachine):
         self.system = SYSTEM
         self.world = World()
         self.queue = NotedQueue(self.world)
-        reporter = Reporter(None)
-        status = Status(self.system)
+        reporter = Reporter(None, COMPUTER)
+        status = Status(self.system, COMPUTER)
         node_set = cast("NodeSet", self.world)
         self.supervisor = Supervisor(
             Reconciler(self.system, node_set, self.queue, status, reporter)

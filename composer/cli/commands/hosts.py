@@ -237,6 +237,7 @@ def _run_server(discovery: Discovery) -> None:
     """Run the servers until a signal. Raises CommandError."""
     from composer.model import LogLevel
     from composer.runtime.children.discovery_server import discovery_servers
+    from composer.runtime.clock.clock import COMPUTER
     from composer.runtime.process import StartRefused
     from composer.runtime.process.signals import (
         READY,
@@ -247,7 +248,7 @@ def _run_server(discovery: Discovery) -> None:
     )
 
     require_ros("compose hosts discovery-server")
-    manager, wakeup = ServiceManager(), WakeupPipe()
+    manager, wakeup = ServiceManager(), WakeupPipe(COMPUTER)
     received: list[str] = []
 
     def stop(name: str) -> None:

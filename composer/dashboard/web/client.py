@@ -21,6 +21,7 @@ from composer.dashboard.context import Dashboard, Run
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, internal_error
 from composer.dashboard.protocol.outbox import Outbox, Update
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 _LOG = logging.getLogger(__name__)
@@ -52,7 +53,7 @@ class Client(ABC):
         self._arrived: deque[tuple[Callable[[Update], None], Update]] = deque()
         self._is_woken = False
         self._is_open = True
-        self._repeats = RepeatLimit()
+        self._repeats = RepeatLimit(COMPUTER)
         self._size = 0  # of the message that is handled
 
     async def run(self) -> None:

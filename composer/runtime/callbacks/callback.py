@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from math import inf
-from time import monotonic
 from typing import Any, Final, TypeVar
 from weakref import ref
 
@@ -21,6 +20,7 @@ from composer.base.source import Located
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.repeat_limit import RepeatLimit
@@ -38,11 +38,13 @@ WARNING_PERIOD_S = 5.0
 class CallbackBudget:
     """Counts the calls of one callback that exceed its ``budget_ms``, and warns about them."""
 
-    def __init__(self, log: Log, callback: CallbackStatistics, budget_s: float) -> None:
+    def __init__(
+        self, log: Log, clock: Clock, callback: CallbackStatistics, budget_s: float
+    ) -> None:
         self._log = log
         self._callback = callback
         self._budget_s = budget_s
-        self._repeats = RepeatLimit(WARNING_PERIOD_S)
+        self._repeats = RepeatLimit(clock, WARNING_PERIOD_S)
 
     def on_overrun(self, duration_s: float) -> None:
         """Count a call that took too long, and warn unless there was a warning just before."""
@@ -70,6 +72,7 @@ class CallbackTimer:
         "_batch",
         "_budget",
         "_budget_s",
+        "_monotonic",
         "_mutations",
         "_skip",
         "_statistics",
@@ -84,12 +87,13 @@ class CallbackTimer:
         statistics: CallbackStatistics,
         budget_ms: Located[float] | None,
     ) -> None:
+        self._monotonic = context.loop.clock.monotonic
         self._statistics = statistics
         statistics.timer = ref(self)
         self._mutations = context.mutations
         self.last_s = 0.0
         self._budget_s = inf if budget_ms is None else budget_ms.value / 1e3
-        self._budget = CallbackBudget(context.log, statistics, self._budget_s)
+        self._budget = CallbackBudget(context.log, context.loop.clock, statistics, self._budget_s)
         self._times = statistics.times
         self._batch = statistics.times.batch
         self._adapted_s = 0.0
@@ -98,17 +102,17 @@ class CallbackTimer:
 
     def call(self, work: Work[T], item: T) -> Coroutine[Any, Any, None] | None:
         """Do the work, timed."""
-        began_s = monotonic()
+        began_s = self._monotonic()
         return self.finish(began_s, work(item))
 
     def finish(
         self, began_s: float, continuation: Coroutine[Any, Any, None] | None
     ) -> Coroutine[Any, Any, None] | None:
-        """Count a call that began at ``began_s`` of ``monotonic()`` and releases its thread now.
+        """Count a call that began at ``began_s`` of the clock and releases its thread now.
 
         Returns ``continuation``, the rest of an ``async`` call, timed.
         """
-        duration_s = monotonic() - began_s
+        duration_s = self._monotonic() - began_s
         self.last_s = began_s
         if continuation is not None:
             self._time_every(1)
@@ -141,7 +145,7 @@ class CallbackTimer:
         return coroutine if self.to_skip == inf else self._timed_steps(coroutine, 0.0)
 
     async def _timed_steps(self, coroutine: Coroutine[Any, Any, T], duration_s: float) -> T:
-        stopwatch = _Stopwatch(duration_s)
+        stopwatch = _Stopwatch(duration_s, self._monotonic)
         try:
             return await in_steps(stopwatch, coroutine)
         finally:
@@ -174,19 +178,20 @@ def mutation_checked(
 class _Stopwatch:
     """Adds up the steps of a coroutine."""
 
-    __slots__ = ("_began_s", "total_s")
+    __slots__ = ("_began_s", "_monotonic", "total_s")
 
-    def __init__(self, total_s: float) -> None:
+    def __init__(self, total_s: float, monotonic: Callable[[], float]) -> None:
+        self._monotonic = monotonic
         self.total_s = total_s
         self._began_s = 0.0
 
     def enter(self) -> None:
         """Begin a step, at once."""
-        self._began_s = monotonic()
+        self._began_s = self._monotonic()
 
     def leave(self) -> None:
         """End a step."""
-        self.total_s += monotonic() - self._began_s
+        self.total_s += self._monotonic() - self._began_s
 
 
 _LAST = BATCH_SIZE - 1  # the call that completes a batch
@@ -219,7 +224,7 @@ class Callback(CallbackTimer):
         if self.to_skip > 0.0:  # two threads may both decrement the last one
             self.to_skip -= 1
         else:
-            began_s = monotonic()
+            began_s = self._monotonic()
         try:
             result = self._handle() if message is EMPTY else self._handle(message)
             rest = None if result is None else self._context.continuation(self._name, result)
@@ -228,7 +233,7 @@ class Callback(CallbackTimer):
             rest = None
         if not began_s:
             return rest
-        duration_s = monotonic() - began_s
+        duration_s = self._monotonic() - began_s
         batch = self._batch
         if rest is not None or duration_s > self._budget_s or len(batch) >= _LAST:
             return self.finish(began_s, rest)

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections import deque
 from itertools import pairwise
-from time import monotonic
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, Port, System
+from composer.runtime.clock.clock import Clock
 from composer.runtime.metrics.statistics import ChainStatistics
 
 _MAX_IN_TRANSIT = 256  # messages from one node to the next; beyond, the oldest are forgotten
@@ -24,7 +24,10 @@ _MAX_IN_TRANSIT = 256  # messages from one node to the next; beyond, the oldest 
 class Hop:
     """One publisher of a chain."""
 
-    def __init__(self, chain: ChainStatistics, following: Hop | None, *, is_first: bool) -> None:
+    def __init__(
+        self, chain: ChainStatistics, following: Hop | None, clock: Clock, *, is_first: bool
+    ) -> None:
+        self._monotonic = clock.monotonic
         self._chain = chain
         self._following = following
         self._is_first = is_first
@@ -34,7 +37,7 @@ class Hop:
 
     def put(self, message: Any) -> None:
         """Note a message that is being published."""
-        now_s = monotonic()
+        now_s = self._monotonic()
         start_s, self._start_s = now_s if self._is_first else self._start_s, None
         if self._following is not None:
             self._following._in_transit.append((id(message), start_s))
@@ -76,7 +79,7 @@ class NodeChains:
 class Chains:
     """All chains of a system."""
 
-    def __init__(self, system: System, *, tracing: bool) -> None:
+    def __init__(self, system: System, clock: Clock, *, tracing: bool) -> None:
         """Without ``tracing``, no chain is observed."""
         self.statistics: list[ChainStatistics] = []
         self._hops: dict[str, list[tuple[str, str, Hop]]] = {}
@@ -86,7 +89,7 @@ class Chains:
             inputs = {after: system.port(before) for before, after in pairwise(chain.through)}
             following: Hop | None = None
             for end in reversed(chain.through):
-                following = Hop(statistics, following, is_first=end not in inputs)
+                following = Hop(statistics, following, clock, is_first=end not in inputs)
                 port = inputs.get(end)
                 topic = "" if port is None else port.full_name
                 self._hops.setdefault(end.node, []).append((end.port, topic, following))

@@ -19,7 +19,6 @@ from composer.model import Port
 from composer.runtime.callbacks.chains import NodeChains
 from composer.runtime.callbacks.log import ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
-from composer.runtime.clock.clock import NodeTime
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import is_closing, text_of
 from composer.runtime.executors.futures import Cancelled, Future
@@ -29,6 +28,7 @@ from composer.runtime.executors.strand import Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node_time.node_time import NodeTime
 
 T = TypeVar("T")
 

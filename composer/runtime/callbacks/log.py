@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,6 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import SEVERITIES, LogLevel
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.stacks import is_internal
@@ -176,6 +176,7 @@ class ErrorLog:
     def __init__(
         self,
         log: Log,
+        clock: Clock,
         statistics: Statistics,
         report: Callable[[str, str], None],
         limit: ErrorLimit | None = None,
@@ -185,7 +186,8 @@ class ErrorLog:
         self._statistics = statistics
         self._report = report
         self._limit = limit
-        self._repeats = RepeatLimit(_ERROR_PERIOD_S)
+        self._monotonic = clock.monotonic
+        self._repeats = RepeatLimit(clock, _ERROR_PERIOD_S)
 
     def exception(self, callback: str, error: BaseException) -> None:
         """Log an exception of ``callback``, unless it was canceled."""
@@ -201,7 +203,7 @@ class ErrorLog:
         """Count an error, and log it unless there was one just before; details the first time."""
         self._statistics.errors += 1
         if self._limit is not None:
-            self._limit.count(time.monotonic())
+            self._limit.count(self._monotonic())
         admission = self._repeats.admit(callback)
         if admission is None:
             return

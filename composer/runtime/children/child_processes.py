@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
@@ -23,6 +22,7 @@ from typing import Any
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.children import launcher
 from composer.runtime.children.output import OutputLines
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.futures import Future
 
 _READ_BYTES = 65_536
@@ -155,10 +155,10 @@ class ChildProcesses:
 
         Until then (monotonic), it waits for those that are ending already.
         """
-        while time.monotonic() < end_s and any(
+        while COMPUTER.monotonic() < end_s and any(
             child.is_ending for child in tuple(self._children.values())
         ):
-            time.sleep(_POLL_S)
+            COMPUTER.sleep(_POLL_S)
         with self._lock:
             connection, self._connection = self._connection, None
             running = self._launcher
@@ -253,7 +253,7 @@ class ChildProcesses:
         if not data:
             self._close_output(child, descriptor)
             return False
-        child.outputs[descriptor].add(data, time.monotonic())
+        child.outputs[descriptor].add(data, COMPUTER.monotonic())
         return True
 
     def _close_output(self, child: Child, descriptor: int) -> None:

@@ -16,7 +16,6 @@ import os
 import shutil
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -30,6 +29,7 @@ from composer.runtime.children.child_processes import (
     Command,
     signal_name,
 )
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.middleware.environment import active_variables
 from composer.runtime.process import StartRefused
 from composer.runtime.process.computer import PortState, is_own_address, port_state, resolve
@@ -116,7 +116,7 @@ Write = Callable[[LogLevel, str, str], None]
 
 
 def _sleep_until(until_s: float) -> bool:
-    time.sleep(max(0.0, until_s - time.monotonic()))
+    COMPUTER.sleep(max(0.0, until_s - COMPUTER.monotonic()))
     return False
 
 
@@ -176,7 +176,7 @@ def _outlast_lost(servers: list[_Server], wait_until: Callable[[float], bool]) -
     lost = [server for server in servers if server.is_lost]
     for server in lost:
         server.announce_delay()
-    return not lost or not wait_until(time.monotonic() + RESTART_DELAY_S)
+    return not lost or not wait_until(COMPUTER.monotonic() + RESTART_DELAY_S)
 
 
 def _end(servers: list[_Server], children: ChildProcesses) -> None:
@@ -184,19 +184,19 @@ def _end(servers: list[_Server], children: ChildProcesses) -> None:
     _wait_until_idle([pid for server in servers if (pid := server.pid) is not None])
     for server in servers:
         server.end()
-    children.close(time.monotonic() + _ENDS_WITHIN_S + _KILLED_WITHIN_S)
+    children.close(COMPUTER.monotonic() + _ENDS_WITHIN_S + _KILLED_WITHIN_S)
     for server in servers:
         server.close()
 
 
 def _wait_until_idle(pids: Sequence[int]) -> None:
     """Wait until processes have had nothing to do for a moment, on a busy computer a longer one."""
-    end_s = time.monotonic() + _IDLE_WITHIN_S
-    idle_s = time.monotonic() + _IDLE_S
-    while pids and time.monotonic() < min(idle_s, end_s):
-        time.sleep(_POLL_S)  # no event says that a process is idle
+    end_s = COMPUTER.monotonic() + _IDLE_WITHIN_S
+    idle_s = COMPUTER.monotonic() + _IDLE_S
+    while pids and COMPUTER.monotonic() < min(idle_s, end_s):
+        COMPUTER.sleep(_POLL_S)  # no event says that a process is idle
         if any(map(has_work, pids)):
-            idle_s = time.monotonic() + _IDLE_S
+            idle_s = COMPUTER.monotonic() + _IDLE_S
 
 
 def has_work(pid: int) -> bool:

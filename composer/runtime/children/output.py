@@ -31,7 +31,7 @@ class OutputLines:
         self._dropped = 0
 
     def add(self, data: bytes, now_s: float) -> None:
-        """Add what was read at a time of ``time.monotonic()``."""
+        """Add what was read at a time of the monotonic clock."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             self._pass_on(line, now_s)

@@ -1,1 +1,1 @@
-"""The time of a node: system time, steady time, or simulated time from /clock."""
+"""The clock: whatever reads or waits for time in a running system asks it."""

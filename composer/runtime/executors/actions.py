@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import inspect
 import threading
-import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
@@ -27,6 +26,7 @@ from rclpy.task import Future as RclpyFuture
 from unique_identifier_msgs.msg import UUID
 
 from composer.base.fast_dataclass import dataclass
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors import readiness
 from composer.runtime.executors.exceptions import is_closing
 from composer.runtime.executors.futures import Cancelled
@@ -273,10 +273,11 @@ class GoalServer(ActionServer):
     longer. Here rcl keeps few ended goals, and results are kept apart from their statuses.
     """
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        """Create the server; the arguments are rclpy's, without ``result_timeout``."""
+    def __init__(self, *arguments: Any, clock: Clock, **options: Any) -> None:
+        """Create the server; the others are rclpy's arguments, without ``result_timeout``."""
         # Zero: rcl discards ended goals on request.
         super().__init__(*arguments, result_timeout=0, **options)
+        self._monotonic = clock.monotonic
         self._changing = threading.Lock()
         #: The ended goals that rcl keeps, and whether their result was delivered.
         self._ended: dict[bytes, bool] = {}
@@ -317,10 +318,10 @@ class GoalServer(ActionServer):
             if self._ended.pop(identity, False):
                 self._discard(identity)
             else:
-                self._results[identity] = time.monotonic()
+                self._results[identity] = self._monotonic()
 
     def _discard_old_results(self) -> None:
-        oldest_s = time.monotonic() - RESULT_TIMEOUT_S
+        oldest_s = self._monotonic() - RESULT_TIMEOUT_S
         for identity, ended_s in tuple(self._results.items()):
             if ended_s > oldest_s and len(self._results) <= KEPT_RESULTS:
                 break

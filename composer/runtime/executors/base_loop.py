@@ -9,9 +9,9 @@ from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable, Coroutine
 from math import floor, inf, isnan
-from time import monotonic
 from typing import Any, Generic, TypeVar, cast
 
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.futures import Awaited, Future
 from composer.runtime.executors.stacks import format_stacks
 from composer.runtime.executors.tasks import Report, Task, name_of
@@ -22,16 +22,17 @@ _SWEEP_SIZE = 64  # entries at which canceled calls are removed
 class ScheduledCall:
     """A call that is due at ``due_s``, and each ``period_s`` seconds after that if it has one."""
 
-    __slots__ = ("callback", "cancelled", "due_s", "period_s")
+    __slots__ = ("_clock", "callback", "cancelled", "due_s", "period_s")
 
     def __init__(
-        self, due_s: float, period_s: float | None, callback: Callable[[], object]
+        self, clock: Clock, due_s: float, period_s: float | None, callback: Callable[[], object]
     ) -> None:
         """Raise ValueError for a period that is not positive and a time that is NaN."""
         if period_s is not None and not period_s > 0:
             raise ValueError(f"a period must be positive, not {period_s:g} s")
         if isnan(due_s):
             raise ValueError("a delay must be a number")
+        self._clock = clock
         self.due_s = due_s
         self.period_s = inf if period_s is None else period_s
         self.callback = callback
@@ -40,7 +41,7 @@ class ScheduledCall:
     @property
     def late_s(self) -> float:
         """How long ago the call was due, in seconds."""
-        return monotonic() - self.due_s
+        return self._clock.monotonic() - self.due_s
 
     def cancel(self) -> None:
         """Never call again."""
@@ -54,7 +55,8 @@ class TimerQueue:
     inserting it again needs no search. A periodic call is inserted again each time.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self._entries: list[tuple[float, int, ScheduledCall]] = []  # ascending: -due_s, -order
         self._order = itertools.count(0, -1)  # calls due at the same time keep their order
         self._sweep_at = _SWEEP_SIZE
@@ -93,7 +95,7 @@ class TimerQueue:
         period_s = call.period_s
         if period_s != inf and not call.cancelled:
             due_s = call.due_s + period_s
-            late_s = monotonic() - due_s
+            late_s = self._clock.monotonic() - due_s
             if late_s >= 0.0:
                 due_s += (floor(late_s / period_s) + 1) * period_s
             call.due_s = due_s
@@ -132,7 +134,9 @@ class BaseLoop(ABC):
     Methods may be called from any thread.
     """
 
-    def __init__(self, name: str, on_exception: Report) -> None:
+    def __init__(self, name: str, on_exception: Report, clock: Clock) -> None:
+        #: The clock by which its calls are due.
+        self.clock = clock
         self._name = name
         self._on_exception = on_exception
         self._tasks: set[Task[Any]] = set()
@@ -166,14 +170,16 @@ class BaseLoop(ABC):
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` once, ``delay_s`` seconds from now."""
         # Never before now: all calls due at one time are made before anything else.
-        return self._schedule(ScheduledCall(monotonic() + max(delay_s, 0.0), None, callback))
+        due_s = self.clock.monotonic() + max(delay_s, 0.0)
+        return self._schedule(ScheduledCall(self.clock, due_s, None, callback))
 
     def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next.
 
         Raises ValueError for a period that is not positive.
         """
-        return self._schedule(ScheduledCall(monotonic() + period_s, period_s, callback))
+        due_s = self.clock.monotonic() + period_s
+        return self._schedule(ScheduledCall(self.clock, due_s, period_s, callback))
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
         """Run a coroutine; return the future of its result.
@@ -196,7 +202,7 @@ class BaseLoop(ABC):
         """
         if self.is_current():
             return function()
-        call = CrossThreadCall(function)
+        call = CrossThreadCall(function, self.clock)
         self.call_soon(call.run)
         if self._stopped and call.revoke():
             raise RuntimeError(f"executor '{self._name}' has stopped")
@@ -208,7 +214,7 @@ class BaseLoop(ABC):
         future.add_done_callback(lambda _: done.set())
         self._waits.add(done)
         if not (future.done() or self._stopping):
-            done.wait(timeout_s)
+            self.clock.wait(done, timeout_s)
         self._waits.discard(done)
         return future.done()
 
@@ -232,8 +238,9 @@ class BaseLoop(ABC):
 class CrossThreadCall(Generic[T]):
     """Calls ``function`` on the thread that calls :meth:`run`, for another thread that waits."""
 
-    def __init__(self, function: Callable[[], T]) -> None:
+    def __init__(self, function: Callable[[], T], clock: Clock) -> None:
         self._function = function
+        self._clock = clock
         self._right_to_start = [True]  # popping is atomic: started or revoked, never both
         self._done = threading.Event()
         self._value: T | None = None
@@ -263,7 +270,7 @@ class CrossThreadCall(Generic[T]):
         Raises TimeoutError, with ``current_stack()``, if that takes longer; the function is not
         started after that.
         """
-        if not self._done.wait(timeout_s):
+        if not self._clock.wait(self._done, timeout_s):
             status = "is still running" if not self.revoke() else "was not started"
             stack = current_stack()
             at = f"; the loop is at:\n{stack}" if stack else ""

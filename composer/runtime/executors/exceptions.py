@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from composer.model.names import PROGRAM_LOGGER
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.stacks import calls_user_code, is_internal
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
@@ -25,7 +26,7 @@ BEHAVIOR_PACKAGE = "_composer_behavior_"
 #: What Python puts before the names of the exceptions that these modules define.
 _IN_PACKAGE = re.compile(rf"\b{BEHAVIOR_PACKAGE}[0-9a-f]+\.")
 
-_LOGGED = RepeatLimit()
+_LOGGED = RepeatLimit(COMPUTER)
 
 
 def describe(error: BaseException) -> str:

@@ -18,6 +18,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future as RclpyFuture
 
 from composer.model import ExecutorKind
+from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.executors.actions import ActionSource, contain_exceptions
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
@@ -48,12 +49,14 @@ class Loop(Scheduler):
         on_exception: Report = log_exception,
         kind: ExecutorKind = ExecutorKind.EVENTS,
         threads: int = 1,
+        clock: Clock = COMPUTER,
     ) -> None:
         """Create a loop, not started, for an executor of this name in YAML.
 
-        ``threads`` counts for ``multi_threaded`` only. rclpy must be initialized.
+        ``threads`` counts for ``multi_threaded`` only. The loop of a system has the ``clock`` of
+        the system. rclpy must be initialized.
         """
-        super().__init__(name, on_exception, kind, threads)
+        super().__init__(name, on_exception, kind, threads, clock)
         self._group_of: dict[object, SourceGroup] = {}  # by the entity that was added
         self._nodes: dict[Node, _ImplicitEntities] = {}
         self._executor = NodeExecutor(self, lambda: None)

@@ -19,7 +19,8 @@ import os
 import select
 from collections.abc import Callable, Sequence
 from functools import partial
-from time import monotonic
+
+from composer.runtime.clock.clock import Clock
 
 #: The file descriptors that are ready, as (file descriptor, event mask).
 Ready = Sequence[tuple[int, int]]
@@ -71,7 +72,8 @@ class Poller:
     ``register``, ``unregister`` and ``wake`` may be called from any thread.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._monotonic = clock.monotonic
         self._epoll = select.epoll()
         #: Returns what is ready, without waiting. A partial, not a method: called per message.
         self.poll: Callable[[], Ready] = partial(self._epoll.poll, 0, _MAX_EVENTS)
@@ -106,13 +108,13 @@ class Poller:
         os.eventfd_write(self._wake_fd, 1)
 
     def wait(self, until_s: float) -> Ready:
-        """Wait until something is ready or ``time.monotonic()`` reaches ``until_s``.
+        """Wait until something is ready or the clock reaches ``until_s``.
 
         It may return earlier.
         """
         if until_s > _NEVER_S:
             return self._epoll.poll(None, _MAX_EVENTS)
-        left_s = until_s - monotonic()
+        left_s = until_s - self._monotonic()
         if left_s <= 0.0:
             return self.poll()
         if until_s != self._programmed_for_s:

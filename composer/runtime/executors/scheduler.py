@@ -13,9 +13,9 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 from math import inf
-from time import monotonic, sleep
 
 from composer.model import ExecutorKind
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.base_loop import BUSY_S, YIELD_S, ScheduledCall, TimerQueue
 from composer.runtime.executors.poller import Poller
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
@@ -30,10 +30,13 @@ _MAX_FINAL_ROUNDS = 64  # of calls that other calls cause at shutdown
 class Scheduler(TurnTaking):
     """Runs calls, timers, tasks and groups of sources. It runs once: start, then stop."""
 
-    def __init__(self, name: str, on_exception: Report, kind: ExecutorKind, threads: int) -> None:
-        super().__init__(name, on_exception, kind, threads)
-        self._poller = Poller()
-        self._timers = TimerQueue()
+    def __init__(
+        self, name: str, on_exception: Report, kind: ExecutorKind, threads: int, clock: Clock
+    ) -> None:
+        super().__init__(name, on_exception, kind, threads, clock)
+        self._monotonic = clock.monotonic
+        self._poller = Poller(clock)
+        self._timers = TimerQueue(clock)
         self._calls: deque[Callable[[], object]] = deque()
         self._ready: deque[SourceGroup] = deque()  # with something to take
         self._groups: dict[int, SourceGroup] = {}  # by the file descriptor of their signal
@@ -95,6 +98,7 @@ class Scheduler(TurnTaking):
     def _run_turn(self, turn: Turn) -> None:  # noqa: C901  a function for each part is slower
         """Serve calls, timers and groups until another thread has the turn or the loop stops."""
         timers, calls, poller = self._timers, self._calls, self._poller
+        monotonic = self._monotonic
         groups, ready = self._groups, self._ready
         while self._turn is turn and not self._stopping:
             now_s = monotonic()
@@ -105,7 +109,7 @@ class Scheduler(TurnTaking):
             if self._turn is not turn:
                 return
             if calls or ready:
-                self._yield_at_s = _yield_if_due(self._yield_at_s, now_s)
+                self._yield_at_s = self._yield_if_due(now_s)
                 signaled = poller.poll()
             else:
                 self._yield_at_s = inf
@@ -143,7 +147,7 @@ class Scheduler(TurnTaking):
                 return
 
     def _run_calls(self, turn: Turn) -> None:
-        calls, timers = self._calls, self._timers
+        calls, timers, monotonic = self._calls, self._timers, self._monotonic
         until_s = monotonic() + _ROUND_S
         while True:  # including calls that calls add
             self._running = callback = calls.popleft()
@@ -159,7 +163,7 @@ class Scheduler(TurnTaking):
 
     def _serve_round(self, turn: Turn) -> None:  # noqa: C901  a function for each part is slower
         # Inlined from here to the handler: after a sleep, each further function is a cache miss.
-        ready, timers = self._ready, self._timers
+        ready, timers, monotonic = self._ready, self._timers, self._monotonic
         until_s = monotonic() + _ROUND_S
         while True:
             self._running = group = ready.popleft()
@@ -219,14 +223,13 @@ class Scheduler(TurnTaking):
             self.report(name_of(callback), error)
         self._running = None
 
+    def _yield_if_due(self, now_s: float) -> float:
+        """Sleep briefly if it is time for it; return when to do so next.
 
-def _yield_if_due(yield_at_s: float, now_s: float) -> float:
-    """Sleep briefly if ``yield_at_s`` has passed; return when to do so next.
-
-    Infinity starts the time of :data:`BUSY_S`.
-    """
-    if now_s > yield_at_s:
-        sleep(YIELD_S)
-    elif yield_at_s != inf:
-        return yield_at_s
-    return now_s + BUSY_S
+        Infinity starts the time of :data:`BUSY_S`.
+        """
+        if now_s > self._yield_at_s:
+            self.clock.sleep(YIELD_S)
+        elif self._yield_at_s != inf:
+            return self._yield_at_s
+        return now_s + BUSY_S

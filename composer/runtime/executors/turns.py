@@ -17,9 +17,9 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from threading import get_ident
-from time import monotonic, sleep
 
 from composer.model import ExecutorKind
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.base_loop import PAUSE_AFTER_FAULT_S, BaseLoop
 from composer.runtime.executors.futures import Awaited
 from composer.runtime.executors.poller import use_precise_wakeups
@@ -56,8 +56,9 @@ class TurnTaking(BaseLoop):
         on_exception: Report,
         kind: ExecutorKind,
         threads: int,
+        clock: Clock,
     ) -> None:
-        super().__init__(name, on_exception)
+        super().__init__(name, on_exception, clock)
         self._replaces_blocked = kind is ExecutorKind.EVENTS
         #: With several threads, an item for each callback that may begin.
         self._slots: queue.SimpleQueue[None] | None = None
@@ -110,7 +111,7 @@ class TurnTaking(BaseLoop):
         Tasks are canceled and get a moment to clean up. On the loop itself, this requests the stop
         and returns false.
         """
-        until_s = monotonic() + timeout_s
+        until_s = self.clock.monotonic() + timeout_s
         self._stopping = True
         self._end_waits()
         if self._threads[0].ident is None:  # never started
@@ -121,7 +122,7 @@ class TurnTaking(BaseLoop):
         if self.is_current():
             return False
         for thread in tuple(self._threads):
-            thread.join(max(0.0, until_s - monotonic()))
+            thread.join(max(0.0, until_s - self.clock.monotonic()))
         if not any(thread.is_alive() for thread in self._threads):
             return True
         for task in tuple(self._tasks):
@@ -165,7 +166,7 @@ class TurnTaking(BaseLoop):
         if expected:
             with self._handing_over:
                 self._hand_over()
-            return monotonic()
+            return self.clock.monotonic()
         turn.call = call = [True]
         return call
 
@@ -174,7 +175,7 @@ class TurnTaking(BaseLoop):
         if began is None:
             return False
         if isinstance(began, float):
-            return monotonic() - began > _BLOCKS_S
+            return self.clock.monotonic() - began > _BLOCKS_S
         try:
             began.pop()
         except IndexError:
@@ -251,7 +252,7 @@ class TurnTaking(BaseLoop):
         self._waits.add(has_turn)
         self.call_soon(resume)
         if not self._stopping:
-            has_turn.wait()
+            self.clock.wait(has_turn)
         self._waits.discard(has_turn)
 
     def _step_in_parallel(self, step: Callable[[], object]) -> None:
@@ -289,7 +290,7 @@ class TurnTaking(BaseLoop):
                     self._run_turn(turn)
                 except BaseException as error:  # between callbacks: an asynchronous one, or a bug
                     self.report(f"executor '{self._name}'", error)
-                    sleep(PAUSE_AFTER_FAULT_S)
+                    self.clock.sleep(PAUSE_AFTER_FAULT_S)
                     if self._turn is turn:
                         self._recover()
             if self._turn is turn:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import inspect
 import threading
-import time
 from collections.abc import Callable
 from types import FrameType
 from typing import Any, cast
 
 from composer.behavior import CallCancelled
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import (
     calls_user_code,
@@ -171,14 +171,14 @@ def interrupt(ident: int, call: FrameType | None = None) -> str:
             raise_in(ident, CallAbandoned)
             return location_of(stack)
         del stack
-        time.sleep(_PERIOD_S)
+        COMPUTER.sleep(_PERIOD_S)
     return ""
 
 
 async def end_callbacks(code: UserCode) -> None:
     """Wait a moment for the callbacks of an instance to return, then interrupt those that run."""
-    until_s = time.monotonic() + _RETURN_WITHIN_S
-    while running_callbacks(code) and time.monotonic() < until_s:
+    until_s = COMPUTER.monotonic() + _RETURN_WITHIN_S
+    while running_callbacks(code) and COMPUTER.monotonic() < until_s:
         await sleep(code.context.loop, _PERIOD_S)
     interrupt_callbacks(code)
 

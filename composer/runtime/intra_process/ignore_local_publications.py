@@ -9,7 +9,6 @@ tests the flag of matches as well.
 from __future__ import annotations
 
 import ctypes
-import time
 from functools import cache
 from typing import Any
 from uuid import uuid4
@@ -22,6 +21,7 @@ from rclpy.subscription import Subscription
 from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import Empty
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.intra_process.match_flag import checked_match
 
 _MIDDLEWARES = ("rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
@@ -128,9 +128,9 @@ def _self_test(node: Node) -> None:
 
 
 def _receives(subscription: Subscription) -> bool:
-    until_s = time.monotonic() + _TIMEOUT_S
-    while not (taken := _take(subscription)) and time.monotonic() < until_s:
-        time.sleep(_POLL_PERIOD_S)
+    until_s = COMPUTER.monotonic() + _TIMEOUT_S
+    while not (taken := _take(subscription)) and COMPUTER.monotonic() < until_s:
+        COMPUTER.sleep(_POLL_PERIOD_S)
     return taken
 
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from time import monotonic
 from typing import Any, TypeVar
 
 from composer.behavior import CallCancelled
+from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.futures import Future
 
 T = TypeVar("T")
-
-CallLater = Callable[[float, Callable[[], object]], object]
 
 
 class PendingFutures:
@@ -22,10 +20,10 @@ class PendingFutures:
     the call. Methods may be called from any thread.
     """
 
-    __slots__ = ("_call_later", "_discard", "_futures", "_next_check_s")
+    __slots__ = ("_discard", "_futures", "_loop", "_next_check_s")
 
-    def __init__(self, call_later: CallLater) -> None:
-        self._call_later = call_later
+    def __init__(self, loop: BaseLoop) -> None:
+        self._loop = loop
         self._futures: dict[Future[Any], tuple[float, Callable[[], BaseException]]] = {}
         self._discard: Callable[[Future[Any]], object] = lambda done: self._futures.pop(done, None)
         self._next_check_s = inf  # the timer fires no later
@@ -38,7 +36,7 @@ class PendingFutures:
     ) -> Future[T]:
         """Fail ``future`` with ``timeout_error()`` unless it is done by ``until_s``; return it.
 
-        ``until_s`` is a time of ``time.monotonic()``.
+        ``until_s`` is a time of the loop's clock.
         """
         self._futures[future] = until_s, timeout_error
         future.add_done_callback(self._discard)
@@ -53,11 +51,11 @@ class PendingFutures:
 
     def _check_at(self, when_s: float) -> None:
         self._next_check_s = when_s
-        self._call_later(when_s - monotonic(), self._check)
+        self._loop.call_later(when_s - self._loop.clock.monotonic(), self._check)
 
     def _check(self) -> None:
         self._next_check_s = inf
-        now_s = monotonic()
+        now_s = self._loop.clock.monotonic()
         for future, (until_s, timeout_error) in self._futures.copy().items():
             if until_s <= now_s:
                 future.set_exception(timeout_error())

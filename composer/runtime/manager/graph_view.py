@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.middleware.dds_participants import count_participants
 from composer.runtime.protocol.requests import (
     KINDS,
@@ -62,7 +61,7 @@ class GraphObserver:
 
     def view(self) -> GraphAnswer | None:
         """Return the graph, None if it may be incomplete. Any thread may call."""
-        end_s = time.monotonic() + _COMPLETE_WITHIN_S
+        end_s = COMPUTER.monotonic() + _COMPLETE_WITHIN_S
         last: GraphView | None = None
         changed_s = 0.0
         while True:
@@ -71,7 +70,7 @@ class GraphObserver:
             view = {kind: graph.names(kind) for kind in KINDS}
             if graph.skipped:
                 return None  # the command warns of it
-            now_s = time.monotonic()
+            now_s = COMPUTER.monotonic()
             if view != last:
                 last, changed_s = view, now_s
             is_settled = known <= self._settled or now_s >= changed_s + SETTLE_S
@@ -79,22 +78,22 @@ class GraphObserver:
                 return GraphAnswer(view)
             if now_s > end_s:
                 return None
-            time.sleep(_POLL_S)
+            COMPUTER.sleep(_POLL_S)
 
     def nodes(self) -> NodesAnswer | None:
         """Return the nodes that can be meant by a name; None if some may be missing.
 
         Those of a process that was just killed may be among them.
         """
-        end_s = time.monotonic() + _COMPLETE_WITHIN_S
+        end_s = COMPUTER.monotonic() + _COMPLETE_WITHIN_S
         while True:
             graph = RosGraph(self._node)
             names = tuple(name for name, _ in graph.names("node"))
             if self._has_all_participants(graph) and graph.are_nodes_known():
                 return NodesAnswer(names)
-            if time.monotonic() > end_s:
+            if COMPUTER.monotonic() > end_s:
                 return None
-            time.sleep(_POLL_S)
+            COMPUTER.sleep(_POLL_S)
 
     def node(self, name: str) -> NodeInfo:
         """Return the endpoints of a node, including hidden ones."""

@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from time import monotonic
 from typing import Any, Generic, TypeVar
 
 from composer.base.fast_dataclass import dataclass
@@ -84,7 +83,7 @@ class MemberService:
         self._log = log
         self._received = ReceivedSteps[_RunningStep]()
         self._reports = ReportTimes()
-        self._repeats = RepeatLimit()
+        self._repeats = RepeatLimit(loop.clock)
 
     def completed(self, report: SystemReport) -> SystemReport:
         """Return a report with what the coordinating process needs to know."""
@@ -93,7 +92,7 @@ class MemberService:
 
     def on_report(self, number: int) -> None:
         """Receive that a report is the current one now."""
-        self._reports.note(number, monotonic())
+        self._reports.note(number, self._loop.clock.monotonic())
 
     def on_request(
         self, request: ChangeStates | KeepGoals | AskReportKey, reply: Callable[[Any], None]
@@ -109,7 +108,7 @@ class MemberService:
             if request.goals is not None:
                 self._callbacks.keep_goals(request.goals)
             reply(self._callbacks.timings() if request.wants_timings else TimingReport())
-        elif self._reports.is_outdated(request.seen_report, monotonic()):
+        elif self._reports.is_outdated(request.seen_report, self._loop.clock.monotonic()):
             self._log_late(request.steps)
         else:
             if request.are_last:

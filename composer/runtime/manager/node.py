@@ -10,7 +10,6 @@ Its topics are described in :mod:`.publishing`.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -23,8 +22,6 @@ from std_srvs.srv import Trigger
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.log import Log, Write
-from composer.runtime.clock.clock import NodeTime
-from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
@@ -39,6 +36,8 @@ from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
+from composer.runtime.node_time.node_time import NodeTime
+from composer.runtime.node_time.sim_time import SimTimeSource
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import (
@@ -128,7 +127,7 @@ class ManagerNode:
         """
         self._status = status
         self._host = host
-        self._loop = Loop(NAME, log_exception)
+        self._loop = Loop(NAME, log_exception, clock=status.clock)
         self._member: MemberService | None = None
         self._node = Node(
             NAME,
@@ -140,8 +139,8 @@ class ManagerNode:
         limit_type_descriptions(self._node)
         self._log = Log(self._node, host.write_log)
         store = ProxyParameterStore(self._node, host.nodes)
-        ParameterServices(self._node, store, self._log.warn)
-        LoggerServices(self._node, self._log.warn)
+        ParameterServices(self._node, status.clock, store, self._log.warn)
+        LoggerServices(self._node, status.clock, self._log.warn)
         self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
         self.process_context = ProcessContext(
@@ -207,7 +206,7 @@ class ManagerNode:
         self._status.on_change(lambda: None)
         self._loop.call_soon(self._reports.publish_now)
         if linger:
-            time.sleep(_RESPONSES_ARRIVE_WITHIN_S)
+            self._loop.clock.sleep(_RESPONSES_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)
 
     def destroy(self) -> None:

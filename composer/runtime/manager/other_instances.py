@@ -9,7 +9,6 @@ longer reports the other one and continues.
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable
 from typing import Any
 from uuid import uuid4
@@ -163,7 +162,7 @@ class _Call:
         self._loop = loop
         self._name = name
         self._on_response = on_response
-        self._end_s = time.monotonic() + _RESPONSE_WITHIN_S
+        self._end_s = self._loop.clock.monotonic() + _RESPONSE_WITHIN_S
         self._client: Client = node.create_client(Trigger, name)
         self._future: Any = None
         loop.add_client(self._client)
@@ -173,7 +172,7 @@ class _Call:
     def is_done(self) -> bool:
         """Whether the response has arrived or is overdue."""
         has_response = self._future is not None and self._future.done()
-        return has_response or time.monotonic() > self._end_s
+        return has_response or self._loop.clock.monotonic() > self._end_s
 
     def close(self) -> None:
         """Destroy the client."""

@@ -7,7 +7,6 @@ one. Timings of callbacks are published every second while there are subscriptio
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -76,9 +75,10 @@ class ReportPublisher:
     def __init__(self, node: Node, loop: Loop, events: EventCounts, sources: ReportSources) -> None:
         self._node = node
         self._loop = loop
+        self._clock = loop.clock
         self._events = events
         self._sources = sources
-        self._started_s = time.monotonic()
+        self._started_s = self._clock.monotonic()
         self._is_waiting = False  # for subscriptions that do not have the last message yet
         self._publish_due = threading.Lock()  # held while a message with changes is due
         self._batch_s = _BATCH_S
@@ -95,7 +95,7 @@ class ReportPublisher:
     @property
     def uptime_s(self) -> float:
         """How long the process has run; not by the time of day, which may differ between hosts."""
-        return time.monotonic() - self._started_s
+        return self._clock.monotonic() - self._started_s
 
     def report(self) -> SystemReport:
         """Return the current report. Thread-safe."""
@@ -123,25 +123,25 @@ class ReportPublisher:
         if self._is_waiting:
             return
         self._is_waiting = True
-        self._publish_by(time.monotonic() + _ACKNOWLEDGED_WITHIN_S)
+        self._publish_by(self._clock.monotonic() + _ACKNOWLEDGED_WITHIN_S)
 
     def publish_first(self) -> None:
         """Publish the first change of a batch at once, for processes that wait for it."""
-        if time.monotonic() - self._published_s > self._batch_s:
+        if self._clock.monotonic() - self._published_s > self._batch_s:
             self.publish()
         else:
             self.publish_soon()
 
     def publish_soon(self) -> None:
         """Publish a change, with others that follow. Thread-safe."""
-        self._changed_s = time.monotonic()
+        self._changed_s = self._clock.monotonic()
         if self._publish_due.acquire(blocking=False):
             self._due_s = self._changed_s + max(self._batch_s, _LONGEST_BATCH_S)
             self._loop.call_later(self._batch_s, self._publish_changes)
 
     def publish_now(self) -> None:
         """Publish the status, whether subscriptions have the last one or not."""
-        start_s = time.monotonic()
+        start_s = self._clock.monotonic()
         self.number += 1
         report = self.report()
         self._state.publish(String(data=signed(encode(report), self._sources.key)))
@@ -149,7 +149,7 @@ class ReportPublisher:
         if self._diagnostics.get_subscription_count():
             chains, callbacks = self._sources.chains(), self._sources.callbacks()
             self._diagnostics.publish(diagnostic_array(report, self.uptime_s, chains, callbacks))
-        self._published_s = time.monotonic()
+        self._published_s = self._clock.monotonic()
         took_s = self._published_s - start_s
         self._batch_s = min(max(_BATCH_S, took_s / _MAX_SHARE), _LONGEST_PERIOD_S)
 
@@ -179,7 +179,7 @@ class ReportPublisher:
         self._callbacks.publish(String(data=encode(self.timings())))
 
     def _publish_changes(self) -> None:
-        left_s = min(self._changed_s + self._batch_s, self._due_s) - time.monotonic()
+        left_s = min(self._changed_s + self._batch_s, self._due_s) - self._clock.monotonic()
         if left_s > 0.0:
             self._loop.call_later(left_s, self._publish_changes)
             return
@@ -187,7 +187,7 @@ class ReportPublisher:
         self.publish()
 
     def _publish_by(self, end_s: float) -> None:
-        if time.monotonic() < end_s and not self._state.wait_for_all_acked(_AT_ONCE):
+        if self._clock.monotonic() < end_s and not self._state.wait_for_all_acked(_AT_ONCE):
             self._loop.call_later(_ACKNOWLEDGMENT_PERIOD_S, partial(self._publish_by, end_s))
             return
         self._is_waiting = False

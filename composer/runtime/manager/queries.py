@@ -92,7 +92,7 @@ class ManagerQueries:
         done = threading.Event()
         future = self._loop.run_task(self._collect(names))
         future.add_done_callback(lambda _: done.set())
-        if not done.wait(_PARAMETERS_WITHIN_S):
+        if not self._loop.clock.wait(done, _PARAMETERS_WITHIN_S):
             future.cancel()
             return None
         return future.result()
@@ -104,7 +104,9 @@ class ManagerQueries:
         for node in nodes:
             of_node = []
             names = await self._parameters.names_of(node)
-            async for described, value in in_slices(names, partial(self._parameter, node)):
+            async for described, value in in_slices(
+                self._loop.clock, names, partial(self._parameter, node)
+            ):
                 left -= 1 + count_items(value)
                 if left < 0:
                     return None

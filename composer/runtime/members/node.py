@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from time import monotonic
 from typing import Any
 
 from composer.model import Node
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import within
 from composer.runtime.members.context import ProcessUnavailable
@@ -147,14 +147,14 @@ class MemberNode(OutsideNode):
         reports are missing, the whole process may hang, or this computer was busy: it is lost then,
         see :class:`.MemberProcess`.
         """
-        self._late_reports = late = _LateReports()
+        self._late_reports = late = _LateReports(self.loop.clock)
         await self._until(
             lambda: self._is_down() or self._is_moving or late.are_enough,
-            monotonic() + STARTS_WITHIN_S,
+            self.loop.clock.monotonic() + STARTS_WITHIN_S,
         )
         self._late_reports = None
         left_s = self._timeout_s if self._is_moving else 0.0
-        return await self._until(self._is_down, monotonic() + left_s)
+        return await self._until(self._is_down, self.loop.clock.monotonic() + left_s)
 
     def _is_down(self) -> bool:
         return not self._is_moving and self._reported not in (INACTIVE, ACTIVE)
@@ -211,7 +211,7 @@ class MemberNode(OutsideNode):
 
     async def _wait_for_counters(self, reported: Future[None]) -> None:
         """Wait for the last report, with the final counters; the node is down without it, too."""
-        left_s = math.inf if self._end_s is None else self._end_s - monotonic()
+        left_s = math.inf if self._end_s is None else self._end_s - self.loop.clock.monotonic()
         wait_s = min(_REPORTED_WITHIN_S, left_s / 2.0)
         with suppress(TimeoutError):
             await within(self.loop, reported, max(0.0, wait_s))
@@ -221,19 +221,19 @@ class MemberNode(OutsideNode):
 
         Raises ProcessUnavailable.
         """
-        start_s = monotonic()
+        start_s = self.loop.clock.monotonic()
         while not future.done():
             start_s = max(start_s, self._process.moved_s)
             self.transition_started_s = start_s
             end_s = start_s + self._timeout_s
             if self._end_s is not None:
                 end_s = min(end_s, self._end_s)
-            if monotonic() >= end_s:
+            if self.loop.clock.monotonic() >= end_s:
                 raise ProcessUnavailable(f"{self._process} does not respond")
             woken: Future[None] = Future()
             future.add_done_callback(partial(_wake, woken))
             with suppress(TimeoutError):
-                await within(self.loop, woken, end_s - monotonic())
+                await within(self.loop, woken, end_s - self.loop.clock.monotonic())
 
     def _on_settled(self) -> None:
         if self._state == FINALIZED:
@@ -318,12 +318,13 @@ class _LateReports:
     The first of them may be older, and have waited in this process.
     """
 
-    def __init__(self) -> None:
-        self._due_s = monotonic() + _REPORTED_WITHIN_S
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._due_s = clock.monotonic() + _REPORTED_WITHIN_S
         self._count = 0
 
     def count(self) -> None:
-        self._count += monotonic() >= self._due_s
+        self._count += self._clock.monotonic() >= self._due_s
 
     @property
     def are_enough(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
@@ -134,11 +133,11 @@ class OtherProcesses:
         """Wait until the messages of :meth:`on_stop` are answered, or ``end_s`` (monotonic)."""
         if self._processes:
             with suppress(TimeoutError, RuntimeError):  # until the loop has prepared the messages
-                self._loop.run(lambda: None, max(0.0, end_s - time.monotonic()))
+                self._loop.run(lambda: None, max(0.0, end_s - self._loop.clock.monotonic()))
         while any(process.requests.has_messages for process in self._all):
-            if time.monotonic() > end_s:
+            if self._loop.clock.monotonic() > end_s:
                 return
-            time.sleep(_POLL_S)
+            self._loop.clock.sleep(_POLL_S)
 
     def callbacks(self) -> tuple[CallbackFigures, ...]:
         """Return the timings of callbacks that the processes have sent."""

@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from time import monotonic
 
 from composer.model import LogLevel, Process
 from composer.model.names import PROGRAM_LOGGER
@@ -65,7 +64,7 @@ class MemberProcess:
         self._name = context.full_name(process)
         self._members: dict[str, Member] = {}
         self._figures: dict[str, NodeFigures] = {}
-        #: When, by ``time.monotonic()``, it last reported that a node has moved.
+        #: When, by the clock of the loop, it last reported that a node has moved.
         self.moved_s = 0.0
         self._life: MemberLife | None = None  # from the start, or the first report, to the end
         self._may_start = bool(context.command)
@@ -83,7 +82,8 @@ class MemberProcess:
         #: The timings of its callbacks and chains, once it was asked for them.
         self.timings = TimingReport()
         self._reports = MemberReports(self._name, context, self._on_report, self._warn)
-        self._checked_s = monotonic()
+        self._clock = context.loop.clock
+        self._checked_s = self._clock.monotonic()
         self._timer = context.loop.call_every(_CHECK_PERIOD_S, self._check)
 
     def add(self, member: Member) -> None:
@@ -226,18 +226,18 @@ class MemberProcess:
             if life.child is None:
                 raise ProcessUnavailable(f"{self} {life.lost}")
             await self._kill_child(life, life.child)
-        end_s = monotonic() + STARTS_WITHIN_S
+        end_s = self._clock.monotonic() + STARTS_WITHIN_S
         refused_s = -REPORTS_WITHIN_S
         child: Child | None = None
         while self._life is None or not self._life.is_up:
             if child is not None and child.ended.done():
                 if self._may_start and child.ended.result() != ALREADY_RUNS:
                     raise ProcessUnavailable(f"{self} {child.how_ended}")
-                child, refused_s = None, monotonic()  # the other one is about to report
-            may_start = self._may_start and monotonic() - refused_s >= REPORTS_WITHIN_S
+                child, refused_s = None, self._clock.monotonic()  # the other one is about to report
+            may_start = self._may_start and self._clock.monotonic() - refused_s >= REPORTS_WITHIN_S
             if self._life is None and may_start and not is_held(self._name):
                 child = await self._start_child()
-            elif monotonic() > end_s:
+            elif self._clock.monotonic() > end_s:
                 raise ProcessUnavailable(self._not_reported())
             await sleep(self._context.loop, _LOCK_POLL_S if self._life is None else _POLL_S)
 
@@ -295,8 +295,8 @@ class MemberProcess:
         has_returned = bool(life.lost) or (life.last is None and life.child is None)
         before = life.states
         if any(before.get(now.node, now).state != now.state for now in report.nodes):
-            self.moved_s = monotonic()
-        life.last, life.reported_s = report, monotonic()
+            self.moved_s = self._clock.monotonic()
+        life.last, life.reported_s = report, self._clock.monotonic()
         for node in report.nodes:
             if node.node in self._figures:
                 is_child = life.child is not None
@@ -319,7 +319,7 @@ class MemberProcess:
         """Ignore the reports of a node from before the end of its transition."""
         if done.cancelled():
             return
-        self.moved_s = monotonic()
+        self.moved_s = self._clock.monotonic()
         if done.exception() is None and done.result().success:
             life.answered[node] = done.result().report
 
@@ -361,7 +361,7 @@ class MemberProcess:
 
     def _check(self) -> None:
         """Notice a process that does not report: it hangs, or is cut off."""
-        now_s = monotonic()
+        now_s = self._clock.monotonic()
         late_s = now_s - self._checked_s - _CHECK_PERIOD_S  # this process did not run, not that one
         self._checked_s = now_s
         life = self._life

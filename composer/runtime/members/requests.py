@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import count
-from time import monotonic
 from typing import Any
 from uuid import uuid4
 
@@ -72,6 +71,7 @@ class MemberRequests:
         """
         self._ros = ros
         self._loop = loop
+        self._clock = loop.clock
         self._service = service
         self._client = ros.create_client(RequestService, service)
         self._sender = uuid4().hex
@@ -115,7 +115,7 @@ class MemberRequests:
         if self._participant != report.participant:
             self._participant = report.participant
             self._is_discovered = self._has_problem = False
-            self._awaited_until_s = monotonic() + _DISCOVERED_WITHIN_S
+            self._awaited_until_s = self._clock.monotonic() + _DISCOVERED_WITHIN_S
         self._seen, self._received = report.number, report.received(self._sender)
         if goals is not None:
             self.keep(goals)
@@ -139,7 +139,7 @@ class MemberRequests:
 
     def ask_for_report_key(self) -> None:
         """Ask the process for the key of its reports, unless that was done a moment ago."""
-        now_s = monotonic()
+        now_s = self._clock.monotonic()
         if now_s - self._key_asked_s < _KEY_AGAIN_S or not self._client.service_is_ready():
             return
         self._key_asked_s = now_s
@@ -217,7 +217,7 @@ class MemberRequests:
         self._send_request(again)
 
     def _wait_for_service(self) -> None:
-        now_s = monotonic()
+        now_s = self._clock.monotonic()
         self._unready_s = self._unready_s or now_s
         if now_s - self._unready_s >= _READY_WITHIN_S:
             self._report_problem("reports, but its service is not discovered; requests wait")
@@ -241,7 +241,7 @@ class MemberRequests:
         if not self._is_discovered:
             found = {participant(server).hex() for server in servers_of(self._ros, self._service)}
             is_found = self._participant in found
-            self._is_discovered = is_found or monotonic() >= self._awaited_until_s
+            self._is_discovered = is_found or self._clock.monotonic() >= self._awaited_until_s
         return self._is_discovered
 
     def _next(self) -> MemberRequest:

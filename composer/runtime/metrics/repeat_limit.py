@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-import time
 
 from composer.base.fast_dataclass import dataclass
+from composer.runtime.clock.clock import Clock
 
 _MAX_SUBJECTS = 1000
 #: The subject of everything new while the limit knows too many subjects.
@@ -34,7 +34,8 @@ class _Subject:
 class RepeatLimit:
     """Admits one line per subject and period, and counts the others. Thread-safe."""
 
-    def __init__(self, period_s: float = 1.0) -> None:
+    def __init__(self, clock: Clock, period_s: float = 1.0) -> None:
+        self._clock = clock
         self._period_s = period_s
         # Reentrant: garbage collection may report a lost exception, at any allocation.
         self._lock = threading.RLock()
@@ -42,7 +43,7 @@ class RepeatLimit:
 
     def admit(self, subject: str) -> Admission | None:
         """Return whether a line about ``subject`` may be logged now; None if not."""
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic()
         with self._lock:
             known = self._subjects.get(subject)
             if known is None and len(self._subjects) >= _MAX_SUBJECTS:

@@ -13,9 +13,9 @@ import os
 import re
 import shutil
 import stat
-import time
 from pathlib import Path
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.middleware.dds_participants import ports_of_domain
 from composer.runtime.process import StartRefused
 
@@ -73,12 +73,12 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def _stays_incomplete(path: Path) -> bool:
-    until_s = time.monotonic() + _FILLED_WITHIN_S
+    until_s = COMPUTER.monotonic() + _FILLED_WITHIN_S
     while (changed_s := _incomplete_since_s(path)) is not None:
         # The clock of files may jump; the monotonic one limits the wait.
-        if time.time() - changed_s >= _FILLED_WITHIN_S or time.monotonic() >= until_s:
+        if COMPUTER.time() - changed_s >= _FILLED_WITHIN_S or COMPUTER.monotonic() >= until_s:
             return True
-        time.sleep(_POLL_S)
+        COMPUTER.sleep(_POLL_S)
     return False
 
 

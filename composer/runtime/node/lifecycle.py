@@ -95,7 +95,7 @@ class Lifecycle:
         self._lock = threading.Lock()
         self._current: Future[None] | None = None  # the transition that runs now
         self._last_state = ""
-        self._repeats = RepeatLimit()
+        self._repeats = RepeatLimit(loop.clock)
         self._pending_reply: list[Reply] = []  # of the change_state request for it, if any
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)

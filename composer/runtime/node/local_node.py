@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from time import monotonic
 from typing import Any, Protocol, TypeVar
 
 from rclpy.node import Node as RosNode
@@ -21,7 +20,6 @@ from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
-from composer.runtime.clock.clock import NodeTime
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
@@ -33,6 +31,7 @@ from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
+from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.ports import PortSet, RunningPort
 
 T = TypeVar("T")
@@ -77,7 +76,7 @@ class LocalNode(ABC):
         self.model = model
         self.loop = loop
         self.activations = 0  # how often it became active
-        #: When, by ``time.monotonic()``, the work of its last transition started.
+        #: When, by the clock of the loop, the work of its last transition started.
         self.transition_started_s = 0.0
         self.statistics = Statistics() if statistics is None else statistics
         self.transition_timeout_s = options.transition_timeout_s
@@ -88,12 +87,12 @@ class LocalNode(ABC):
         offers = model.introspection
         log = Log(self._ros, listener.write_log, rosout=offers.rosout)
         self._error_limit = _error_limit(model, listener)
-        error_log = ErrorLog(log, self.statistics, listener.on_error, self._error_limit)
+        error_log = ErrorLog(log, loop.clock, self.statistics, listener.on_error, self._error_limit)
         self._context = NodeContext(
             node=self._ros,
             loop=loop,
             clock=NodeTime(self._ros, loop, options.process.simulated_time, self._time_switched),
-            gate=LifecycleGate(model.full_name, PendingFutures(loop.call_later)),
+            gate=LifecycleGate(model.full_name, PendingFutures(loop)),
             strand=self._make_strand(),
             log=log,
             error_log=error_log,
@@ -105,7 +104,7 @@ class LocalNode(ABC):
             mutations=_mutation_check(options.seen_messages, error_log),
         )
         # Ports that are always on have a gate of their own and share the rest.
-        always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop.call_later))
+        always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop))
         self._always_on_context = replace(self._context, gate=always_on_gate)
         self._keeps_entities = False
 
@@ -113,9 +112,10 @@ class LocalNode(ABC):
         """Join the ROS graph, unconfigured; the parameters are declared."""
         offers = self.model.introspection
         if offers.parameters:
-            ParameterServices(self._ros, NodeParameterStore(self._ros), self._context.log.warn)
+            store = NodeParameterStore(self._ros)
+            ParameterServices(self._ros, self.loop.clock, store, self._context.log.warn)
         if offers.logger_services:
-            LoggerServices(self._ros, self._context.log.warn)
+            LoggerServices(self._ros, self.loop.clock, self._context.log.warn)
         self.loop.add_node(self._ros)
         self.lifecycle = Lifecycle(
             self._context_of_transitions(),
@@ -273,7 +273,7 @@ class LocalNode(ABC):
     # --- transitions
 
     def _begin_transition(self) -> None:
-        self.transition_started_s = monotonic()
+        self.transition_started_s = self.loop.clock.monotonic()
         if self._error_limit is not None:
             self._error_limit.paused = True
         for context in self.contexts:

@@ -13,6 +13,7 @@ from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
 
+from composer.runtime.clock.clock import Clock
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.ros.limited_requests import TooLarge, limited
 
@@ -20,10 +21,10 @@ from composer.runtime.ros.limited_requests import TooLarge, limited
 class LoggerServices:
     """The two services of one node. Create it before the node is added to its loop."""
 
-    def __init__(self, node: Node, warn: Callable[[str], None]) -> None:
+    def __init__(self, node: Node, clock: Clock, warn: Callable[[str], None]) -> None:
         """``warn`` logs requests that are refused."""
         self._warn = warn
-        self._repeats = RepeatLimit()
+        self._repeats = RepeatLimit(clock)
         self._add(node, GetLoggerLevels, "get_logger_levels", _get)
         self._add(node, SetLoggerLevels, "set_logger_levels", _set)
 

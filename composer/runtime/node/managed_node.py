@@ -93,7 +93,7 @@ class ManagedNode(Protocol):
     loop: Loop
     statistics: Statistics
     activations: int  # how often it became active
-    #: When, by ``time.monotonic()``, the work of its last transition started.
+    #: When, by the clock of the loop, the work of its last transition started.
     transition_started_s: float
 
     @property

@@ -13,9 +13,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import Node
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
-from composer.runtime.clock.sim_time import SimTimeSource
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.node_time.sim_time import SimTimeSource
 from composer.runtime.ros.limited_requests import limit_type_descriptions
 from composer.runtime.transforms.listener import TransformListeners
 

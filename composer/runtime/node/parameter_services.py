@@ -8,7 +8,7 @@ callbacks: it is handled in slices, or refused above the limits of
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Generator, Iterable
-from time import monotonic
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from rcl_interfaces.msg import (
@@ -31,6 +31,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.exceptions import text_of
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.ros.limited_requests import MAX_ITEMS, TooLarge, limited
@@ -124,12 +125,15 @@ def set_parameters(node: Node, changes: Iterable[ParameterMessage]) -> SetParame
 class ParameterServices:
     """The six services of one node. Create it before the node is added to its loop."""
 
-    def __init__(self, node: Node, store: ParameterStore, warn: Callable[[str], None]) -> None:
+    def __init__(
+        self, node: Node, clock: Clock, store: ParameterStore, warn: Callable[[str], None]
+    ) -> None:
         """``warn`` logs requests that are refused."""
+        self._in_slices = partial(in_slices, clock)
         self._node = node
         self._store = store
         self._warn = warn
-        self._repeats = RepeatLimit()
+        self._repeats = RepeatLimit(clock)
         self._add(ListParameters, "list_parameters", self._list)
         self._add(GetParameters, "get_parameters", self._get)
         self._add(GetParameterTypes, "get_parameter_types", self._get_types)
@@ -167,7 +171,7 @@ class ParameterServices:
     async def _get(self, request: Any, response: Any) -> None:
         values: list[ParameterValue] = []
         items = 0
-        async for value in in_slices(request.names, self._store.value):
+        async for value in self._in_slices(request.names, self._store.value):
             items += count_items(value)
             if items > MAX_ITEMS:
                 reason = f"more than {MAX_ITEMS} array items and characters in one response"
@@ -177,38 +181,40 @@ class ParameterServices:
         response.values = values if len(values) == len(request.names) else []
 
     async def _get_types(self, request: Any, response: Any) -> None:
-        types = [kind async for kind in in_slices(request.names, self._store.type_of)]
+        types = [kind async for kind in self._in_slices(request.names, self._store.type_of)]
         response.types = types if len(types) == len(request.names) else []
 
     async def _describe(self, request: Any, response: Any) -> None:
-        found = [item async for item in in_slices(request.names, self._store.descriptor)]
+        found = [item async for item in self._in_slices(request.names, self._store.descriptor)]
         response.descriptors = found if len(found) == len(request.names) else []
 
     async def _set(self, request: Any, response: Any) -> None:
         async def set_one(change: ParameterMessage) -> SetParametersResult:
             return await self._store.set([change])
 
-        response.results = [item async for item in in_slices(request.parameters, set_one)]
+        response.results = [item async for item in self._in_slices(request.parameters, set_one)]
 
     async def _set_atomically(self, request: Any, response: Any) -> None:
         response.result = await self._store.set(request.parameters)
 
 
-async def in_slices(items: Iterable[Any], call: Callable[[Any], Coroutine[Any, Any, T]]) -> Any:
+async def in_slices(
+    clock: Clock, items: Iterable[Any], call: Callable[[Any], Coroutine[Any, Any, T]]
+) -> Any:
     """Yield the result of ``call`` for each item, up to the first unknown parameter.
 
     Other callbacks of the loop run in between.
     """
-    until_s = monotonic() + _SLICE_S
+    until_s = clock.monotonic() + _SLICE_S
     for item in items:
         try:
             result = await call(item)
         except UnknownParameterError:
             return
         yield result
-        if monotonic() > until_s:
+        if clock.monotonic() > until_s:
             await _NextTurn()
-            until_s = monotonic() + _SLICE_S
+            until_s = clock.monotonic() + _SLICE_S
 
 
 class _NextTurn:

@@ -6,7 +6,6 @@ See :class:`composer.behavior.Transforms`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from time import monotonic
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -213,7 +212,7 @@ class NodeTransforms(RunningPort):
         """Wait for a transform up to the timeout, and return it."""
         future: Future[Any] = Future()
         buffer, stamp_ns = self._buffer, _time(stamp)
-        until_s = monotonic() + timeout_ms / 1000.0
+        until_s = self._context.loop.clock.monotonic() + timeout_ms / 1000.0
         if buffer is None:
             future.set_exception(self._refusal())
             return future

@@ -12,7 +12,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from time import monotonic
 from typing import Any
 
 from composer.base.regular_files import write_whole
@@ -95,7 +94,7 @@ class ExecutableNode(OutsideNode):
 
     async def _activate(self) -> None:
         child = await self._start(INACTIVE)
-        end_s = monotonic() + self._executable.ready_timeout_s
+        end_s = self.loop.clock.monotonic() + self._executable.ready_timeout_s
         if self._executable.kind is ExecutableKind.TASK:
             await self._finish_task(child, end_s)
             return
@@ -145,7 +144,7 @@ class ExecutableNode(OutsideNode):
         self._find()
         child = await self._start(UNCONFIGURED)
         self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
-        end_s = monotonic() + self._executable.ready_timeout_s
+        end_s = self.loop.clock.monotonic() + self._executable.ready_timeout_s
         service = f"{self.full_name}/change_state"
 
         def has_services() -> bool:
@@ -165,8 +164,10 @@ class ExecutableNode(OutsideNode):
             raise TransitionRefused("its process does not run", UNCONFIGURED)
         limit_s = self._timeout_s
         if self._end_s is not None:
-            limit_s = min(limit_s, max(0.0, self._end_s - monotonic()) * _END_SHARE)
-        request = self.loop.run_task(remote.change(transition, monotonic() + limit_s))
+            limit_s = min(limit_s, max(0.0, self._end_s - self.loop.clock.monotonic()) * _END_SHARE)
+        request = self.loop.run_task(
+            remote.change(transition, self.loop.clock.monotonic() + limit_s)
+        )
         child.ended.add_done_callback(lambda _: request.cancel())
         try:
             await self._until(request.done, float("inf"))
@@ -248,7 +249,7 @@ class ExecutableNode(OutsideNode):
         self._child = None  # its end is expected
         terminate_s, kill_s = self._end_limits_s
         self._children.end(child, terminate_s, kill_s)
-        end_s = monotonic() + terminate_s + kill_s + _KILLED_WITHIN_S
+        end_s = self.loop.clock.monotonic() + terminate_s + kill_s + _KILLED_WITHIN_S
         if not await self._until(child.ended.done, end_s):
             raise TransitionRefused(f"process {child.pid} cannot be killed", UNCONFIGURED)
 
@@ -259,7 +260,7 @@ class ExecutableNode(OutsideNode):
         kill_s = self._executable.sigkill_timeout_ms / 1000.0
         if self._end_s is None:
             return terminate_s, kill_s
-        left_s = max(0.0, self._end_s - monotonic()) * _END_SHARE
+        left_s = max(0.0, self._end_s - self.loop.clock.monotonic()) * _END_SHARE
         share = min(1.0, left_s / max(terminate_s + kill_s, 1e-3))
         return terminate_s * share, kill_s * share
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from time import monotonic
-
 from composer.model import External, LifecycleKind, Node
 from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
@@ -86,7 +84,7 @@ class ExternalNode(OutsideNode):
         return self._presence.has_node() and not self._presence.missing()
 
     async def _await_ports(self) -> None:
-        end_s = monotonic() + self._external.ready_timeout_s
+        end_s = self.loop.clock.monotonic() + self._external.ready_timeout_s
         if not await self._until_ready(self._is_there, end_s):
             self._refuse_absent(missing_text(self._presence.missing()), INACTIVE)
         self._is_lost = False
@@ -96,7 +94,7 @@ class ExternalNode(OutsideNode):
             await self._connect()
         if self._remote is None:
             raise TransitionRefused("it is not connected", UNCONFIGURED)
-        end_s = monotonic() + self._timeout_s
+        end_s = self.loop.clock.monotonic() + self._timeout_s
         try:
             state = await self._remote.state(end_s)
             if state == _STARTS[transition]:  # otherwise, something else has moved it already
@@ -109,7 +107,7 @@ class ExternalNode(OutsideNode):
 
     async def _connect(self) -> None:
         self._close_remote()
-        end_s = monotonic() + self._external.ready_timeout_s
+        end_s = self.loop.clock.monotonic() + self._external.ready_timeout_s
         if not await self._until_ready(self._is_there, end_s):
             missing = f"it has no service {self.full_name}/change_state"
             self._refuse_absent(missing, UNCONFIGURED)

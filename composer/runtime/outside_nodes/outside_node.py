@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Set
-from time import monotonic
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
@@ -137,7 +135,7 @@ class OutsideNode(ABC):
 
     def now_s(self) -> float:
         """Return the system time in seconds."""
-        return time.time()
+        return self.loop.clock.time()
 
     def sent(self, publisher: str) -> int:
         """Return how many messages a publisher has sent, as far as this process knows."""
@@ -201,7 +199,7 @@ class OutsideNode(ABC):
             names = ", ".join(self.available) or "none"
             reason = f"refused: the node is {start}; available transitions: {names}"
             return TransitionOutcome(transition, start, success=False, reason=reason)
-        self.transition_started_s = monotonic()
+        self.transition_started_s = self.loop.clock.monotonic()
         self._state = _DURING[transition]
         state, reason = start, "its executor has stopped"
         try:
@@ -255,7 +253,7 @@ class OutsideNode(ABC):
     async def _until(self, condition: Callable[[], bool], end_s: float) -> bool:
         """Wait for ``condition()`` until ``end_s`` (monotonic); return its value."""
         while not condition():
-            if monotonic() >= end_s:
+            if self.loop.clock.monotonic() >= end_s:
                 return False
             await sleep(self.loop, _POLL_S)
         return True

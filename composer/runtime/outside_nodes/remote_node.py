@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
@@ -174,6 +173,7 @@ class RemoteLifecycle:
         """
         self._ros = ros
         self._loop = loop
+        self._clock = loop.clock
         self._full_name = full_name
         self._get_state = ros.create_client(GetState, f"{full_name}/get_state")
         self._change_state = ros.create_client(ChangeState, f"{full_name}/change_state")
@@ -240,7 +240,7 @@ class RemoteLifecycle:
         try:
             while (start := self._event_start) is not None:
                 self._event_start = None
-                state = await self._settled(time.monotonic() + _CONFIRMED_WITHIN_S)
+                state = await self._settled(self._clock.monotonic() + _CONFIRMED_WITHIN_S)
                 self._on_state(self._event_start or start, state)
         except NotAnswered:
             self._event_start = None  # its disappearance is noticed elsewhere
@@ -255,10 +255,11 @@ class RemoteLifecycle:
 
     async def _response(self, future: Any, end_s: float) -> Any:
         """Return the response, None if there is none within a second."""
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic()
         if now_s >= end_s:
             raise NotAnswered(f"{self._full_name} does not answer")
         until_s = min(now_s + _ASK_AGAIN_S, end_s)
-        while not future.done() and time.monotonic() < until_s:
-            await sleep(self._loop, _POLL_S if time.monotonic() > now_s + _SOON_S else _SOON_S / 4)
+        while not future.done() and self._clock.monotonic() < until_s:
+            is_late = self._clock.monotonic() > now_s + _SOON_S
+            await sleep(self._loop, _POLL_S if is_late else _SOON_S / 4)
         return future.result() if future.done() else None

@@ -145,6 +145,7 @@ class ActionServerPort(RunningPort):
             context.node,
             self._type,
             port.full_name,
+            clock=context.loop.clock,
             execute_callback=_unused_execute_callback,
             callback_group=context.group_of(port),
             goal_callback=self._on_goal_request,

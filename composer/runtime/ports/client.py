@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from math import inf
 from typing import Any, TypeVar
@@ -44,12 +43,16 @@ class CallLimit:
         self._context = context
         self._what = what
         self._timeout_ms = timeout_ms
-        self._end_s = inf if timeout_ms is None else time.monotonic() + timeout_ms / 1000.0
+        self._end_s = (
+            inf
+            if timeout_ms is None
+            else self._context.loop.clock.monotonic() + timeout_ms / 1000.0
+        )
 
     async def wait_for_server(self, is_available: Callable[[], bool]) -> None:
         """Wait for the server. Raises ServerUnavailable and CallCancelled."""
         while not is_available():
-            if time.monotonic() >= self._end_s:
+            if self._context.loop.clock.monotonic() >= self._end_s:
                 raise ServerUnavailable(
                     f"no server of {self._what} was available within {self._timeout_ms:g} ms"
                 )

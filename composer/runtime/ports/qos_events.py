@@ -10,7 +10,6 @@ from contextlib import suppress
 from enum import IntEnum
 from functools import partial
 from math import inf
-from time import monotonic
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -144,7 +143,7 @@ class QosEvents:
         self._incompatible = IncompatibleQos(context, port)
         self._warnings: dict[str, RepeatedWarning] = {}
         self._stop_watching: list[Callable[[], None]] = []
-        self._active_since_s = inf  # time.monotonic
+        self._active_since_s = inf  # by the loop's clock
 
     def create_event_handlers(
         self, _callback_group: CallbackGroup, endpoint: Any, _topic_name: str
@@ -161,7 +160,7 @@ class QosEvents:
 
     def activate(self) -> None:
         """Count events from now on, and those that take a period after that period."""
-        self._active_since_s = monotonic()
+        self._active_since_s = self._context.loop.clock.monotonic()
 
     def close(self) -> None:
         """Stop watching. Call it before the endpoint is destroyed."""
@@ -223,7 +222,7 @@ class QosEvents:
         name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
 
         def on_events(number: int) -> None:
-            began_s = monotonic() - event.period_s
+            began_s = self._context.loop.clock.monotonic() - event.period_s
             context.loop.call_soon(partial(self._on_events, event.name, number, began_s))
 
         count = event.count

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Coroutine
 from math import inf
-from time import monotonic
 from typing import Any, cast
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -84,7 +83,7 @@ class SubscriptionPort(RunningPort):
         """Handle the messages that were latched meanwhile."""
         self._mailbox.restart()
         self._qos_events.activate()
-        since_s = monotonic() - self._lifespan_s
+        since_s = self._context.loop.clock.monotonic() - self._lifespan_s
         while self._latched:
             received_s, message = self._latched.popleft()
             if received_s >= since_s:
@@ -99,7 +98,7 @@ class SubscriptionPort(RunningPort):
         if self._latched is None:
             self._context.statistics.dropped += 1
         else:
-            self._latched.append((monotonic(), message))
+            self._latched.append((self._context.loop.clock.monotonic(), message))
 
     def count_drop(self) -> None:
         """Count a message that was dropped from the full queue."""

@@ -6,10 +6,10 @@ import errno
 import ipaddress
 import os
 import socket
-import time
 from enum import Enum
 
 from composer.base.fast_dataclass import dataclass
+from composer.runtime.clock.clock import COMPUTER
 
 _REFUSED_WITHIN_S = 0.3
 
@@ -106,7 +106,7 @@ _UTIME, _STIME, _THREADS, _STARTED, _RSS = 11, 12, 17, 19, 21
 
 @dataclass(frozen=True, slots=True)
 class ProcessUsage:
-    """What a process has used until ``at_s``, by ``time.monotonic()``; ``up_s`` is its age."""
+    """What a process has used until ``at_s`` of the monotonic clock; ``up_s`` is its age."""
 
     at_s: float
     cpu_s: float
@@ -129,18 +129,18 @@ def process_usage(pid: str) -> ProcessUsage | None:
         os.close(descriptor)
     values = text.rpartition(")")[2].split()
     return ProcessUsage(
-        at_s=time.monotonic(),
+        at_s=COMPUTER.monotonic(),
         cpu_s=(int(values[_UTIME]) + int(values[_STIME])) / _TICKS_PER_S,
         memory_mb=int(values[_RSS]) * _PAGE_BYTES / _MB,
         threads=int(values[_THREADS]),
-        up_s=time.clock_gettime(time.CLOCK_BOOTTIME) - int(values[_STARTED]) / _TICKS_PER_S,
+        up_s=COMPUTER.since_boot_s() - int(values[_STARTED]) / _TICKS_PER_S,
     )
 
 
 def process_start_s() -> float:
-    """Return when this process started, by ``time.monotonic()``; now if that cannot be read.
+    """Return when this process started, by the monotonic clock; now if that cannot be read.
 
     Python may have been started again in it, as by the ROS wheels. Linux counts steps of 10 ms.
     """
     usage = process_usage("self")
-    return time.monotonic() - (0.0 if usage is None else max(0.0, usage.up_s))
+    return COMPUTER.monotonic() - (0.0 if usage is None else max(0.0, usage.up_s))

@@ -11,12 +11,12 @@ import json
 import os
 import socket
 import stat
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.process import StartRefused
 
 #: The key of the reports of a process that the coordinating process of its system starts. Such a
@@ -71,15 +71,15 @@ def hold_instance_lock(
         yield
         return
     with lock, _kept_folder():
-        start_s = time.monotonic()
+        start_s = COMPUTER.monotonic()
         while not _is_locked(lock, fcntl.LOCK_EX):
             is_shared = _is_locked(lock, fcntl.LOCK_SH)
             limit_s = _LOOKED_AT_WITHIN_S if is_shared else _WRITTEN_WITHIN_S
-            if time.monotonic() - start_s > limit_s:
+            if COMPUTER.monotonic() - start_s > limit_s:
                 holder = _holder(lock)
                 raise already_running(name, holder["host"], holder["pid"])
             fcntl.flock(lock, fcntl.LOCK_UN)
-            time.sleep(_POLL_S)
+            COMPUTER.sleep(_POLL_S)
         lock.seek(0)
         lock.truncate()
         holder = {
@@ -119,7 +119,7 @@ class LocalSystems:
         changed_ns = _changed_ns()
         if changed_ns is None or changed_ns != self._changed_ns:
             is_certain = changed_ns is not None and (
-                time.time_ns() - changed_ns > _CHANGE_IS_CERTAIN_NS
+                COMPUTER.time_ns() - changed_ns > _CHANGE_IS_CERTAIN_NS
             )
             self._changed_ns = changed_ns if is_certain else None
             self._known = local_systems()

@@ -14,12 +14,12 @@ import json
 import os
 import socket
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.process.instance_lock import socket_path
 from composer.runtime.protocol.codec import ProtocolError, decode, encode
 
@@ -75,10 +75,12 @@ class QuerySocket:
             self._path.unlink()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)  # wakes up accept
-        end_s = time.monotonic() + timeout_s
+        end_s = COMPUTER.monotonic() + timeout_s
         self._thread.join(timeout_s)
         self._listener.close()
-        self._answering.acquire(timeout=max(0.0, end_s - time.monotonic()))  # kept: no more answers
+        self._answering.acquire(
+            timeout=max(0.0, end_s - COMPUTER.monotonic())
+        )  # kept: no more answers
 
     def _serve(self, listener: socket.socket) -> None:
         while True:
@@ -143,9 +145,9 @@ def ask(system: str, query: Any, timeout_s: float) -> Any:
 def _read_line(connection: socket.socket) -> bytes:
     """Return the line that a command sends. Raises OSError if it takes too long."""
     line = b""
-    end_s = time.monotonic() + _TRANSFER_WITHIN_S
+    end_s = COMPUTER.monotonic() + _TRANSFER_WITHIN_S
     while not line.endswith(b"\n") and len(line) < _MAX_QUERY_BYTES:
-        connection.settimeout(max(0.001, end_s - time.monotonic()))
+        connection.settimeout(max(0.001, end_s - COMPUTER.monotonic()))
         received = connection.recv(_READ_BYTES)
         if not received:
             break

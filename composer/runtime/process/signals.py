@@ -8,10 +8,11 @@ import select
 import signal
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager, suppress
 from types import FrameType
+
+from composer.runtime.clock.clock import Clock
 
 _MILLISECONDS = 1000
 _LONGEST_MS = 2**31 - 1  # the longest timeout of poll(2): 24 days
@@ -25,7 +26,8 @@ class WakeupPipe:
     it, and Python never runs the handler. A byte in a pipe is still there for the wait.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         #: Any byte written here wakes, also by ``signal.set_wakeup_fd``.
         self._read_fd, self.fd = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._poll = select.poll()
@@ -38,8 +40,8 @@ class WakeupPipe:
 
     def wait(self, until_s: float = math.inf) -> bool:
         """Sleep until a wake-up; return False if ``until_s`` (monotonic) comes first."""
-        while not self._poll.poll(_milliseconds_until(until_s)):
-            if time.monotonic() >= until_s:
+        while not self._poll.poll(self._milliseconds_until(until_s)):
+            if self._clock.monotonic() >= until_s:
                 return False
         os.read(self._read_fd, _READ_BYTES)
         return True
@@ -49,10 +51,9 @@ class WakeupPipe:
         os.close(self._read_fd)
         os.close(self.fd)
 
-
-def _milliseconds_until(end_s: float) -> int:
-    left_ms = max(0.0, end_s - time.monotonic()) * _MILLISECONDS
-    return math.ceil(min(left_ms, _LONGEST_MS))
+    def _milliseconds_until(self, end_s: float) -> int:
+        left_ms = max(0.0, end_s - self._clock.monotonic()) * _MILLISECONDS
+        return math.ceil(min(left_ms, _LONGEST_MS))
 
 
 #: SIGQUIT would leave sockets and shared memory behind.

@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel
+from composer.runtime.clock.clock import Clock
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
 
@@ -194,17 +194,20 @@ class Reporter:
     The system keeps running without its listener: the first exception of it ends the reports.
     """
 
-    def __init__(self, listener: Report | None, started_at_s: float | None = None) -> None:
-        """Count times of events from ``started_at_s``, by ``time.monotonic()``; or from now."""
+    def __init__(
+        self, listener: Report | None, clock: Clock, started_at_s: float | None = None
+    ) -> None:
+        """Count times of events from ``started_at_s``, by the clock; or from now."""
+        self._clock = clock
         self._listener = listener
         # Reentrant: garbage collection may run a finalizer that logs, at any allocation.
         self._lock = threading.RLock()
-        self._started_at_s = time.monotonic() if started_at_s is None else started_at_s
+        self._started_at_s = self._clock.monotonic() if started_at_s is None else started_at_s
 
     @property
     def elapsed_s(self) -> float:
         """The seconds since the start, for events."""
-        return time.monotonic() - self._started_at_s
+        return self._clock.monotonic() - self._started_at_s
 
     def report(self, event: Event) -> None:
         """Pass an event to the listener."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -27,6 +26,7 @@ class FaultHandler:
         self._reconciler = reconciler
         self._shared = reconciler.shared
         self._main_queue = reconciler.main_queue
+        self._clock = reconciler.main_queue.clock
         self._status = reconciler.status
         self._reporter = reconciler.reporter
         self._abandoned: dict[str, set[str]] = {}  # by hung loop: the nodes that did not fail
@@ -35,7 +35,7 @@ class FaultHandler:
 
     def handle(self, faults: Iterable[Fault]) -> None:
         """Handle failures: many nodes may fail at once, for one reason."""
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic()
         decisions = ((fault, self._decide(fault, now_s)) for fault in faults)
         handled = [(fault, decision) for fault, decision in decisions if decision is not None]
         self._report_failed(handled)

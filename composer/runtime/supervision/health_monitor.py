@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable
 from types import FrameType
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState
 from composer.plan import Fault, FaultKind
+from composer.runtime.clock.clock import Clock
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.supervision.events import Reporter, Stuck
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
@@ -56,10 +56,12 @@ class HealthMonitor:
         desired: SharedDesiredState,
         report: Callable[[NodeEvent], None],
         reporter: Reporter,
+        clock: Clock,
     ) -> None:
         """``report`` receives failures; the user sees by ``reporter`` which callbacks take long."""
         self._node_set = node_set
         self._desired = desired
+        self._clock = clock
         self._serial = 0  # of the desired state before the check
         self._report = report
         self._reporter = reporter
@@ -71,7 +73,7 @@ class HealthMonitor:
         silences = {name: _NodeSilence(name, node_set) for name in own}
         self._silences = {name: silence for name, silence in silences.items() if silence.has_limits}
         self._period_s = _period_s(node_set)
-        self._checked_s = time.monotonic()
+        self._checked_s = self._clock.monotonic()
         self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="health monitor", daemon=True)
 
@@ -92,8 +94,8 @@ class HealthMonitor:
             self._thread.join()
 
     def _run(self) -> None:
-        while not self._end.wait(self._period_s):
-            now_s = time.monotonic()
+        while not self._clock.wait(self._end, self._period_s):
+            now_s = self._clock.monotonic()
             self._serial = self._desired.value.serial
             self._forgive_delay(now_s)
             self._check_callbacks(now_s)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from time import sleep
 from types import FrameType
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import (
     INTERRUPTIBLE,
@@ -95,7 +95,7 @@ class RunningCallback:
         """
         for _ in range(_ATTEMPTS):
             # After a sleep, this thread holds the GIL for 5 ms, so the sampled stack stays valid.
-            sleep(_MOMENT_S)
+            COMPUTER.sleep(_MOMENT_S)
             stack = stacks_of((self.thread,)).get(self.thread, [])
             if self.call not in stack:
                 return

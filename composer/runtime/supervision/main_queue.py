@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.plan import DesiredState, Fault
+from composer.runtime.clock.clock import Clock
 from composer.runtime.process.signals import WakeupPipe
 
 
@@ -101,9 +101,11 @@ class MainQueue(Generic[T]):
     It uses no locks: code that is interrupted by a signal handler might hold them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        #: The clock of the system.
+        self.clock = clock
         #: Woken for every item and request; wake it to make :meth:`wait` check its condition.
-        self.wakeup = WakeupPipe()
+        self.wakeup = WakeupPipe(clock)
         self._items: deque[T] = deque()
         self._held = threading.local()
         #: Why the system stops; None while no stop is requested.
@@ -119,7 +121,7 @@ class MainQueue(Generic[T]):
 
     def request_stop(self, reason: str) -> None:
         """Request a stop, from any thread or a signal handler; a later second one is urgent."""
-        now_s = time.monotonic()
+        now_s = self.clock.monotonic()
         if self.stop_reason is None:
             self.stop_reason = reason
             self._requested_s = now_s
@@ -186,7 +188,7 @@ class MainQueue(Generic[T]):
             if stoppable and self.stopping:
                 break
             if self.urgent:
-                until_s = min(until_s, time.monotonic() + _URGENT_S)
+                until_s = min(until_s, self.clock.monotonic() + _URGENT_S)
             if not self.wakeup.wait(until_s):
                 break
         return condition()

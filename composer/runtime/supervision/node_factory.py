@@ -68,7 +68,8 @@ class NodeFactory:
         self._process: ProcessContext  # set by join()
         self.executors = {executor.name.value: executor for executor in system.executors}
         self.loops: dict[str, Loop] = {}
-        self.chains = Chains(system, tracing=options.tracing)
+        self.clock = options.clock
+        self.chains = Chains(system, self.clock, tracing=options.tracing)
         self.children = ChildProcesses()
         namespace = join(system.namespace, system.name.value)
         self.other_processes = OtherProcesses(
@@ -135,7 +136,9 @@ class NodeFactory:
     def _loop_of(self, executor: Executor) -> Loop:
         name = executor.name.value
         if name not in self.loops:
-            self.loops[name] = Loop(name, _log_exception, executor.kind, executor.threads)
+            self.loops[name] = Loop(
+                name, _log_exception, executor.kind, executor.threads, self.clock
+            )
         return self.loops[name]
 
     def _timeout_s(self, node: Node) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -52,6 +51,7 @@ class NodeSet:
     def __init__(self, system: System, factory: NodeFactory) -> None:
         self._system = system
         self._factory = factory
+        self._clock = factory.clock
         self.nodes: dict[str, ManagedNode] = {}
         self.loops = factory.loops
         self._turn_watch = TurnWatch(self.loops.values)
@@ -229,7 +229,7 @@ class NodeSet:
         minimum_s = _LOOP_ENDS_WITHIN_S + _NODE_REMOVED_WITHIN_S * len(self.nodes)
         self._turn_watch.stop()
         for name, loop in self.loops.items():
-            left_s = 0.0 if name in self.hung else end_s - time.monotonic()
+            left_s = 0.0 if name in self.hung else end_s - self._clock.monotonic()
             if not loop.stop(max(minimum_s, left_s)):
                 self.hung.add(name)
 
@@ -245,7 +245,7 @@ class NodeSet:
             return False
         complete = not self.hung
         for name in reversed(self.nodes):
-            if self.is_lost(name) or time.monotonic() > end_s:
+            if self.is_lost(name) or self._clock.monotonic() > end_s:
                 complete = False
             else:
                 self.nodes[name].destroy()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import field, replace
@@ -178,13 +177,13 @@ def wait_for_step(phase: Phase, main_queue: MainQueue[Item]) -> None:
     On a busy machine, or if it is suspended, this process does not run for a while.
     """
     while True:
-        until_s = min(phase.check_s, time.monotonic() + _SLICE_S)
+        until_s = min(phase.check_s, main_queue.clock.monotonic() + _SLICE_S)
         ended = main_queue.wait(
             lambda: bool(phase.ended), until_s, stoppable=phase.options.stoppable
         )
-        lost_s = time.monotonic() - until_s
+        lost_s = main_queue.clock.monotonic() - until_s
         if lost_s > _SLICE_S:
             phase.postpone(lost_s)
         is_stopped = main_queue.urgent or (main_queue.stopping and phase.options.stoppable)
-        if ended or is_stopped or time.monotonic() >= phase.check_s:
+        if ended or is_stopped or main_queue.clock.monotonic() >= phase.check_s:
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
@@ -48,6 +47,7 @@ class PlanExecutor:
         self._node_set = node_set
         self._desired = desired
         self._main_queue = main_queue
+        self._clock = main_queue.clock
         self._report_failure = report_failure
         self._detached: dict[str, RunningStep] = {}
 
@@ -87,7 +87,7 @@ class PlanExecutor:
                 return
             while phase.ended:
                 self._end(phase.ended.popleft(), phase)
-            if self._main_queue.urgent or time.monotonic() >= phase.check_s:
+            if self._main_queue.urgent or self._clock.monotonic() >= phase.check_s:
                 self._end_late(phase)
         for item in phase.running.values():
             self._detach(item)
@@ -109,7 +109,7 @@ class PlanExecutor:
         """End the steps that have no time left."""
         self._update_start_times(phase.running.values())
         for number, item in tuple(phase.running.items()):
-            if self._main_queue.urgent or time.monotonic() >= item.until_s:
+            if self._main_queue.urgent or self._clock.monotonic() >= item.until_s:
                 self._end(number, phase)
         phase.check_s = min((item.until_s for item in phase.running.values()), default=math.inf)
 
@@ -128,7 +128,7 @@ class PlanExecutor:
     def _start(self, step: Step, after: Sequence[Step], phase: Phase) -> None:
         node = self._node_set.nodes[step.node]
         options = phase.options
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic()
         # A tear-down waits for the steps of earlier plans.
         is_running = step.node in self._detached
         is_possible = step.transition in node.lifecycle.available and not is_running
@@ -188,7 +188,7 @@ class PlanExecutor:
         if not item.future.done():
             if stack:
                 self._node_set.hung.add(node.loop.name)
-            stuck = bool(stack) or self._main_queue.urgent or time.monotonic() >= item.late_s
+            stuck = bool(stack) or self._main_queue.urgent or self._clock.monotonic() >= item.late_s
             reason = "stuck" if stuck else "no time left"
             return StepFailed(item.step, reason, node.state, stuck=stuck, stack=stack)
         if item.future.cancelled():
@@ -216,7 +216,7 @@ class PlanExecutor:
             return node.loop.current_stack()
         running = self._node_set.running_callbacks(item.step.node)
         own = [callback for callback in running if callback.node((node,)) is node]
-        if not own and time.monotonic() < item.late_s:
+        if not own and self._clock.monotonic() < item.late_s:
             return ""
         stack = node.loop.current_stack()
         if running:  # report it now: once it is interrupted, the node may continue
@@ -226,6 +226,6 @@ class PlanExecutor:
         for callback in own or running:
             callback.interrupt()
         if running:
-            until_s = time.monotonic() + _INTERRUPTED_WITHIN_S
+            until_s = self._clock.monotonic() + _INTERRUPTED_WITHIN_S
             self._main_queue.wait(item.future.done, until_s, stoppable=False)
         return stack

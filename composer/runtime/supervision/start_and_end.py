@@ -7,7 +7,6 @@ end tears them down, within the limits of time of :class:`.HostOptions`.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
@@ -83,13 +82,13 @@ class SystemStart:
     def _wait_for_processes(self, within_s: float) -> None:
         """Wait until other processes that run already have reported."""
         processes, queue = self.node_set.other_processes, self.main_queue
-        start_s = time.monotonic()
+        start_s = queue.clock.monotonic()
         while not processes.are_known and not queue.stopping:
             is_certain = processes.is_running_unknown
             limit_s = _RUNNING_REPORT_WITHIN_S if is_certain else _REPORTS_WITHIN_S
-            if time.monotonic() >= start_s + min(limit_s, within_s):
+            if queue.clock.monotonic() >= start_s + min(limit_s, within_s):
                 return
-            queue.wait(lambda: False, time.monotonic() + _POLL_S, stoppable=True)
+            queue.wait(lambda: False, queue.clock.monotonic() + _POLL_S, stoppable=True)
 
     def _bring_up(self, within_s: float) -> str | None:
         serial = self.supervisor.desired.serial
@@ -134,6 +133,7 @@ class SystemEnd:
         self._supervisor = supervisor
         self._node_set = reconciler.node_set
         self._main_queue = reconciler.main_queue
+        self._clock = self._main_queue.clock
         self._reporter = reconciler.reporter
         self._status = reconciler.status
         self._options = options
@@ -164,14 +164,14 @@ class SystemEnd:
         self._reporter.report(Stopping(self._reporter.elapsed_s, self._reason))
         self.keep_entities()
         stop_within_s = self._options.stop_within_s
-        self._end_s = time.monotonic() + stop_within_s
+        self._end_s = self._clock.monotonic() + stop_within_s
         self._node_set.limit_end(self._end_s)
         self._node_set.other_processes.on_stop()
         if is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._end_s, limit_s):
                 self._has_failed = True
-        end_s = time.monotonic() + _MESSAGES_ARRIVE_WITHIN_S
+        end_s = self._clock.monotonic() + _MESSAGES_ARRIVE_WITHIN_S
         self._node_set.other_processes.wait_for_messages(end_s)
         self._summary = self._node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
@@ -188,7 +188,7 @@ class SystemEnd:
         self._status.set_activity("stopped")
         end_s = self._end_s
         if self._main_queue.urgent:
-            end_s = min(end_s, time.monotonic() + _URGENT_S)
+            end_s = min(end_s, self._clock.monotonic() + _URGENT_S)
         self._node_set.stop_loops(end_s)
         self._is_left_to_exit = not self._node_set.destroy(end_s)
         self._has_failed = self._has_failed or self._node_set.has_unfinished()

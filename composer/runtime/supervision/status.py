@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import socket
 import threading
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import SystemGoals, optional_nodes, start_goals
+from composer.runtime.clock.clock import Clock
 from composer.runtime.metrics.message_rate import CountedRate
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.protocol.reports import NodeReport, SystemReport
@@ -24,14 +24,15 @@ _MAX_LENGTH = 500
 class _NodeRates:
     """The rates of a node in this process, from counters that are read every second."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self._sent, self._received = CountedRate(), CountedRate()
         self._at_s = self._busy_s = 0.0
         self.current: dict[str, float | None] = {}
 
     def read(self, counters: Statistics) -> None:
         """Read the counters."""
-        before_s, self._at_s = self._at_s, time.monotonic()
+        before_s, self._at_s = self._at_s, self._clock.monotonic()
         before_busy_s, self._busy_s = self._busy_s, counters.busy_s
 
         def time_of(last_s: float) -> float:
@@ -51,14 +52,16 @@ class _NodeRates:
 class Status:
     """The current status of the system and its nodes. Thread-safe."""
 
-    def __init__(self, system: System, *, is_child: bool = False) -> None:
+    def __init__(self, system: System, clock: Clock, *, is_child: bool = False) -> None:
+        #: The clock of the system.
+        self.clock = clock
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
         self._statistics: Mapping[str, Statistics] = {}
         self._reported: Mapping[str, Mapping[str, Any]] = {}
-        now_s = time.time()
+        now_s = clock.time()
         models = {node.name.value: node for node in system.nodes}
-        self._rates = {name: _NodeRates() for name, node in models.items() if node.in_process}
+        self._rates = {name: _NodeRates(clock) for name, node in models.items() if node.in_process}
         self._topics = {
             name: {port.name.value: port.full_name for port in node.ports}
             for name, node in models.items()
@@ -144,7 +147,7 @@ class Status:
 
     def set_state(self, name: str, state: str) -> None:
         """Set the state of a node."""
-        self._change(name, state=state, since_s=time.time())
+        self._change(name, state=state, since_s=self.clock.time())
 
     def update_states(self, states: Mapping[str, str]) -> None:
         """Set observed states, which may also be transition states."""

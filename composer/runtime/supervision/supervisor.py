@@ -8,7 +8,6 @@ themselves, so every plan is based on all of them (see :mod:`.main_queue`).
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
@@ -45,6 +44,7 @@ class Supervisor:
         self._system = reconciler.system
         self._node_set = reconciler.node_set
         self._main_queue = reconciler.main_queue
+        self._clock = self._main_queue.clock
         self._status = reconciler.status
         self.reconciler = reconciler
         self._shared = reconciler.shared
@@ -99,7 +99,7 @@ class Supervisor:
         nodes are up or their failures are handled, and if the system stops: a failure may have
         ended it.
         """
-        end_s = time.monotonic() + within_s
+        end_s = self._clock.monotonic() + within_s
         self._faults.before = self._node_set.states(), since
         self.set_goals(goals, since, "running")
         self.reconciler.reconcile_settled("bring-up", end_s)
@@ -128,13 +128,13 @@ class Supervisor:
         ``since`` is the serial number of the desired state that the plan is based on.
         """
         before = self._node_set.states()
-        end_s = time.monotonic() + within_s
+        end_s = self._clock.monotonic() + within_s
         options = ExecutionOptions(end_s=end_s, serial=since)
         failures = self.reconciler.execute(plan, options)
         if not failures:
             return None
         step, reason = failures[0].step, failures[0].text
-        if time.monotonic() >= end_s:
+        if self._clock.monotonic() >= end_s:
             reason = f"{step.transition} failed: bring-up timed out after {within_s:g} s"
         self.reconciler.roll_back(before, since, step.full_name, reason)
         return f"{step.full_name}: {reason}"
@@ -175,8 +175,8 @@ class Supervisor:
 
         Without ``run_command``, the first command in the queue ends this, too.
         """
-        while not (self._main_queue.stopping or time.monotonic() >= end_s or until()):
-            now_s = time.monotonic()
+        while not (self._main_queue.stopping or self._clock.monotonic() >= end_s or until()):
+            now_s = self._clock.monotonic()
             due = [item for item in self.desired.scheduled.values() if item.due_s <= now_s]
             if due:
                 self.restart(due)
@@ -218,7 +218,9 @@ class Supervisor:
             name, serial = restart.node, self.desired.serial
             if self.desired.scheduled.get(name) != restart:
                 continue
-            self._shared.update(partial(DesiredState.restart, node=name, at_s=time.monotonic()))
+            self._shared.update(
+                partial(DesiredState.restart, node=name, at_s=self._clock.monotonic())
+            )
             self._status.count_restart(name)
             problem = self._node_set.recreate(name, partial(self.has_moved, name, serial))
             if problem is not None:

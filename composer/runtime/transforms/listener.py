@@ -17,11 +17,12 @@ from rclpy.time import Time
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
-from composer.runtime.clock.sim_time import SimTimeSource
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.repeat_limit import RepeatLimit
+from composer.runtime.node_time.sim_time import SimTimeSource
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.transforms.buffer import TransformBuffer
@@ -54,7 +55,9 @@ class TransformListeners:
         with self._creating:
             if key not in self._listeners:
                 topics = _Topics(self._node, self._loop, router, static, dynamic)
-                self._listeners[key] = TransformListener(topics, self._sim_time, self._warn)
+                self._listeners[key] = TransformListener(
+                    topics, self._loop.clock, self._sim_time, self._warn
+                )
             return self._listeners[key]
 
 
@@ -62,12 +65,16 @@ class TransformListener:
     """Fills a buffer while it has users; the last one that leaves empties it."""
 
     def __init__(
-        self, topics: _Topics, sim_time: SimTimeSource, warn: Callable[[str], None]
+        self,
+        topics: _Topics,
+        clock: Clock,
+        sim_time: SimTimeSource,
+        warn: Callable[[str], None],
     ) -> None:
         self._topics = topics
         self._sim_time = sim_time
         self._warn = warn
-        self._repeats = RepeatLimit(_WARNING_PERIOD_S)
+        self._repeats = RepeatLimit(clock, _WARNING_PERIOD_S)
         self._changing = threading.Lock()
         self._users: dict[object, bool] = {}  # with simulated time, or not
         self._now_ns = 0  # of /clock

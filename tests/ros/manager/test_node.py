@@ -14,6 +14,7 @@ from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
 from composer.plan import bring_up, tear_down
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.diagnostics import diagnostic_array
@@ -230,7 +231,7 @@ def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) ->
 
 
 def test_the_length_of_reported_texts_is_limited(tmp_path: Path) -> None:
-    status = Status(system_of(ROBOT, tmp_path))
+    status = Status(system_of(ROBOT, tmp_path), COMPUTER)
     status.set_error("planner", 10_000 * "x")
     status.set_desired({}, {"planner": 10_000 * "y"}, {})
     report = status.snapshot()

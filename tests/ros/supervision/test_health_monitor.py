@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor, _ObservedCallback
 from composer.runtime.supervision.main_queue import SharedDesiredState
@@ -19,7 +20,8 @@ from composer.runtime.supervision.main_queue import SharedDesiredState
 def test_a_late_check_counts_at_most_as_two(passed_s: float, counted_s: float) -> None:
     """Otherwise every callback would hang after a pause of the computer."""
     node_set: Any = SimpleNamespace(nodes={}, loops={}, hung=set())
-    monitor = HealthMonitor(node_set, SharedDesiredState(), print, Reporter(None))
+    reporter = Reporter(None, COMPUTER)
+    monitor = HealthMonitor(node_set, SharedDesiredState(), print, reporter, COMPUTER)
     assert monitor._period_s == 1.0
     now_s = time.monotonic()
     monitor._forgive_delay(now_s)

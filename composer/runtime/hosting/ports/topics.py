@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -27,6 +26,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.model.qos import Durability
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.sources import Taken
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction, call_in_group
@@ -287,7 +287,9 @@ class HostedSubscription(SubscriptionPort):
         context.loop.add_subscription(subscription, receive)
         if subscription.raw:  # only the middleware has the bytes
             return mailbox.close
-        return context.router.add_subscription(port, subscription, _WithInfo(mailbox))
+        return context.router.add_subscription(
+            port, subscription, _WithInfo(mailbox, context.loop.clock)
+        )
 
     def _destroy_subscription(self) -> None:
         Node.destroy_subscription(self._instance.node, self._given)
@@ -296,14 +298,15 @@ class HostedSubscription(SubscriptionPort):
 class _WithInfo:
     """Adds to messages from this process the information that rclpy has of others."""
 
-    __slots__ = ("_mailbox",)
+    __slots__ = ("_clock", "_mailbox")
 
-    def __init__(self, mailbox: Mailbox) -> None:
+    def __init__(self, mailbox: Mailbox, clock: Clock) -> None:
+        self._clock = clock
         self._mailbox = mailbox
 
     def put(self, message: Any) -> None:
         """Put the message with its information, from any thread."""
-        now_ns = time.time_ns()
+        now_ns = self._clock.time_ns()
         info = {
             "source_timestamp": now_ns,
             "received_timestamp": now_ns,

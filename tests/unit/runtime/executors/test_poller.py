@@ -10,6 +10,7 @@ from time import monotonic
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors import poller as module
 from composer.runtime.executors.poller import Poller
 
@@ -22,7 +23,7 @@ def poller(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> P
         monkeypatch.setattr(module, "_HAS_PWAIT2", False)
     elif not module._HAS_PWAIT2:
         pytest.skip("this Linux has no epoll_pwait2")
-    return Poller()
+    return Poller(COMPUTER)
 
 
 @pytest.fixture

@@ -7,11 +7,12 @@ from time import monotonic
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.base_loop import ScheduledCall, TimerQueue
 
 
 def call(due_s: float, period_s: float | None = None) -> ScheduledCall:
-    return ScheduledCall(due_s, period_s, lambda: None)
+    return ScheduledCall(COMPUTER, due_s, period_s, lambda: None)
 
 
 def take_due(queue: TimerQueue) -> list[ScheduledCall]:
@@ -22,7 +23,7 @@ def take_due(queue: TimerQueue) -> list[ScheduledCall]:
 
 
 def test_pops_due_calls_in_order_and_keeps_the_rest() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     now_s = monotonic()
     late, soon, later = call(now_s - 2.0), call(now_s - 1.0), call(now_s + 60.0)
     for item in (later, soon, late):
@@ -34,7 +35,7 @@ def test_pops_due_calls_in_order_and_keeps_the_rest() -> None:
 
 
 def test_calls_due_at_the_same_time_keep_their_order() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     due_s = monotonic() - 1.0
     calls = [call(due_s) for _ in range(10)]
     for item in calls:
@@ -43,13 +44,13 @@ def test_calls_due_at_the_same_time_keep_their_order() -> None:
 
 
 def test_an_empty_queue_is_never_due() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     assert queue.next_due_s() == queue.next_s == math.inf
     assert take_due(queue) == []
 
 
 def test_a_canceled_call_is_neither_made_nor_waited_for() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     now_s = monotonic()
     due, next_one, last = call(now_s - 1.0), call(now_s + 30.0), call(now_s + 60.0)
     for item in (due, next_one, last):
@@ -62,7 +63,7 @@ def test_a_canceled_call_is_neither_made_nor_waited_for() -> None:
 
 
 def test_canceled_calls_do_not_accumulate() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     for _ in range(10_000):
         item = call(monotonic() + 60.0)
         queue.add(item)
@@ -71,7 +72,7 @@ def test_canceled_calls_do_not_accumulate() -> None:
 
 
 def test_a_periodic_call_keeps_its_phase_and_skips_missed_periods() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     begin_s = monotonic() - 350.0
     item = call(begin_s, period_s=100.0)
     queue.reschedule(item)  # called 3.5 periods late
@@ -80,7 +81,7 @@ def test_a_periodic_call_keeps_its_phase_and_skips_missed_periods() -> None:
 
 
 def test_a_periodic_call_in_time_is_due_one_period_later() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     due_s = monotonic()
     item = call(due_s, period_s=60.0)
     queue.reschedule(item)
@@ -88,7 +89,7 @@ def test_a_periodic_call_in_time_is_due_one_period_later() -> None:
 
 
 def test_a_popped_call_counts_for_the_next_due_time() -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     begin_s = monotonic() - 1.0
     once, often = call(begin_s), call(begin_s + 0.5, period_s=60.0)
     queue.add(once)
@@ -103,7 +104,7 @@ def test_a_popped_call_counts_for_the_next_due_time() -> None:
 
 @pytest.mark.parametrize("period_s", [None, 1.0])
 def test_canceled_and_single_calls_are_not_repeated(period_s: float | None) -> None:
-    queue = TimerQueue()
+    queue = TimerQueue(COMPUTER)
     item = call(monotonic(), period_s)
     if period_s is not None:
         item.cancel()

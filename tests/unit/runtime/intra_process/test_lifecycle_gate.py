@@ -6,21 +6,28 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from math import inf
 from time import monotonic
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.futures import Future
-from composer.runtime.intra_process import lifecycle_gate as module
 from composer.runtime.intra_process.lifecycle_gate import PendingFutures
 
 
 class Clock:
-    """A steady clock that the test advances, and its timers."""
+    """A loop, and its clock that the test advances."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
         self.timers: list[tuple[float, Callable[[], object]]] = []
         self.ordered = 0
+        self.clock = self
+
+    def monotonic(self) -> float:
+        return self.now_s
 
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> None:
         self.ordered += 1
@@ -42,15 +49,13 @@ class TooLate(Exception):
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    clock = Clock()
-    monkeypatch.setattr(module, "monotonic", lambda: clock.now_s)
-    return clock
+def clock() -> Clock:
+    return Clock()
 
 
 @pytest.fixture
 def pending(clock: Clock) -> PendingFutures:
-    return PendingFutures(clock.call_later)
+    return PendingFutures(cast(BaseLoop, clock))
 
 
 def hold(pending: PendingFutures, until_s: float) -> Future[str]:
@@ -144,7 +149,8 @@ def test_a_passed_deadline_ends_it_at_the_next_poll(clock: Clock, pending: Pendi
 
 def test_no_future_is_lost_while_threads_add_and_the_timer_checks() -> None:
     due: list[Callable[[], object]] = []
-    pending = PendingFutures(lambda _, look: due.append(look))
+    loop = SimpleNamespace(clock=COMPUTER, call_later=lambda _, look: due.append(look))
+    pending = PendingFutures(cast(BaseLoop, loop))
 
     def hold_some(_: int) -> list[Future[str]]:
         return [hold(pending, monotonic()) for _ in range(200)]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.process import StartRefused, instance_lock
 from composer.runtime.process.instance_lock import (
     LocalSystems,
@@ -57,7 +58,7 @@ def test_a_start_waits_for_a_process_that_only_looks(
             if next(polls) == 29:
                 fcntl.flock(looking, fcntl.LOCK_UN)
 
-        monkeypatch.setattr("time.sleep", sleep)
+        monkeypatch.setattr(COMPUTER, "sleep", sleep)
         with hold_instance_lock(NAME):
             assert is_held(NAME)
 

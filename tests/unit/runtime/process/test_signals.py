@@ -19,10 +19,11 @@ while os.read(0, 1):
 """
 RECEIVER = f"""
 import os, random, subprocess, sys, time
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.supervision.main_queue import MainQueue
 from composer.runtime.process.signals import stop_signals
 
-main_queue = MainQueue()
+main_queue = MainQueue(COMPUTER)
 sender = subprocess.Popen([sys.executable, "-c", '''{SENDER}'''], stdin=subprocess.PIPE)
 with stop_signals(main_queue.request_stop, main_queue.wakeup, ends_process=True):
     for _ in range({ROUNDS}):

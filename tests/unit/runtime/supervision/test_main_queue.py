@@ -8,12 +8,13 @@ import time
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.supervision import main_queue as module
 from composer.runtime.supervision.main_queue import MainQueue
 
 
 def test_items_are_returned_in_order() -> None:
-    main_queue: MainQueue[int] = MainQueue()
+    main_queue: MainQueue[int] = MainQueue(COMPUTER)
     for number in range(3):
         main_queue.put(number)
     assert [main_queue.get(), main_queue.get(), main_queue.get()] == [0, 1, 2]
@@ -21,7 +22,7 @@ def test_items_are_returned_in_order() -> None:
 
 
 def test_items_are_kept_during_a_wait() -> None:
-    main_queue: MainQueue[str] = MainQueue()
+    main_queue: MainQueue[str] = MainQueue(COMPUTER)
     main_queue.put("later")
     done = []
     threading.Thread(target=lambda: (done.append(True), main_queue.wakeup.wake())).start()
@@ -30,7 +31,7 @@ def test_items_are_kept_during_a_wait() -> None:
 
 
 def test_a_wait_ends_in_time() -> None:
-    main_queue: MainQueue[str] = MainQueue()
+    main_queue: MainQueue[str] = MainQueue(COMPUTER)
     began_s = time.monotonic()
     assert not main_queue.wait(lambda: False, began_s + 0.05, stoppable=True)
     assert main_queue.get(began_s + 0.1) is None
@@ -41,7 +42,7 @@ def test_a_stop_ends_stoppable_waits_and_a_second_one_shortens_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "_SAME_REQUEST_S", 60.0)
-    main_queue: MainQueue[str] = MainQueue()
+    main_queue: MainQueue[str] = MainQueue(COMPUTER)
     main_queue.put("never handled")
     main_queue.request_stop("SIGINT")
     assert main_queue.stopping
@@ -61,7 +62,7 @@ def test_a_stop_ends_stoppable_waits_and_a_second_one_shortens_the_others(
 
 @pytest.mark.parametrize("left_s", [1e9, math.inf])
 def test_the_end_of_a_wait_may_be_years_away(left_s: float) -> None:
-    main_queue: MainQueue[str] = MainQueue()
+    main_queue: MainQueue[str] = MainQueue(COMPUTER)
     main_queue.wakeup.wake()
     assert main_queue.wakeup.wait(time.monotonic() + left_s)
     assert not main_queue.wakeup.wait(time.monotonic() + 0.01)

@@ -183,7 +183,7 @@ class SimTimeSource:
         """Subscribe with ``node``, on ``loop``; call ``warn`` for times that are not valid."""
         self._node = node
         self._warn = warn
-        self._repeats = RepeatLimit(_WARNING_PERIOD_S)
+        self._repeats = RepeatLimit(loop.clock, _WARNING_PERIOD_S)
         self._loop = loop
         self._changing = threading.Lock()  # a follower that has left is not called
         self._followers: set[Follower] = set()

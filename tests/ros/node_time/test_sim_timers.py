@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from composer.runtime.clock.sim_time import NANOSECONDS, SimTimers
+from composer.runtime.node_time.sim_time import NANOSECONDS, SimTimers
 
 
 class Loop:

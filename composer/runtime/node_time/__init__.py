@@ -1,0 +1,1 @@
+"""The time of a node: system time, steady time, or simulated time from /clock."""
