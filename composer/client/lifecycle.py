@@ -1,6 +1,6 @@
 """The lifecycle of nodes in other processes.
 
-It uses the standard services (lifecycle_msgs) only, so it works with every lifecycle node. A
+It uses the standard services (lifecycle_msgs), so it works with every lifecycle node. A
 transition is requested only if the node lists it as available: an invalid request ends the process
 of an rclpy lifecycle node.
 """
@@ -18,14 +18,8 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from composer.base.fast_dataclass import dataclass
 from composer.client.graph_names import check_all_respond, find_node, not_found_error
-from composer.client.requests import (
-    Call,
-    call_all_with_retries,
-    call_once,
-    call_with_retries,
-)
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.client.systems.proxies import LIFECYCLE, Proxies
+from composer.client.systems.node_services import NodeServices
 
 PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
 _PATTERN = re.compile(r"[*?\[]")
@@ -36,8 +30,6 @@ _NEXT_TRANSITION = {
     "active": {"unconfigured": "configure", "inactive": "activate"},
     "finalized": dict.fromkeys(("unconfigured", "inactive", "active"), "shutdown"),
 }
-_STATE_SERVICE = "/get_state"
-_STATE_TYPE = "lifecycle_msgs/srv/GetState"
 
 
 class TransitionError(RosError):
@@ -65,31 +57,13 @@ class CompletedTransition:
         return f"{self.node}: {self.before} -> {self.after}"
 
 
-#: The transitions of each state (lifecycle_msgs), for nodes without services of their own.
-_AVAILABLE = {
-    "unconfigured": (
-        Transition(TransitionMessage.TRANSITION_CONFIGURE, "configure", "configuring"),
-        Transition(TransitionMessage.TRANSITION_UNCONFIGURED_SHUTDOWN, "shutdown", "shuttingdown"),
-    ),
-    "inactive": (
-        Transition(TransitionMessage.TRANSITION_CLEANUP, "cleanup", "cleaningup"),
-        Transition(TransitionMessage.TRANSITION_ACTIVATE, "activate", "activating"),
-        Transition(TransitionMessage.TRANSITION_INACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
-    ),
-    "active": (
-        Transition(TransitionMessage.TRANSITION_DEACTIVATE, "deactivate", "deactivating"),
-        Transition(TransitionMessage.TRANSITION_ACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
-    ),
-}
-
-
 class LifecycleClient:
     """Queries and changes lifecycle nodes, all within one time limit."""
 
     def __init__(self, session: Session, deadline: Deadline) -> None:
         self._session = session
         self._deadline = deadline
-        self._proxies = Proxies(session)
+        self._services = NodeServices(session)
         for service in (GetState, GetAvailableTransitions, ChangeState):
             check_is_valid_srv_type(service)  # takes 0.1 s, during which discovery runs
 
@@ -123,34 +97,23 @@ class LifecycleClient:
 
     def state(self, node: str) -> str:
         """Return the label of the node's state. Raises NoResponseError."""
-        if self._manager(node):
-            return self._proxies.state(node)
-        response = self._call(call_with_retries, node, GetState, "get_state", GetState.Request())
+        response = self._call(node, GetState, "get_state", GetState.Request())
         return str(response.current_state.label)
 
     def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
         """Return the label of each node's state, None for nodes that did not respond in time."""
-        names = tuple(nodes)
-        reported: dict[str, str | None] = {
-            node: self._proxies.state(node) for node in names if self._manager(node)
-        }
-        services = {f"{node}/get_state": node for node in names if node not in reported}
-        responses = call_all_with_retries(
-            self._session, GetState, services, GetState.Request(), self._deadline
-        )
-        return reported | {
-            node: None if response is None else str(response.current_state.label)
-            for node, response in zip(services.values(), responses.values(), strict=True)
+        services = {f"{node}/get_state": node for node in nodes}
+        requests = dict.fromkeys(services, GetState.Request())
+        responses = self._services.call_all(GetState, requests, self._deadline)
+        return {
+            node: None if responses[name] is None else str(responses[name].current_state.label)
+            for name, node in services.items()
         }
 
     def transitions(self, node: str) -> tuple[Transition, ...]:
         """Return the transitions that are available now. Raises NoResponseError."""
-        if self._manager(node):
-            return _AVAILABLE.get(self._proxies.state(node), ())
         request = GetAvailableTransitions.Request()
-        response = self._call(
-            call_with_retries, node, GetAvailableTransitions, "get_available_transitions", request
-        )
+        response = self._call(node, GetAvailableTransitions, "get_available_transitions", request)
         return tuple(
             Transition(item.transition.id, item.transition.label, item.goal_state.label)
             for item in response.available_transitions
@@ -168,8 +131,12 @@ class LifecycleClient:
             raise TransitionError(
                 f"'{label}' is not possible: {node} is {before}", _hint(before, available)
             )
-        success, after = self._request(node, before, transition)
-        if not success:
+        # The label makes the request fail cleanly if the state has changed in the meantime.
+        message = TransitionMessage(id=transition.id, label=label)
+        request = ChangeState.Request(transition=message)
+        response = self._call(node, ChangeState, "change_state", request, once=True)
+        after = self.state(node)
+        if not response.success:
             raise TransitionError(
                 f"'{label}' of {node} failed: it is {after} now", "see its log for the reason"
             )
@@ -217,38 +184,17 @@ class LifecycleClient:
 
         return self._session.wait_for(primary, self._deadline) or self.state(node)
 
-    def _request(self, node: str, before: str, transition: Transition) -> tuple[bool, str]:
-        """Request a transition; return whether it succeeded, and the state after it."""
-        manager = self._manager(node)
-        # The label makes the request fail cleanly if the state has changed in the meantime.
-        label = f"{node} {transition.label}" if manager else transition.label
-        message = TransitionMessage(id=transition.id, label=label)
-        request = ChangeState.Request(transition=message)
-        response = self._call(call_once, manager or node, ChangeState, "change_state", request)
-        success = bool(response.success)
-        if not manager:
-            return success, self.state(node)
-        return success, self._proxies.wait_for_state(
-            node, before if success else None, self._deadline
-        )
-
-    def _manager(self, node: str) -> str | None:
-        """Return the manager that provides the lifecycle services of a node, or None."""
-        return self._proxies.nodes(LIFECYCLE).get(node)
-
     def known(self) -> tuple[str, ...]:
         """Return the full names of the lifecycle nodes discovered so far."""
-        self._proxies.discover(self._deadline)
-        with_services = {
-            name.removesuffix(_STATE_SERVICE)
-            for name, types in self._session.graph.services()
-            if name.endswith(_STATE_SERVICE) and _STATE_TYPE in types
-        }
-        return tuple(sorted(with_services | self._proxies.nodes(LIFECYCLE).keys()))
+        return tuple(sorted(self._services.nodes("get_state", GetState, self._deadline)))
 
-    def _call(self, send: Call, node: str, service: Any, name: str, request: Any) -> Any:
+    def close(self) -> None:
+        """Destroy clients and subscriptions; the end of the session does so too."""
+        self._services.close()
+
+    def _call(self, node: str, kind: Any, name: str, request: Any, *, once: bool = False) -> Any:
         try:
-            return send(self._session, service, f"{node}/{name}", request, self._deadline)
+            return self._services.call(kind, f"{node}/{name}", request, self._deadline, once=once)
         except NoResponseError as error:
             raise NoResponseError(
                 f"{node} did not respond within {self._deadline.timeout_s:g} s",

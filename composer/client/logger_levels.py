@@ -10,8 +10,8 @@ from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 
 from composer.client.graph_names import GraphNames
-from composer.client.requests import call_all_with_retries, call_once, call_with_retries
-from composer.client.session import Deadline, RosError, Session
+from composer.client.requests import call_all_with_retries, call_once
+from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.systems.managers import DISCOVERY_S, Systems
 from composer.model import SEVERITIES, LogLevel
 from composer.runtime.callbacks.log import logger_name
@@ -48,10 +48,7 @@ class LoggerLevels:
             by_server.setdefault(server, []).append(node)
         levels: dict[str, str | None] = dict.fromkeys(sorted(servers))
         for server, nodes in by_server.items():
-            service = f"{server}/{_GET}"
-            response = call_all_with_retries(
-                self._session, GetLoggerLevels, [service], _question(nodes), self._deadline
-            )[service]
+            response = self._levels(server, nodes)
             if response is not None:
                 levels.update(zip(nodes, map(_name_of, response.levels), strict=False))
         return levels
@@ -62,9 +59,10 @@ class LoggerLevels:
         Raises NotFoundError; RosError if the level of the node cannot be read.
         """
         found, server = self._find(node)
-        response = call_with_retries(
-            self._session, GetLoggerLevels, f"{server}/{_GET}", _question([found]), self._deadline
-        )
+        response = self._levels(server, [found])
+        if response is None:
+            text = f"{server} did not respond within {self._deadline.timeout_s:g} s"
+            raise NoResponseError(text)
         return found, _name_of(response.levels[0])
 
     def set(self, node: str, level: LogLevel) -> str:
@@ -80,6 +78,13 @@ class LoggerLevels:
         if not result.successful:
             raise LevelRejectedError(f"{found} did not set its log level: {result.reason}")
         return found
+
+    def _levels(self, server: str, nodes: list[str]) -> GetLoggerLevels.Response | None:
+        service = f"{server}/{_GET}"
+        request = GetLoggerLevels.Request(names=list(map(logger_name, nodes)))
+        return call_all_with_retries(
+            self._session, GetLoggerLevels, [service], request, self._deadline
+        )[service]
 
     def _find(self, node: str) -> tuple[str, str]:
         """Return the full name of a node, and the node with the services for it."""
@@ -112,10 +117,6 @@ class LoggerLevels:
             if name.endswith(f"/{_GET}") and _GET_TYPE in types
         )
         return of_managers | {node: node for node in own}
-
-
-def _question(nodes: list[str]) -> GetLoggerLevels.Request:
-    return GetLoggerLevels.Request(names=list(map(logger_name, nodes)))
 
 
 def _name_of(level: LoggerLevel) -> str:

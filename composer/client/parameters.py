@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import closing
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -17,22 +16,14 @@ from rclpy.parameter import Parameter
 
 from composer.base.diagnostics import suggestion
 from composer.client.graph_names import GraphNames
-from composer.client.requests import (
-    Call,
-    ServiceCaller,
-    call_all_with_retries,
-    call_once,
-    call_with_retries,
-)
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.client.systems.proxies import PARAMETERS, Proxies
+from composer.client.systems.node_services import NodeServices
 from composer.language.tree import Plain
-from composer.runtime.protocol.requests import ParameterDescription, full_parameter_name
+from composer.model.names import is_hidden
+from composer.runtime.protocol.requests import ParameterDescription
 from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value
 
 T = TypeVar("T")
-
-_LIST_SERVICE = "/list_parameters"
 
 
 class UnknownParameterError(RosError):
@@ -54,24 +45,25 @@ class ParameterClient:
         self._session = session
         self._deadline = deadline
         self.node = GraphNames(session, deadline).find_node(node)
-        manager = _manager(session, deadline, self.node)
-        #: The node with the services, and the prefix of the parameter names there.
-        self._server, self._prefix = (
-            (manager, full_parameter_name(self.node, "")) if manager else (self.node, "")
-        )
+        self._services = NodeServices(session)
+        # Its manager may have the services: wait until that, or the node itself, is discovered.
+        session.search(self._has_services, deadline)
+
+    def close(self) -> None:
+        """Destroy clients and subscriptions; the end of the session does so too."""
+        self._services.close()
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all parameters, sorted. Raises NoResponseError."""
-        request = ListParameters.Request(prefixes=[self.node] if self._prefix else [])
-        response = self._call(call_with_retries, ListParameters, "list_parameters", request)
-        return tuple(sorted(name.removeprefix(self._prefix) for name in response.result.names))
+        response = self._call(ListParameters, "list_parameters", ListParameters.Request())
+        return tuple(sorted(response.result.names))
 
     def values(self, names: Iterable[str]) -> dict[str, Any]:
         """Return the values of parameters, None if not set. Raises UnknownParameterError."""
         requested = list(names)
         self._check_known(requested)
-        request = GetParameters.Request(names=self._qualified(requested))
-        response = self._call(call_with_retries, GetParameters, "get_parameters", request)
+        request = GetParameters.Request(names=requested)
+        response = self._call(GetParameters, "get_parameters", request)
         return {
             name: plain_value(value) for name, value in self._by_name(requested, response.values)
         }
@@ -80,8 +72,8 @@ class ParameterClient:
         """Return the descriptions of parameters. Raises UnknownParameterError."""
         requested = list(names)
         self._check_known(requested)
-        request = DescribeParameters.Request(names=self._qualified(requested))
-        response = self._call(call_with_retries, DescribeParameters, "describe_parameters", request)
+        request = DescribeParameters.Request(names=requested)
+        response = self._call(DescribeParameters, "describe_parameters", request)
         return tuple(
             description(name, found)
             for name, found in self._by_name(requested, response.descriptors)
@@ -95,13 +87,8 @@ class ParameterClient:
         """
         types = {item.name: item.type for item in self.describe(values)}
         messages = [_message(name, value, types[name]) for name, value in values.items()]
-        request = SetParameters.Request(
-            parameters=[
-                ParameterMessage(name=f"{self._prefix}{item.name}", value=item.value)
-                for item in messages
-            ]
-        )
-        response = self._call(call_once, SetParameters, "set_parameters", request)
+        request = SetParameters.Request(parameters=messages)
+        response = self._call(SetParameters, "set_parameters", request, once=True)
         rejected = [
             f"{name}: {result.reason or 'no reason given'}"
             for name, result in self._by_name(list(values), response.results)
@@ -117,9 +104,8 @@ class ParameterClient:
         Nodes delete only parameters that they declared without a fixed type.
         """
         self._check_known([name])
-        (qualified,) = self._qualified([name])
-        request = SetParameters.Request(parameters=[ParameterMessage(name=qualified)])
-        (result,) = self._call(call_once, SetParameters, "set_parameters", request).results
+        request = SetParameters.Request(parameters=[ParameterMessage(name=name)])
+        (result,) = self._call(SetParameters, "set_parameters", request, once=True).results
         if not result.successful:
             reason = result.reason or "no reason given"
             raise ParameterRejectedError(f"{self.node} did not delete {name}: {reason}")
@@ -156,13 +142,15 @@ class ParameterClient:
                     f"{self.node} has no parameter '{name}'", suggestion(name, known)
                 )
 
-    def _qualified(self, names: Iterable[str]) -> list[str]:
-        """Return the names of parameters at the node with the services."""
-        return [f"{self._prefix}{name}" for name in names]
+    def _has_services(self) -> bool | None:
+        name = f"{self.node}/list_parameters"
+        return self._services.is_offered(name, self._deadline) or None
 
-    def _call(self, send: Call, service: Any, name: str, request: Any) -> Any:
+    def _call(self, kind: Any, name: str, request: Any, *, once: bool = False) -> Any:
         try:
-            return send(self._session, service, f"{self._server}/{name}", request, self._deadline)
+            return self._services.call(
+                kind, f"{self.node}/{name}", request, self._deadline, once=once
+            )
         except NoResponseError as error:
             raise NoResponseError(
                 f"{self.node} did not respond within {self._deadline.timeout_s:g} s",
@@ -174,54 +162,17 @@ def names_by_node(
     session: Session, deadline: Deadline, *, hidden: bool = False
 ) -> dict[str, list[str] | None]:
     """Return the parameter names of all nodes, None for nodes that did not respond in time."""
-    # Nodes without parameter services are left out.
-    services = {
-        name: name.removesuffix(_LIST_SERVICE)
-        for name, _ in GraphNames(session, deadline).names("service", hidden=hidden)
-        if name.endswith(_LIST_SERVICE)
+    with NodeServices(session) as services:
+        found = session.wait_until_settled(
+            lambda: frozenset(services.nodes("list_parameters", ListParameters, deadline)), deadline
+        )
+        nodes = sorted(node for node in found if hidden or not is_hidden(node))
+        requests = {f"{node}/list_parameters": ListParameters.Request() for node in nodes}
+        responses = services.call_all(ListParameters, requests, deadline)
+    return {
+        node: None if response is None else sorted(response.result.names)
+        for node, response in zip(nodes, responses.values(), strict=True)
     }
-    proxies = Proxies(session)
-    proxies.discover(deadline)
-    responses = call_all_with_retries(
-        session, ListParameters, services, ListParameters.Request(), deadline
-    )
-    listed = {
-        node: None if responses[name] is None else sorted(responses[name].result.names)
-        for name, node in services.items()
-    }
-    managers = proxies.nodes(PARAMETERS)
-    proxies.close()
-    own = {
-        manager: names and [name for name in names if not name.startswith("/")]
-        for manager in managers.values()
-        if (names := listed.get(manager)) is not None
-    }
-    proxied = {node: _of_node(node, listed.get(manager)) for node, manager in managers.items()}
-    return listed | own | proxied
-
-
-def _of_node(node: str, listed: list[str] | None) -> list[str] | None:
-    """Return the names of a node's parameters from the list of its manager."""
-    if listed is None:
-        return None
-    prefix = full_parameter_name(node, "")
-    return [name.removeprefix(prefix) for name in listed if name.startswith(prefix)]
-
-
-def _manager(session: Session, deadline: Deadline, node: str) -> str | None:
-    """Return the manager with the parameter services of a node, None if the node has its own."""
-    proxies = Proxies(session)
-
-    def server() -> str | None:
-        names = (name for name, _ in session.graph.services())
-        if f"{node}{_LIST_SERVICE}" in names:
-            return ""
-        proxies.discover(deadline)
-        return proxies.nodes(PARAMETERS).get(node)
-
-    found = session.search(server, deadline)
-    proxies.close()
-    return found or None
 
 
 def _message(name: str, value: Any, kind: str) -> ParameterMessage:
@@ -251,8 +202,6 @@ def _converted(value: Any, kind: str) -> Any:
 
 #: How long to wait for the responses of nodes; the parameters of later ones have no description.
 _RESPONSE_S = 2.0
-_SERVICE = "describe_parameters"
-_TYPE = "rcl_interfaces/srv/DescribeParameters"
 
 
 def parameter_settings(
@@ -263,20 +212,21 @@ def parameter_settings(
     ``names`` are the parameters of each node. Nodes without the service, or that do not respond,
     are left out.
     """
-    known = {name for name, types in session.graph.services() if _TYPE in types}
-    requests = {
-        f"{node}/{_SERVICE}": (node, list(parameters))
-        for node, parameters in names.items()
-        if f"{node}/{_SERVICE}" in known
-    }
-    with closing(ServiceCaller(session)) as caller:
-        responses = caller.call_all(
+    limit = Deadline(min(_RESPONSE_S, deadline.left_s))
+    with NodeServices(session) as services:
+        known = services.nodes("describe_parameters", DescribeParameters, limit)
+        requests = {
+            f"{node}/describe_parameters": (node, list(parameters))
+            for node, parameters in names.items()
+            if node in known
+        }
+        responses = services.call_all(
             DescribeParameters,
             {
                 service: DescribeParameters.Request(names=listed)
                 for service, (_, listed) in requests.items()
             },
-            Deadline(min(_RESPONSE_S, deadline.left_s)),
+            limit,
         )
     found: dict[str, dict[str, dict[str, Plain]]] = {}
     for service, (node, listed) in requests.items():

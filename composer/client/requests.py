@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import closing
-from typing import Any, TypeAlias
+from typing import Any
 
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
@@ -28,9 +28,6 @@ _KNOWN_WITHIN_S = 2.0
 #: A service that most nodes have, and that changes nothing.
 _READ_SERVICE = "get_parameters"
 _READ_TYPE = "rcl_interfaces/srv/GetParameters"
-
-#: How to send a request: :func:`call_with_retries` or :func:`call_once`.
-Call: TypeAlias = Callable[[Session, Any, str, Any, Deadline], Any]
 
 
 class ServiceCaller:
@@ -55,7 +52,11 @@ class ServiceCaller:
 
         A request without a response is sent again every second.
         """
-        return self._call(service, requests, deadline, _RETRY_AFTER_S)
+        return self.call_each({name: (service, item) for name, item in requests.items()}, deadline)
+
+    def call_each(self, calls: Mapping[str, tuple[Any, Any]], deadline: Deadline) -> dict[str, Any]:
+        """Return the same as :meth:`call_all`, with the class of each service and its request."""
+        return self._call(calls, deadline, _RETRY_AFTER_S)
 
     def call_once(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
         """Return the response to a request that is sent only once. Raises NoResponseError."""
@@ -68,25 +69,25 @@ class ServiceCaller:
         if servers != self._knowing.get(name):
             wait_until_known(self._session, name, deadline)
             self._knowing[name] = servers
-        return _required(self._call(service, {name: request}, deadline, math.inf), deadline)
+        return _required(self._call({name: (service, request)}, deadline, math.inf), deadline)
 
     def _call(
-        self, service: Any, requests: Mapping[str, Any], deadline: Deadline, retry_after_s: float
+        self, calls: Mapping[str, tuple[Any, Any]], deadline: Deadline, retry_after_s: float
     ) -> dict[str, Any]:
-        calls = {
+        sent = {
             name: _PendingCall(self._client(service, name), request, retry_after_s)
-            for name, request in requests.items()
+            for name, (service, request) in calls.items()
         }
         try:
-            pending = list(calls.values())
+            pending = list(sent.values())
             while pending and not deadline.passed:
                 for call in pending:
                     call.send_if_due()
                 self._session.spin_once(deadline)
                 pending = [call for call in pending if call.response is None]
-            return {name: call.response for name, call in calls.items()}
+            return {name: call.response for name, call in sent.items()}
         finally:
-            for call in calls.values():
+            for call in sent.values():
                 call.cancel()
 
     def _client(self, service: Any, name: str) -> Client:
@@ -116,14 +117,6 @@ def call_all_with_retries(
     """Send a read request to services of one type; None for those that did not respond in time."""
     with closing(ServiceCaller(session)) as caller:
         return caller.call_all(service, dict.fromkeys(names, request), deadline)
-
-
-def call_with_retries(
-    session: Session, service: Any, name: str, request: Any, deadline: Deadline
-) -> Any:
-    """Return the response to a request that changes nothing. Raises NoResponseError."""
-    responses = call_all_with_retries(session, service, [name], request, deadline)
-    return _required(responses, deadline)
 
 
 def call_once(session: Session, service: Any, name: str, request: Any, deadline: Deadline) -> Any:

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Self
+from collections.abc import Collection
+from typing import Any, Self
 
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
 
 from composer.client.messages.rates import RateMeter
-from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, Session
-from composer.client.systems.proxies import LIFECYCLE, PARAMETERS, Proxies
+from composer.client.systems.node_services import NodeServices
 from composer.language.tree import Plain
-from composer.model import PortKind
 from composer.model.names import is_hidden
-from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
-from composer.runtime.protocol.requests import full_parameter_name
+from composer.plan.drift import ObservedNode, Snapshot
 from composer.runtime.ros.parameter_values import plain_value
 from composer.runtime.ros_graph.node_endpoints import endpoints, node_names, visible_topics
 
 #: How long to wait for the responses of nodes; later ones count as unknown.
 _RESPONSE_S = 2.0
-_STATE_TYPE = "lifecycle_msgs/srv/GetState"
-_LIST_TYPE = "rcl_interfaces/srv/ListParameters"
 
 
 class GraphObserver:
@@ -32,15 +27,13 @@ class GraphObserver:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._caller = ServiceCaller(session)
-        self._proxies = Proxies(session)
+        self._services = NodeServices(session)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._caller.close()
-        self._proxies.close()
+        self._services.close()
 
     def snapshot(self, deadline: Deadline) -> Snapshot:
         """Return the graph once discovery is complete, or at the deadline."""
@@ -48,10 +41,8 @@ class GraphObserver:
         graph = session.graph
         ends = dict(session.wait_until_settled(lambda: endpoints(graph), deadline))
         counts = Counter(node_names(graph))
-        services = _services(ends)
-        self._proxies.discover(self._response_deadline(deadline))
-        states = self._states(services, deadline) | self._proxy_states()
-        parameters = self._parameters(services, deadline)
+        states = self._states(ends.keys(), deadline)
+        parameters = self.parameters(ends.keys(), deadline)
         return Snapshot(
             tuple(
                 ObservedNode(
@@ -65,13 +56,6 @@ class GraphObserver:
             )
         )
 
-    def parameters(
-        self, ends: Mapping[str, Sequence[ObservedEndpoint]], deadline: Deadline
-    ) -> dict[str, dict[str, Plain] | None]:
-        """Return the parameters of nodes with these endpoints, None without a response."""
-        self._proxies.discover(self._response_deadline(deadline))
-        return self._parameters(_services(ends), deadline)
-
     def rates(self, deadline: Deadline, measure_s: float) -> dict[str, float]:
         """Return the message rate of each topic in Hz, measured for ``measure_s``.
 
@@ -83,90 +67,47 @@ class GraphObserver:
         with RateMeter(self._session, visible_topics(self._session.graph)) as meter:
             return meter.measure(min(measure_s, deadline.left_s))
 
-    def _states(
-        self, services: dict[str, dict[str, str]], deadline: Deadline
-    ) -> dict[str, str | None]:
-        nodes = _offering(services, "get_state", _STATE_TYPE)
-        responses = self._caller.call_all(
-            GetState,
-            {name: GetState.Request() for name in nodes},
-            self._response_deadline(deadline),
-        )
+    def _states(self, nodes: Collection[str], deadline: Deadline) -> dict[str, str | None]:
+        responses = self._responses(nodes, "get_state", GetState, deadline)
         return {
-            node: None if responses[name] is None else str(responses[name].current_state.label)
-            for name, node in nodes.items()
+            node: None if response is None else str(response.current_state.label)
+            for node, response in responses.items()
         }
 
-    def _proxy_states(self) -> dict[str, str | None]:
-        """Return the states of nodes without services of their own, from their managers."""
-        return {node: self._proxies.state(node) for node in self._proxies.nodes(LIFECYCLE)}
-
-    def _parameters(
-        self, services: dict[str, dict[str, str]], deadline: Deadline
+    def parameters(
+        self, nodes: Collection[str], deadline: Deadline
     ) -> dict[str, dict[str, Plain] | None]:
-        nodes = _offering(services, "list_parameters", _LIST_TYPE)
-        listed = self._caller.call_all(
-            ListParameters,
-            {name: ListParameters.Request() for name in nodes},
-            self._response_deadline(deadline),
-        )
+        """Return the parameters of those of the nodes that have any, None without a response."""
+        responses = self._responses(nodes, "list_parameters", ListParameters, deadline)
         names = {
-            node: sorted(listed[name].result.names)
-            for name, node in nodes.items()
-            if listed[name] is not None
+            f"{node}/get_parameters": sorted(response.result.names)
+            for node, response in responses.items()
+            if response is not None
         }
-        values = self._caller.call_all(
+        values = self._services.call_all(
             GetParameters,
-            {
-                f"{node}/get_parameters": GetParameters.Request(names=listed_names)
-                for node, listed_names in names.items()
-            },
+            {service: GetParameters.Request(names=listed) for service, listed in names.items()},
             self._response_deadline(deadline),
         )
-        found: dict[str, dict[str, Plain] | None] = dict.fromkeys(nodes.values())
-        for node, listed_names in names.items():
-            response = values[f"{node}/get_parameters"]
-            if response is not None and len(response.values) == len(listed_names):
-                found[node] = dict(
-                    zip(listed_names, map(plain_value, response.values), strict=True)
+        found: dict[str, dict[str, Plain] | None] = dict.fromkeys(responses)
+        for service, listed in names.items():
+            response = values[service]
+            if response is not None and len(response.values) == len(listed):
+                found[service.rpartition("/")[0]] = dict(
+                    zip(listed, map(plain_value, response.values), strict=True)
                 )
-        return self._from_managers(found)
+        return found
 
-    def _from_managers(
-        self, found: dict[str, dict[str, Plain] | None]
-    ) -> dict[str, dict[str, Plain] | None]:
-        """Move the parameters that managers list for other nodes to these nodes."""
-        proxied: dict[str, dict[str, Plain] | None] = {}
-        for node, manager in self._proxies.nodes(PARAMETERS).items():
-            values, prefix = found.get(manager), full_parameter_name(node, "")
-            proxied[node] = values and {
-                name.removeprefix(prefix): value
-                for name, value in values.items()
-                if name.startswith(prefix)
-            }
-        own = {
-            node: values and {name: values[name] for name in values if not name.startswith("/")}
-            for node, values in found.items()
-        }
-        return own | proxied
+    def _responses(
+        self, nodes: Collection[str], service: str, kind: Any, deadline: Deadline
+    ) -> dict[str, Any]:
+        """Return the response to an empty request of each node that has a service."""
+        limit = self._response_deadline(deadline)
+        offering = self._services.nodes(service, kind, limit)
+        asked = [node for node in nodes if node in offering and not is_hidden(node)]
+        requests = {f"{node}/{service}": kind.Request() for node in asked}
+        responses = self._services.call_all(kind, requests, self._response_deadline(deadline))
+        return dict(zip(asked, responses.values(), strict=True))
 
     def _response_deadline(self, deadline: Deadline) -> Deadline:
         return Deadline(min(_RESPONSE_S, deadline.left_s))
-
-
-def _services(ends: Mapping[str, Sequence[ObservedEndpoint]]) -> dict[str, dict[str, str]]:
-    """Return the services of each node that is not hidden, with their types."""
-    return {
-        node: {end.name: end.type for end in found if end.kind is PortKind.SERVICE}
-        for node, found in ends.items()
-        if not is_hidden(node)
-    }
-
-
-def _offering(services: dict[str, dict[str, str]], last: str, type_name: str) -> dict[str, str]:
-    """Return the nodes with a service of that name and type, by the full name of the service."""
-    return {
-        f"{node}/{last}": node
-        for node, offered in services.items()
-        if offered.get(f"{node}/{last}") == type_name
-    }

@@ -111,8 +111,9 @@ class Introspection:
 
     ``parameters``: the parameter services (rcl_interfaces); ``rosout``: the publisher of its log on
     /rosout; ``type_description``: the service of that name; ``lifecycle_services``: those of
-    lifecycle_msgs; ``logger_services``: those for the levels of loggers (rcl_interfaces). The
-    manager node serves parameters, lifecycle and levels for nodes without these services.
+    lifecycle_msgs; ``logger_services``: those for the levels of loggers (rcl_interfaces). Commands
+    ask the manager node for the parameters, the lifecycle and the levels of nodes without these
+    services.
     """
 
     parameters: bool = True

@@ -188,8 +188,6 @@ def _manager(namespace: str, system: System) -> Profile:
     profile.allow(PortKind.SERVICE, *_COMMANDS, *PARAMETER_SERVICES, *LOGGER_SERVICES)
     profile.allow(PortKind.SERVICE, "get_type_description")
     profile.allow(PortKind.SERVICE, "_instance_*")
-    if any(node.introspection.left_to_manager for node in system.nodes):
-        profile.allow(PortKind.SERVICE, "change_state")
     profile.allow(PortKind.CLIENT, "_instance_*")
     for node in system.nodes:
         for port in node.transforms.ports if node.transforms is not None else ():

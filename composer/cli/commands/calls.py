@@ -77,7 +77,7 @@ def call(
     with ros_session("compose service", timeout) as (session, deadline):
         from composer.client.calls import ServiceRequest, call_service
         from composer.client.graph_names import GraphNames, full_name
-        from composer.client.messages.values import to_plain
+        from composer.runtime.ros.messages import to_plain
 
         name = full_name("service", service)
         service_type = type_name or GraphNames(session, deadline).only_type("service", name)
@@ -144,8 +144,8 @@ def send_goal(
         from composer.client.calls import GoalRequest
         from composer.client.calls import send_goal as send
         from composer.client.graph_names import GraphNames, full_name
-        from composer.client.messages.values import to_plain
         from composer.client.session import Deadline
+        from composer.runtime.ros.messages import to_plain
 
         name = full_name("action", action)
         action_type = type_name or GraphNames(session, deadline).only_type("action", name)

@@ -154,7 +154,8 @@ def pub(
     with ros_session("compose topic", timeout, carries_messages=True) as (session, deadline):
         from composer.client.graph_names import full_name
         from composer.client.messages.topics import NotAcknowledgedError, Publication, publish
-        from composer.client.messages.values import class_of, compile_content, to_plain
+        from composer.client.messages.values import class_of, compile_content
+        from composer.runtime.ros.messages import to_plain
 
         publication = Publication(
             topic=full_name("topic", topic),

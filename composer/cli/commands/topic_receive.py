@@ -146,7 +146,8 @@ def echo(
     with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
         from composer.client.graph_names import full_name
         from composer.client.messages.topics import Topics, TopicSubscription
-        from composer.client.messages.values import part, to_plain
+        from composer.client.messages.values import part
+        from composer.runtime.ros.messages import to_plain
 
         topics = Topics(session, deadline)
         name = full_name("topic", topic)

@@ -21,6 +21,7 @@ from composer.runtime.ros.messages import (
     compile_message,
     convert_message,
     interface_class,
+    to_plain,
 )
 
 
@@ -115,19 +116,6 @@ def build_message(content: str | Mapping[str, Any], message_type: Any, what: str
         return convert_message(content, message_type, what)
     except MessageError as error:
         raise InvalidValueError(str(error), error.hint) from error
-
-
-def to_plain(value: Any) -> Any:
-    """Return a message, or a part of one, as dicts, lists and scalars."""
-    if hasattr(value, "get_fields_and_field_types"):
-        return {name: to_plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    if isinstance(value, bytes):
-        return value[0] if len(value) == 1 else list(value)
-    if isinstance(value, array) or hasattr(value, "tolist"):
-        return value.tolist()
-    if isinstance(value, list | tuple):
-        return [to_plain(item) for item in value]
-    return value
 
 
 def to_short_plain(value: Any, max_items: int) -> Any:

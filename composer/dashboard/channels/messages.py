@@ -125,7 +125,8 @@ class PlotFeed(Feed):
 
 def _number(message: Any, path: str) -> Any:
     """Return the number at a path of a message. Raises InvalidValueError, BadRequestError."""
-    from composer.client.messages.values import part, to_plain
+    from composer.client.messages.values import part
+    from composer.runtime.ros.messages import to_plain
 
     value = to_plain(part(message, path))
     if not isinstance(value, int | float):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -78,9 +79,10 @@ class ParametersFeed(Feed):
 
         found: str | RequestError
         try:
-            client = ParameterClient(self.ros.session, Deadline(_READ_WITHIN_S), self._node)
-            names = client.names()
-            descriptions, values = client.describe(names), client.values(names)
+            deadline = Deadline(_READ_WITHIN_S)
+            with closing(ParameterClient(self.ros.session, deadline, self._node)) as client:
+                names = client.names()
+                descriptions, values = client.describe(names), client.values(names)
             parameters = [self._parameter(asdict(item), values[item.name]) for item in descriptions]
             found = to_json({"node": client.node, "parameters": parameters})
         except RosError as error:

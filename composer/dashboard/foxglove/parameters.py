@@ -6,6 +6,7 @@ import base64
 import binascii
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from composer.base.fast_dataclass import dataclass
@@ -225,7 +226,8 @@ def _for_each(by_node: Mapping[str, Any], ros: RosGraph, deadline: Deadline, act
     answer = _Answer([], [])
     for node, items in by_node.items():
         try:
-            act(ParameterClient(ros.session, deadline, node), items, answer)
+            with closing(ParameterClient(ros.session, deadline, node)) as client:
+                act(client, items, answer)
         except RosError as error:
             answer.problems.append(error_text(error))
     return answer

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Set
+from contextlib import closing
 from typing import TYPE_CHECKING, Self
 
 from composer.client.lifecycle import LifecycleClient
@@ -233,8 +234,8 @@ class _States:
         learned = self._learned
         period_s = _STATES_PERIOD_S
         try:
-            client = LifecycleClient(self._session, Deadline(_STATES_WITHIN_S))
-            answers = client.states(nodes)
+            with closing(LifecycleClient(self._session, Deadline(_STATES_WITHIN_S))) as client:
+                answers = client.states(nodes)
             if learned == self._learned:
                 self._known = answers
             else:

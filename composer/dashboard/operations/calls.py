@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.channels.sending import read_outgoing
@@ -71,8 +72,8 @@ def set_parameter(values: Values, _: Dashboard) -> Prepared:
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.parameters import ParameterClient
 
-        client = ParameterClient(ros.session, deadline, node)
-        return {"value": json_safe(client.set({name: value})[name])}
+        with closing(ParameterClient(ros.session, deadline, node)) as client:
+            return {"value": json_safe(client.set({name: value})[name])}
 
     return run, _CHANGE_S
 

@@ -28,12 +28,12 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
+from composer.runtime.manager.node_services import answer_calls
 from composer.runtime.manager.other_instances import OtherInstances
-from composer.runtime.manager.proxy_services import ProxyLifecycleService, ProxyParameterStore
 from composer.runtime.manager.publishing import ReportPublisher, ReportSources
 from composer.runtime.manager.queries import ManagerQueries
 from composer.runtime.node.logger_services import LoggerServices
-from composer.runtime.node.managed_node import ManagedNode
+from composer.runtime.node.managed_node import InProcessNode, ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
@@ -52,6 +52,7 @@ from composer.runtime.protocol.requests import (
     NAME,
     REQUEST,
     AskReportKey,
+    CallNodes,
     ChangeStates,
     Done,
     Instance,
@@ -76,6 +77,7 @@ COMMANDS = (
 _RESTART = "restart"
 #: The requests of the coordinating process to the others.
 _OF_MEMBERS = (ChangeStates, KeepGoals, AskReportKey)
+_OF_COMMANDS = (Restart, CallNodes)
 _PERIOD_S = 1.0
 _ENDS_WITHIN_S = 0.2
 _RESPONSES_ARRIVE_WITHIN_S = 0.15
@@ -138,8 +140,8 @@ class ManagerNode:
         )
         limit_type_descriptions(self._node)
         self._log = Log(self._node, host.write_log)
-        store = ProxyParameterStore(self._node, host.nodes)
-        ParameterServices(self._node, status.clock, store, self._log.warn)
+        self._own_parameters = ParameterServices(self._node, status.clock, self._log.warn)
+        self._own_parameters.provide()
         LoggerServices(self._node, status.clock, self._log.warn)
         self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
@@ -185,11 +187,13 @@ class ManagerNode:
             self._member = MemberService(
                 self._loop, callbacks, own_participant.hex(), self._log.info
             )
-        if any(node.left_to_manager for node in status.snapshot().nodes):
-            ProxyLifecycleService(self._node, self._loop, host.nodes, self._reports.publish_first)
         self._graph = GraphObserver(changes, own_participant)
         queries = ManagerQueries(
-            self._loop, self._graph, store, self._reports.report, self._reports.timings
+            self._loop,
+            self._graph,
+            self._parameter_services,
+            self._reports.report,
+            self._reports.timings,
         )
         self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()
@@ -213,6 +217,15 @@ class ManagerNode:
         """Leave the ROS graph."""
         self._node.destroy_node()
 
+    def _parameter_services(self) -> dict[str, tuple[Loop, ParameterServices]]:
+        """Return the loops and parameters of the manager and the nodes of this process."""
+        own = (self._loop, self._own_parameters)
+        return {self._node.get_fully_qualified_name(): own} | {
+            name: (node.loop, node.parameter_services)
+            for name, node in self._host.nodes().items()
+            if isinstance(node, InProcessNode)
+        }
+
     def _add_service(self, kind: Any, name: str, callback: Callable[[Any, Reply], None]) -> None:
         service = self._node.create_service(kind, f"~/{name}", unused_callback)
         self._loop.add_service(service, callback)
@@ -226,7 +239,7 @@ class ManagerNode:
 
     def _on_request(self, message: Any, reply: Reply) -> None:
         """Answer a request, or send it to what answers it."""
-        kinds = (Restart,) if self._member is None else (*_OF_MEMBERS, Restart)
+        kinds = _OF_COMMANDS if self._member is None else (*_OF_MEMBERS, *_OF_COMMANDS)
         try:
             request = read_request(message, *kinds)
         except ProtocolError as error:
@@ -234,8 +247,13 @@ class ManagerNode:
             return
         if isinstance(request, Restart):
             self._restart(request.nodes, reply)
+        elif isinstance(request, CallNodes):
+            self._loop.run_task(self._call_nodes(request, reply))
         elif self._member is not None:
             self._member.on_request(request, lambda answer: reply(answer_message(answer)))
+
+    async def _call_nodes(self, request: CallNodes, reply: Reply) -> None:
+        reply(answer_message(await answer_calls(request, self._host.nodes())))
 
     def _restart(self, nodes: tuple[str, ...], reply: Reply) -> None:
         def answer(success: bool, message: str) -> None:

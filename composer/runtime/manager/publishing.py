@@ -125,13 +125,6 @@ class ReportPublisher:
         self._is_waiting = True
         self._publish_by(self._clock.monotonic() + _ACKNOWLEDGED_WITHIN_S)
 
-    def publish_first(self) -> None:
-        """Publish the first change of a batch at once, for processes that wait for it."""
-        if self._clock.monotonic() - self._published_s > self._batch_s:
-            self.publish()
-        else:
-            self.publish_soon()
-
     def publish_soon(self) -> None:
         """Publish a change, with others that follow. Thread-safe."""
         self._changed_s = self._clock.monotonic()

@@ -6,17 +6,13 @@ See :mod:`composer.runtime.process.query_socket`, on whose thread the methods ar
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any
-
-from rcl_interfaces.msg import ParameterValue
 
 from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.graph_view import GraphObserver
-from composer.runtime.manager.proxy_services import ProxyParameterStore
-from composer.runtime.node.parameter_services import count_items, in_slices
+from composer.runtime.node.parameter_services import ParameterServices, count_items
 from composer.runtime.process.query_socket import Answer
 from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import (
@@ -30,9 +26,8 @@ from composer.runtime.protocol.requests import (
     ParametersQuery,
     StatusQuery,
     TopicQuery,
-    full_parameter_name,
 )
-from composer.runtime.ros.parameter_values import description, plain_value
+from composer.runtime.ros.parameter_values import plain_value
 
 #: Commands wait a little longer. A node that hangs does not answer.
 _PARAMETERS_WITHIN_S = 0.4
@@ -48,10 +43,11 @@ class ManagerQueries:
         self,
         loop: Loop,
         graph: GraphObserver,
-        parameters: ProxyParameterStore,
+        parameters: Callable[[], Mapping[str, tuple[Loop, ParameterServices]]],
         report: Callable[[], SystemReport],
         timings: Callable[[], TimingReport],
     ) -> None:
+        """``parameters()`` returns the loop and the parameters of each node, by full name."""
         self._loop = loop
         self._graph = graph
         self._parameters = parameters
@@ -86,35 +82,24 @@ class ManagerQueries:
         Other nodes are left out, and so are those of other processes, which have parameter services
         of their own.
         """
-        names = [
-            name for name in self._parameters.nodes() if query.nodes is None or name in query.nodes
-        ]
         done = threading.Event()
-        future = self._loop.run_task(self._collect(names))
+        future = self._loop.run_task(self._collect(query.nodes))
         future.add_done_callback(lambda _: done.set())
         if not self._loop.clock.wait(done, _PARAMETERS_WITHIN_S):
             future.cancel()
             return None
         return future.result()
 
-    async def _collect(self, nodes: list[str]) -> ParametersAnswer | None:
+    async def _collect(self, nodes: Collection[str] | None) -> ParametersAnswer | None:
         """Return the parameters of the nodes, None if they are too many or too large."""
         left = _MAX_ITEMS
         found: dict[str, tuple[tuple[ParameterDescription, Any], ...]] = {}
-        for node in nodes:
-            of_node = []
-            names = await self._parameters.names_of(node)
-            async for described, value in in_slices(
-                self._loop.clock, names, partial(self._parameter, node)
-            ):
-                left -= 1 + count_items(value)
-                if left < 0:
-                    return None
-                of_node.append((described, plain_value(value)))
-            found[node] = tuple(of_node)
+        for name, (loop, services) in self._parameters().items():
+            if nodes is not None and name not in nodes:
+                continue
+            described = await loop.run_task(services.described())
+            left -= sum(1 + count_items(value) for _, value in described)
+            if left < 0:
+                return None
+            found[name] = tuple((item, plain_value(value)) for item, value in described)
         return ParametersAnswer(found)
-
-    async def _parameter(self, node: str, name: str) -> tuple[ParameterDescription, ParameterValue]:
-        store = self._parameters
-        full_name = name if node == store.manager else full_parameter_name(node, name)
-        return description(name, await store.descriptor(full_name)), await store.value(full_name)

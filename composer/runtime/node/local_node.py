@@ -8,7 +8,7 @@ The kinds of nodes differ in what they create and call in a transition. See
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol, TypeVar
@@ -21,7 +21,6 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
 from composer.runtime.executors.exceptions import describe
-from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
@@ -30,7 +29,7 @@ from composer.runtime.node.lifecycle import Lifecycle
 from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node
-from composer.runtime.node.parameter_services import NodeParameterStore, ParameterServices
+from composer.runtime.node.parameter_services import ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.ports import PortSet, RunningPort
 
@@ -111,9 +110,11 @@ class LocalNode(ABC):
     def _join(self, options: NodeOptions) -> None:
         """Join the ROS graph, unconfigured; the parameters are declared."""
         offers = self.model.introspection
+        self.parameter_services = ParameterServices(
+            self._ros, self.loop.clock, self._context.log.warn
+        )
         if offers.parameters:
-            store = NodeParameterStore(self._ros)
-            ParameterServices(self._ros, self.loop.clock, store, self._context.log.warn)
+            self.parameter_services.provide()
         if offers.logger_services:
             LoggerServices(self._ros, self.loop.clock, self._context.log.warn)
         self.loop.add_node(self._ros)
@@ -170,14 +171,6 @@ class LocalNode(ABC):
     def contexts(self) -> tuple[NodeContext, NodeContext]:
         """What its parts share: those that are gated by *active*, and those that are always on."""
         return self._context, self._always_on_context
-
-    def query(self, function: Callable[[RosNode], T]) -> Future[T]:
-        """Return the result of ``function(ROS node)``, which is called on the node's loop."""
-
-        async def call() -> T:
-            return function(self._ros)
-
-        return self.loop.run_task(call())
 
     def keep_entities(self) -> None:
         """Do not destroy ports from now on: the end of the process does."""

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
 from composer.plan import FaultKind
-from composer.runtime.executors.futures import Future
 from composer.runtime.metrics.statistics import Statistics
 
 if TYPE_CHECKING:  # tests of the supervision run without ROS
-    from rclpy.node import Node as RosNode
-
     from composer.runtime.executors.loop import Loop
+    from composer.runtime.node.parameter_services import ParameterServices
 
 #: The label of the state that a node cannot leave.
 FINALIZED = "finalized"
@@ -36,9 +34,6 @@ class TransitionOutcome:
     reason: str = ""
     external: bool = True
     outdated: bool = False
-
-
-T = TypeVar("T")
 
 
 class NodeListener(Protocol):
@@ -142,5 +137,6 @@ class ManagedNode(Protocol):
 class InProcessNode(ManagedNode, Protocol):
     """A node with a ROS node in this process."""
 
-    def query(self, function: Callable[[RosNode], T]) -> Future[T]:
-        """Return the result of ``function(ROS node)``, which is called on the node's loop."""
+    @property
+    def parameter_services(self) -> ParameterServices:
+        """What answers requests to its parameter services, on its loop, if it has them or not."""

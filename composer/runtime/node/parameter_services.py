@@ -7,17 +7,16 @@ callbacks: it is handled in slices, or refused above the limits of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import (
-    ListParametersResult,
     ParameterDescriptor,
     ParameterValue,
     SetParametersResult,
 )
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -34,10 +33,21 @@ from rclpy.qos import qos_profile_parameters
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.exceptions import text_of
 from composer.runtime.metrics.repeat_limit import RepeatLimit
+from composer.runtime.protocol.requests import ParameterDescription
 from composer.runtime.ros.limited_requests import MAX_ITEMS, TooLarge, limited
+from composer.runtime.ros.parameter_values import description
 
 T = TypeVar("T")
 
+#: The services by name.
+PARAMETER_SERVICES: Mapping[str, Any] = {
+    "list_parameters": ListParameters,
+    "get_parameters": GetParameters,
+    "get_parameter_types": GetParameterTypes,
+    "describe_parameters": DescribeParameters,
+    "set_parameters": SetParameters,
+    "set_parameters_atomically": SetParametersAtomically,
+}
 #: Other callbacks of the loop run after this time.
 _SLICE_S = 1e-3
 
@@ -46,114 +56,54 @@ class UnknownParameterError(Exception):
     """There is no such parameter, or it has no value: the response is empty, as rclpy's."""
 
 
-class ParameterStore(Protocol):
-    """Parameters by name. Methods raise UnknownParameterError."""
-
-    async def list_names(self, prefixes: list[str], depth: int) -> ListParametersResult:
-        """Return the names that begin with one of ``prefixes``, as rclpy's ``list_parameters``."""
-
-    async def value(self, name: str) -> ParameterValue:
-        """Return the value of a parameter."""
-
-    async def type_of(self, name: str) -> int:
-        """Return the type of a parameter, a constant of ParameterType."""
-
-    async def descriptor(self, name: str) -> ParameterDescriptor:
-        """Return the descriptor of a parameter."""
-
-    async def set(self, changes: list[ParameterMessage]) -> SetParametersResult:
-        """Set all parameters or none. Raises nothing."""
-
-
-class NodeParameterStore:
-    """The parameters of a node."""
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-
-    async def list_names(self, prefixes: list[str], depth: int) -> ListParametersResult:
-        """Return the names that begin with one of ``prefixes``."""
-        return self._node.list_parameters(list(dict.fromkeys(prefixes)), depth)
-
-    async def value(self, name: str) -> ParameterValue:
-        """Return the value of a parameter."""
-        return value_of(self._node, name)
-
-    async def type_of(self, name: str) -> int:
-        """Return the type of a parameter."""
-        try:
-            kind: Any = self._node.get_parameter_type(name)  # its type hint is wrong
-        except ParameterNotDeclaredException as error:
-            raise UnknownParameterError(name) from error
-        return int(kind)
-
-    async def descriptor(self, name: str) -> ParameterDescriptor:
-        """Return the descriptor of a parameter."""
-        return descriptor_of(self._node, name)
-
-    async def set(self, changes: list[ParameterMessage]) -> SetParametersResult:
-        """Set all parameters or none."""
-        return set_parameters(self._node, changes)
-
-
-def value_of(node: Node, name: str) -> ParameterValue:
-    """Return the value of a node's parameter. Raises UnknownParameterError."""
-    try:
-        return node.get_parameter(name).get_parameter_value()
-    except (ParameterNotDeclaredException, ParameterUninitializedException) as error:
-        raise UnknownParameterError(name) from error
-
-
-def descriptor_of(node: Node, name: str) -> ParameterDescriptor:
-    """Return the descriptor of a node's parameter. Raises UnknownParameterError."""
-    try:
-        return node.describe_parameter(name)
-    except ParameterNotDeclaredException as error:
-        raise UnknownParameterError(name) from error
-
-
-def set_parameters(node: Node, changes: Iterable[ParameterMessage]) -> SetParametersResult:
-    """Set all parameters of a node or none. Raises nothing."""
-    try:
-        return node.set_parameters_atomically([_parameter(change) for change in changes])
-    except ParameterNotDeclaredException as error:
-        return _refusal(str(error))
-    except Exception as error:  # such as a value that rclpy cannot compare
-        return _refusal(text_of(error))
-
-
 class ParameterServices:
-    """The six services of one node. Create it before the node is added to its loop."""
+    """Answers requests to the six services of one node; see :meth:`provide` for the services."""
 
-    def __init__(
-        self, node: Node, clock: Clock, store: ParameterStore, warn: Callable[[str], None]
-    ) -> None:
+    def __init__(self, node: Node, clock: Clock, warn: Callable[[str], None]) -> None:
         """``warn`` logs requests that are refused."""
         self._in_slices = partial(in_slices, clock)
         self._node = node
-        self._store = store
         self._warn = warn
         self._repeats = RepeatLimit(clock)
-        self._add(ListParameters, "list_parameters", self._list)
-        self._add(GetParameters, "get_parameters", self._get)
-        self._add(GetParameterTypes, "get_parameter_types", self._get_types)
-        self._add(DescribeParameters, "describe_parameters", self._describe)
-        self._add(SetParameters, "set_parameters", self._set)
-        self._add(SetParametersAtomically, "set_parameters_atomically", self._set_atomically)
 
-    def _add(
-        self, kind: Any, name: str, answer: Callable[[Any, Any], Coroutine[Any, Any, None]]
-    ) -> None:
-        async def respond(request: Any, response: Any) -> Any:
-            if isinstance(request, TooLarge):
-                self._refuse(name, request.reason, response)
-            else:
-                await answer(request, response)
+    def provide(self) -> None:
+        """Create the services. Call it before the node is added to its loop."""
+        for name, kind in PARAMETER_SERVICES.items():
+            self._node.create_service(
+                limited(kind),
+                f"~/{name}",
+                partial(self.answer, name),
+                qos_profile=qos_profile_parameters,
+            )
+
+    async def answer(self, name: str, request: Any, response: Any) -> Any:
+        """Fill and return the response of a service to a request, on the node's loop."""
+        if isinstance(request, TooLarge):
+            self._refuse(name, request.reason, response)
             return response
+        match name:
+            case "list_parameters":
+                prefixes = list(dict.fromkeys(request.prefixes))
+                response.result = self._node.list_parameters(prefixes, request.depth)
+            case "get_parameters":
+                await self._get(request, response)
+            case "get_parameter_types":
+                types = [kind async for kind in self._in_slices(request.names, self._type)]
+                response.types = types if len(types) == len(request.names) else []
+            case "describe_parameters":
+                found = [item async for item in self._in_slices(request.names, self._descriptor)]
+                response.descriptors = found if len(found) == len(request.names) else []
+            case "set_parameters":
+                changes = [[change] for change in request.parameters]
+                response.results = [item async for item in self._in_slices(changes, self._set)]
+            case _:
+                response.result = self._set(request.parameters)
+        return response
 
-        self._node.create_service(
-            limited(kind), f"~/{name}", respond, qos_profile=qos_profile_parameters
-        )
+    async def described(self) -> list[tuple[ParameterDescription, ParameterValue]]:
+        """Return the descriptions and values of all parameters, on the node's loop."""
+        names = self._node.list_parameters([], 0).names
+        return [item async for item in self._in_slices(names, self._described)]
 
     def _refuse(self, service: str, reason: str, response: Any) -> None:
         """Log the refusal, and add it to the response if its type has a reason."""
@@ -165,13 +115,10 @@ class ParameterServices:
         elif isinstance(response, SetParametersAtomically.Response):
             response.result = _refusal(reason)
 
-    async def _list(self, request: Any, response: Any) -> None:
-        response.result = await self._store.list_names(request.prefixes, request.depth)
-
     async def _get(self, request: Any, response: Any) -> None:
         values: list[ParameterValue] = []
         items = 0
-        async for value in self._in_slices(request.names, self._store.value):
+        async for value in self._in_slices(request.names, self._value):
             items += count_items(value)
             if items > MAX_ITEMS:
                 reason = f"more than {MAX_ITEMS} array items and characters in one response"
@@ -180,27 +127,43 @@ class ParameterServices:
             values.append(value)
         response.values = values if len(values) == len(request.names) else []
 
-    async def _get_types(self, request: Any, response: Any) -> None:
-        types = [kind async for kind in self._in_slices(request.names, self._store.type_of)]
-        response.types = types if len(types) == len(request.names) else []
+    def _value(self, name: str) -> ParameterValue:
+        try:
+            return self._node.get_parameter(name).get_parameter_value()
+        except (ParameterNotDeclaredException, ParameterUninitializedException) as error:
+            raise UnknownParameterError(name) from error
 
-    async def _describe(self, request: Any, response: Any) -> None:
-        found = [item async for item in self._in_slices(request.names, self._store.descriptor)]
-        response.descriptors = found if len(found) == len(request.names) else []
+    def _type(self, name: str) -> int:
+        try:
+            kind: Any = self._node.get_parameter_type(name)  # its type hint is wrong
+        except ParameterNotDeclaredException as error:
+            raise UnknownParameterError(name) from error
+        return int(kind)
 
-    async def _set(self, request: Any, response: Any) -> None:
-        async def set_one(change: ParameterMessage) -> SetParametersResult:
-            return await self._store.set([change])
+    def _descriptor(self, name: str) -> ParameterDescriptor:
+        try:
+            return self._node.describe_parameter(name)
+        except ParameterNotDeclaredException as error:
+            raise UnknownParameterError(name) from error
 
-        response.results = [item async for item in self._in_slices(request.parameters, set_one)]
+    def _described(self, name: str) -> tuple[ParameterDescription, ParameterValue]:
+        try:
+            value = self._value(name)
+        except UnknownParameterError:  # it is declared, and has no value
+            value = ParameterValue()
+        return description(name, self._descriptor(name)), value
 
-    async def _set_atomically(self, request: Any, response: Any) -> None:
-        response.result = await self._store.set(request.parameters)
+    def _set(self, changes: Iterable[ParameterMessage]) -> SetParametersResult:
+        """Set all parameters or none. Raises nothing."""
+        try:
+            return self._node.set_parameters_atomically([_parameter(item) for item in changes])
+        except ParameterNotDeclaredException as error:
+            return _refusal(str(error))
+        except Exception as error:  # such as a value that rclpy cannot compare
+            return _refusal(text_of(error))
 
 
-async def in_slices(
-    clock: Clock, items: Iterable[Any], call: Callable[[Any], Coroutine[Any, Any, T]]
-) -> Any:
+async def in_slices(clock: Clock, items: Iterable[Any], call: Callable[[Any], T]) -> Any:
     """Yield the result of ``call`` for each item, up to the first unknown parameter.
 
     Other callbacks of the loop run in between.
@@ -208,7 +171,7 @@ async def in_slices(
     until_s = clock.monotonic() + _SLICE_S
     for item in items:
         try:
-            result = await call(item)
+            result = call(item)
         except UnknownParameterError:
             return
         yield result

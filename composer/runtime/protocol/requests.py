@@ -20,8 +20,6 @@ NAME = "manager"
 IS_ACTIVE = "is_active"
 #: At the end of ``startup`` and ``resume``: undo everything if a node fails.
 ALL_OR_NOTHING = "_all_or_nothing"
-#: lifecycle_msgs/srv/ChangeState, for nodes without lifecycle services.
-CHANGE_STATE = "change_state"
 #: Carries documents: see :mod:`composer.runtime.ros.manager_interface`.
 REQUEST = "request"
 #: A hidden service of each manager, with a unique name: see ``manager/other_instances.py``.
@@ -40,11 +38,6 @@ GraphView: TypeAlias = Mapping[str, tuple[NameAndTypes, ...]]
 def visible_names(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
     """Return the names that ROS tools do not hide."""
     return tuple(item for item in names if not is_hidden(item[0]))
-
-
-def full_parameter_name(node: str, parameter: str) -> str:
-    """Return the manager's name of a node's parameter: node names have no dots."""
-    return f"{node}.{parameter}"
 
 
 # --- queries of commands on this computer: see composer.runtime.manager.queries
@@ -207,6 +200,29 @@ class Restart:
 
     nodes: tuple[str, ...]
     Answer: ClassVar = Done
+
+
+@dataclass(frozen=True, slots=True)
+class NodeCall:
+    """A request to a service that a node does not have: its full name, and the request."""
+
+    service: str
+    request: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeResponses:
+    """The responses to the calls of a request, in their order; None if there is no such service."""
+
+    responses: tuple[Mapping[str, Any] | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CallNodes:
+    """Calls services of ROS that nodes leave to their manager, see ``manager/node_services.py``."""
+
+    calls: tuple[NodeCall, ...]
+    Answer: ClassVar = NodeResponses
 
 
 #: A step that creates a finalized node again, which is unconfigured then.

@@ -1,4 +1,4 @@
-"""Builds ROS messages from templates.
+"""Builds ROS messages from templates and plain data, and returns messages as plain data.
 
 A template is compiled once for its message type, and constants are converted then. Conversions
 follow the rule of parameters: an integer is accepted for a floating-point number, and nothing else
@@ -128,6 +128,19 @@ def convert_message(values: Mapping[str, Any], message_type: Any, what: str) -> 
     Nothing is evaluated: a string is a string.
     """
     return _from_mapping(values, message_type, what)
+
+
+def to_plain(value: Any) -> Any:
+    """Return a message, or a part of one, as dicts, lists and scalars."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: to_plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, bytes):
+        return value[0] if len(value) == 1 else list(value)
+    if isinstance(value, array) or hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [to_plain(item) for item in value]
+    return value
 
 
 def _message(template: Template, message_type: Any, where: str) -> Build:

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log
-from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.parameter import Parameter
 from std_msgs.msg import Header, String
 
+from composer.client.parameters import ParameterClient
+from composer.client.session import Deadline, Session
 from composer.model import ExecutorKind
 from composer.runtime.supervision.events import CallbackFailed
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
@@ -255,7 +255,7 @@ def stamp_ns(message: Any) -> int:
     return int(message.stamp.sec * NANOSECONDS + message.stamp.nanosec)
 
 
-def test_stamps_are_simulated_and_the_manager_has_the_parameter_of_nodes_without_services(
+def test_stamps_are_simulated_and_use_sim_time_changes_at_run_time(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(STAMPED, tmp_path) as system:
@@ -275,18 +275,11 @@ def test_stamps_are_simulated_and_the_manager_has_the_parameter_of_nodes_without
         for message in (*received, *logged):
             assert stamp_ns(message) in SIMULATED_NS
             assert stamp_ns(message) % (NANOSECONDS // 10) == 0
-        names = ["/a.use_sim_time", "/wall.use_sim_time"]
-        values = peer.call(
-            GetParameters, "/stamped/manager/get_parameters", GetParameters.Request(names=names)
-        ).values
-        assert [value.bool_value for value in values] == [True, False]
-        off = Parameter("/a.use_sim_time", value=False).to_parameter_msg()
-        answer = peer.call(
-            SetParameters,
-            "/stamped/manager/set_parameters",
-            SetParameters.Request(parameters=[off]),
-        )
-        assert answer.results[0].successful
+        with Session() as session:  # neither node has parameter services
+            a, wall = (ParameterClient(session, Deadline(20.0), name) for name in ("/a", "/wall"))
+            values = [client.values(["use_sim_time"])["use_sim_time"] for client in (a, wall)]
+            assert values == [True, False]
+            a.set({"use_sim_time": False})
         wait_until(lambda: received[-1].stamp.sec > 10**9, "a stamp of today")
 
 

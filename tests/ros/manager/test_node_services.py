@@ -1,4 +1,4 @@
-"""Nodes without endpoints for tools, and the proxy services of the manager node."""
+"""Nodes without endpoints for tools, whose services are left to the manager node."""
 
 from __future__ import annotations
 
@@ -8,16 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Log, ParameterEvent
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
 from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
@@ -26,6 +17,9 @@ from composer.client.parameters import ParameterClient, ParameterRejectedError, 
 from composer.client.session import Deadline, Session
 from composer.client.snapshot import GraphObserver
 from composer.plan.drift import ObservedNode
+from composer.runtime.protocol.requests import CallNodes, NodeCall
+from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
+from composer.runtime.ros.messages import to_plain
 from tests.ros.support.commands import listed, output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
@@ -47,7 +41,6 @@ nodes:
     on_activate: {log: "so am I"}
 """
 TALKER = "/far/talker"
-OWN = {f"{TALKER}.speed", f"{TALKER}.label"}
 
 
 @pytest.fixture(scope="module")
@@ -88,40 +81,36 @@ def test_disabled_endpoints_are_not_created(system: RunningSystem, peer: Peer) -
     assert {"here I am", "so am I"} <= set(system.log())
 
 
-def test_proxy_services_have_standard_types(system: RunningSystem, peer: Peer) -> None:
-    def call(kind: Any, name: str, **fields: Any) -> Any:
-        return peer.call(kind, f"/lean/manager/{name}", kind.Request(**fields))
+def test_the_manager_answers_requests_to_services_of_nodes(
+    system: RunningSystem, peer: Peer
+) -> None:
+    def response(service: str, **fields: Any) -> Any:
+        request = CallNodes((NodeCall(service, fields),))
+        message = request_message(request)
+        answer = peer.call(RequestService, "/lean/manager/request", message)
+        (found,) = read_answer(answer, request).responses
+        return found
 
-    listed = call(ListParameters, "list_parameters").result
-    assert set(listed.names) > OWN
-    assert listed.prefixes == [TALKER]
-    names = [f"{TALKER}.speed", "/whole.size", "/missing.speed", f"{TALKER}.missing"]
-    values = call(GetParameters, "get_parameters", names=names).values
-    assert [value.type for value in values] == [3, 2, 0, 0]
-    assert list(call(GetParameterTypes, "get_parameter_types", names=names).types) == [3, 2, 0, 0]
-    described = call(DescribeParameters, "describe_parameters", names=names).descriptors
-    assert [item.name for item in described] == names
-    assert described[0].floating_point_range[0].to_value == 5.0
+    values = response(f"{TALKER}/get_parameters", names=["speed", "missing"])["values"]
+    assert values == []  # as rclpy does
+    types = response(f"{TALKER}/get_parameter_types", names=["speed", "label"])["types"]
+    assert types == [3, 4]
     changes = [
-        Parameter(f"{TALKER}.speed", value=2.5).to_parameter_msg(),
-        Parameter(f"{TALKER}.label", value="there").to_parameter_msg(),
-        Parameter("/missing.speed", value=2.5).to_parameter_msg(),
+        to_plain(Parameter("speed", value=2.5).to_parameter_msg()),
+        to_plain(Parameter("missing", value=2.5).to_parameter_msg()),
     ]
-    results = call(SetParameters, "set_parameters", parameters=changes).results
-    assert [result.successful for result in results] == [True, True, False]
-    mixed = call(SetParametersAtomically, "set_parameters_atomically", parameters=changes).result
-    assert not mixed.successful
-    assert "/missing" in mixed.reason
-    alone = call(SetParametersAtomically, "set_parameters_atomically", parameters=changes[:2])
-    assert alone.result.successful
-    for label, success in (("/missing activate", False), (f"{TALKER} activate", False)):
-        request = ChangeState.Request()
-        request.transition.label = label
-        answer = peer.call(ChangeState, "/lean/manager/change_state", request)
-        assert answer.success is success
+    results = response(f"{TALKER}/set_parameters", parameters=changes)["results"]
+    assert [result["successful"] for result in results] == [True, False]
+    together = response(f"{TALKER}/set_parameters_atomically", parameters=changes)["result"]
+    assert not together["successful"]
+    assert response("/missing/get_state") is None
+    assert response(f"{TALKER}/reboot") is None
+    assert response(f"{TALKER}/get_parameters", names=3) is None
+    refused = response(f"{TALKER}/change_state", transition={"label": "activate"})
+    assert refused == {"success": False}
 
 
-def test_commands_use_the_proxy_services(session: Session) -> None:
+def test_clients_reach_such_nodes(session: Session) -> None:
     client = LifecycleClient(session, Deadline(20.0))
     assert client.find("talker") == TALKER
     assert set(client.nodes()) >= {TALKER, "/whole"}
@@ -204,7 +193,7 @@ def test_a_node_with_all_endpoints_has_those_of_a_lifecycle_node(
         plain.destroy_node()
 
 
-def test_commands_work_the_same_with_proxy_services(system: RunningSystem) -> None:
+def test_commands_work_the_same_with_such_nodes(system: RunningSystem) -> None:
     patiently = ("--timeout", "20")
     text = output_of("lifecycle", "set", "talker", "deactivate", *patiently)
     assert text == f"{TALKER}: active -> inactive\n"

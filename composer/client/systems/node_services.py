@@ -1,0 +1,175 @@
+"""The lifecycle and parameter services of nodes, whether a node has them or its manager.
+
+A node whose ``introspection`` disables them leaves them to the manager of its system. Requests to
+them are sent to the manager, those to many nodes of a system as one: see
+:mod:`composer.runtime.manager.node_services`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
+from typing import Any, Self
+
+from composer.client.requests import ServiceCaller
+from composer.client.session import Deadline, NoResponseError, Session
+from composer.client.systems.managers import Systems
+from composer.runtime.protocol.codec import ProtocolError
+from composer.runtime.protocol.requests import NAME, REQUEST, CallNodes, NodeCall
+from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
+from composer.runtime.ros.messages import MessageError, convert_message, to_plain
+from composer.runtime.ros_graph.graph import is_valid_name
+
+#: Managers publish their last report to each new subscription, and again every second.
+_REPORT_WITHIN_S = 2.0
+#: The services that nodes may leave to their manager, by the names in its report.
+_SERVICES = {
+    "lifecycle": ("get_state", "get_available_transitions", "change_state"),
+    "parameters": (
+        *("list_parameters", "get_parameters", "get_parameter_types", "describe_parameters"),
+        *("set_parameters", "set_parameters_atomically"),
+    ),
+}
+
+
+class NodeServices:
+    """Calls services of nodes. Clients and subscriptions are kept until :meth:`close`."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._caller = ServiceCaller(session)
+        self._systems = Systems(session, Deadline(0.0))
+        self._awaited: set[str] = set()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Destroy the clients and subscriptions."""
+        self._caller.close()
+        self._systems.close()
+
+    def is_offered(self, name: str, deadline: Deadline) -> bool:
+        """Return whether a service has been discovered, by its full name."""
+        if any(name == known for known, _ in self._session.graph.services()):
+            return True
+        self._wait_for_reports(deadline)
+        return bool(self._systems_by_service([name]))
+
+    def nodes(self, service: str, kind: Any, deadline: Deadline) -> set[str]:
+        """Return the nodes with a service, discovered so far: its last name and its class.
+
+        The first report of each manager is waited for.
+        """
+        self._wait_for_reports(deadline)
+        type_name = f"{kind.__module__.partition('.')[0]}/srv/{kind.__name__}"
+        own = {
+            name.removesuffix(f"/{service}")
+            for name, types in self._session.graph.services()
+            if name.endswith(f"/{service}") and type_name in types
+        }
+        return own | {node for node, _ in self._left(service)}
+
+    def call(
+        self, kind: Any, name: str, request: Any, deadline: Deadline, *, once: bool = False
+    ) -> Any:
+        """Return the response of a service. Raises NoResponseError.
+
+        A request that changes nothing is sent again every second, others are sent ``once``.
+        """
+        system = self._systems_by_service([name]).get(name)
+        if not once:
+            response = self.call_all(kind, {name: request}, deadline)[name]
+        elif system is None:
+            response = self._caller.call_once(kind, name, request, deadline)
+        else:
+            document, service = _document({name: request}), _service(system)
+            message = request_message(document)
+            answer = self._caller.call_once(RequestService, service, message, deadline)
+            response = dict(_responses(kind, document, answer)).get(name)
+        if response is None:
+            raise NoResponseError(
+                f"service '{name}' did not respond within {deadline.timeout_s:g} s"
+            )
+        return response
+
+    def call_all(
+        self, kind: Any, requests: Mapping[str, Any], deadline: Deadline
+    ) -> dict[str, Any]:
+        """Return the response of each service, None for those that did not respond in time.
+
+        A request without a response is sent again every second.
+        """
+        systems = self._systems_by_service(requests)
+        calls = {name: (kind, request) for name, request in requests.items() if name not in systems}
+        documents = {
+            _service(system): _document(
+                {name: requests[name] for name in requests if systems.get(name) == system}
+            )
+            for system in set(systems.values())
+        }
+        for service, document in documents.items():
+            calls[service] = (RequestService, request_message(document))
+        answers = self._caller.call_each(calls, deadline)
+        found: dict[str, Any] = dict.fromkeys(requests)
+        found |= {name: answers[name] for name in requests if name not in systems}
+        for service, document in documents.items():
+            if answers[service] is not None:
+                found |= _responses(kind, document, answers[service])
+        return found
+
+    def _wait_for_reports(self, deadline: Deadline) -> None:
+        new = set(self._systems.discover()) - self._awaited  # wait for each manager only once
+        limit = Deadline(min(_REPORT_WITHIN_S, deadline.left_s))
+
+        def have_reported() -> bool | None:
+            reports = self._systems.current()
+            return all(reports[name] or self._systems.other_version(name) for name in new) or None
+
+        self._session.wait_for(have_reported, limit)
+        self._awaited |= new
+
+    def _left(self, service: str) -> Iterator[tuple[str, str]]:
+        """Yield the nodes that leave a service to a manager, with the names of its system.
+
+        The manager of the process of a node comes last: it has its parameters.
+        """
+        found = [
+            (bool(node.process), node.node, name)
+            for name, report in self._systems.current().items()
+            for node in (() if report is None else report.nodes)
+            if is_valid_name(node.node)
+            and any(service in _SERVICES.get(kind, ()) for kind in node.left_to_manager)
+        ]
+        for _, node, name in sorted(found, reverse=True):
+            yield node, name
+
+    def _systems_by_service(self, services: Collection[str]) -> dict[str, str]:
+        """Return the systems whose managers have services, for those that nodes leave to them."""
+        left = {
+            f"{node}/{last}": system
+            for last in {service.rpartition("/")[2] for service in services}
+            for node, system in self._left(last)
+        }
+        return {service: left[service] for service in services if service in left}
+
+
+def _service(system: str) -> str:
+    return f"{system}/{NAME}/{REQUEST}"
+
+
+def _document(requests: Mapping[str, Any]) -> CallNodes:
+    return CallNodes(tuple(NodeCall(name, to_plain(item)) for name, item in requests.items()))
+
+
+def _responses(kind: Any, document: CallNodes, answer: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the responses of class ``kind`` to the calls of a request, by service."""
+    with suppress(ProtocolError):
+        responses = read_answer(answer, document).responses
+        for call, plain in zip(document.calls, responses, strict=False):
+            with suppress(MessageError):
+                if plain is not None:
+                    yield call.service, convert_message(plain, kind.Response, call.service)
