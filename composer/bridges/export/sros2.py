@@ -1,10 +1,7 @@
-"""What SROS2 and DDS check: what each process may publish, subscribe to, call and serve.
+"""What SROS2 checks: what each process may publish, subscribe to, call and serve.
 
 https://design.ros2.org/articles/ros2_access_control_policies.html defines the format. Each process
 has an enclave, because DDS checks participants; the profiles in it are those of its nodes.
-
-DDS Security 1.1 (9.4.1.3) defines permissions, to which SROS2 translates policies. They name topics
-as in DDS: a service is a topic for its requests and one for its responses.
 """
 
 from __future__ import annotations
@@ -43,14 +40,6 @@ _RULES = {
     PortKind.ACTION_SERVER: ("actions", "execute", "action"),
     PortKind.ACTION_CLIENT: ("actions", "call", "action"),
 }
-
-#: The nodes of each participant, as the middleware publishes them.
-_GRAPH_TOPIC = "ros_discovery_info"
-#: A grant is only used with the identity certificate of the process, whose validity is its limit.
-_VALIDITY = ("2000-01-01T00:00:00", "2099-12-31T23:59:59")
-_ACTION_SERVICES = ("cancel_goal", "get_result", "send_goal")
-_ACTION_TOPICS = ("feedback", "status")
-_DIRECTIONS = ("publish", "subscribe")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,55 +99,6 @@ def policy(system: System) -> str:
         for profile in enclave.profiles:
             _write(profile, profiles)
     return _document(root, system.name.value)
-
-
-def permissions(system: System, domain_id: int) -> dict[str, str]:
-    """Return the permissions file of each enclave of a system, by the path of the enclave.
-
-    They apply to one ROS domain, and have to be signed.
-    """
-    name = system.name.value
-    return {item.path: _permissions_file(item, name, domain_id) for item in enclaves(system)}
-
-
-def _permissions_file(enclave: Enclave, system: str, domain_id: int) -> str:
-    root = Xml.Element("dds")
-    grant = Xml.SubElement(Xml.SubElement(root, "permissions"), "grant", name=enclave.path)
-    Xml.SubElement(grant, "subject_name").text = f"CN={enclave.path}"
-    validity = Xml.SubElement(grant, "validity")
-    for tag, time in zip(("not_before", "not_after"), _VALIDITY, strict=True):
-        Xml.SubElement(validity, tag).text = time
-    rule = Xml.SubElement(grant, "allow_rule")
-    Xml.SubElement(Xml.SubElement(rule, "domains"), "id").text = str(domain_id)
-    allowed: dict[str, set[str]] = {direction: {_GRAPH_TOPIC} for direction in _DIRECTIONS}
-    for profile in enclave.profiles:
-        for kind, names in profile.names.items():
-            for name in names:
-                for direction, topics in zip(_DIRECTIONS, _topics(kind, name), strict=True):
-                    allowed[direction].update(topics)
-    for direction, topics in allowed.items():
-        listed = Xml.SubElement(Xml.SubElement(rule, direction), "topics")
-        for topic in sorted(topics):
-            Xml.SubElement(listed, "topic").text = topic
-    Xml.SubElement(grant, "default").text = "DENY"
-    return _document(root, system)
-
-
-def _topics(kind: PortKind, name: str) -> tuple[Iterable[str], Iterable[str]]:
-    """Return the topics that a port publishes and those that it subscribes to."""
-    match kind:
-        case PortKind.PUBLISHER:
-            return [f"rt{name}"], []
-        case PortKind.SUBSCRIPTION:
-            return [], [f"rt{name}"]
-        case PortKind.CLIENT:
-            return [f"rq{name}Request"], [f"rr{name}Reply"]
-        case PortKind.SERVICE:
-            return [f"rr{name}Reply"], [f"rq{name}Request"]
-    requests = [f"rq{name}/_action/{service}Request" for service in _ACTION_SERVICES]
-    replies = [f"rr{name}/_action/{service}Reply" for service in _ACTION_SERVICES]
-    replies += [f"rt{name}/_action/{topic}" for topic in _ACTION_TOPICS]
-    return (replies, requests) if kind is PortKind.ACTION_SERVER else (requests, replies)
 
 
 def _document(root: Xml.Element, system: str) -> str:

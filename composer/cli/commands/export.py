@@ -18,7 +18,7 @@ from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
 from composer.cli.support.results import as_json
 from composer.cli.support.system_arguments import SystemName
-from composer.cli.support.terminal import write, write_raw
+from composer.cli.support.terminal import write
 
 if TYPE_CHECKING:
     from composer.bridges.export.deployment import Service
@@ -110,20 +110,12 @@ add_image_commands(export_app)
     "sros2",
     epilog=examples(
         "compose export sros2 pipeline -o policies/pipeline.xml",
-        "compose export sros2 pipeline --permissions -o keystore/enclaves",
     ),
 )
 def export_sros2(
     system: SystemName,
     *,
     namespace: Namespace = None,
-    permissions: Annotated[
-        bool,
-        typer.Option(
-            "--permissions",
-            help="Write the permissions of DDS instead, a file for each process, to a folder.",
-        ),
-    ] = False,
     output: NewPath = None,
     force: Force = False,
 ) -> None:
@@ -132,29 +124,11 @@ def export_sros2(
     Each process may publish, subscribe, serve and call exactly what its nodes declare, and what ROS
     and the manager node need. The policy is for 'ros2 security create_permission'; the enclave of a
     process is its full name, such as /robot1/pipeline.
-
-    With --permissions, write what that command makes of the policy: FOLDER/robot1/pipeline/
-    permissions.xml, for the ROS domain of ROS_DOMAIN_ID. These files have to be signed.
     """
+    from composer.bridges.export.sros2 import policy
+
     declared = exported_system(system, namespace=namespace).system
-    if not permissions:
-        from composer.bridges.export.sros2 import policy
-
-        write_output(policy(declared), output, replace=force)
-        return
-    from composer.bridges.export.sros2 import permissions as dds_permissions
-
-    texts = dds_permissions(declared, _domain_id())
-    if output is None and len(texts) == 1:
-        write_raw(next(iter(texts.values())))
-    elif output is None:
-        raise CommandError(
-            f"there are {len(texts)} processes: {', '.join(texts)}",
-            hint="name a folder for their files with --output",
-        )
-    else:
-        files = {f"{path.strip('/')}/permissions.xml": text for path, text in texts.items()}
-        write_and_say(output, files, replace=force)
+    write_output(policy(declared), output, replace=force)
 
 
 add_stubs_command(export_app)
@@ -200,13 +174,3 @@ def _user() -> str:
         return pwd.getpwuid(number).pw_name
     except KeyError:
         return str(number)
-
-
-def _domain_id() -> int:
-    """Return the ROS domain. Raises CommandError."""
-    from composer.model.hosts import domain_problem
-
-    text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    if domain_problem(text) is not None:
-        raise CommandError(f"ROS_DOMAIN_ID is '{text}', which is not a domain id")
-    return int(text)

@@ -1,4 +1,4 @@
-"""Launch files that run a system, and permissions of its processes."""
+"""Launch files that run a system."""
 
 from __future__ import annotations
 
@@ -48,21 +48,3 @@ def test_a_system_with_errors_is_not_exported(folder: Path) -> None:
     assert done.code == 1
     assert "unknown-node-type" in done.err
     assert not (folder / "robot.launch.py").exists()
-
-
-PROCESSES = "system: robot\nprocesses: {ears: {nodes: [a]}}\nnodes: {a: {}, b: {}}\n"
-
-
-def test_each_process_gets_permissions(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
-    (folder / "systems" / "robot.yaml").write_text(PROCESSES)
-    export = ("export", "sros2", "robot", "--permissions")
-    done = compose(*export)
-    assert done.code == 1
-    assert "there are 2 processes: /robot, /robot/ears" in done.err
-    assert compose(*export, "-o", "enclaves").code == 0
-    found = {str(path.relative_to(folder)) for path in folder.rglob("permissions.xml")}
-    assert found == {"enclaves/robot/permissions.xml", "enclaves/robot/ears/permissions.xml"}
-    monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
-    done = compose(*export, "-o", "enclaves", "--force")
-    assert "compose: ROS_DOMAIN_ID is '-1', which is not a domain id\n" in done.err
