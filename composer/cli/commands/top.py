@@ -67,9 +67,10 @@ def top(
 ) -> None:
     """Show the timings of callbacks in a running system.
 
-    'calls/s' and 'busy' (the share of a thread) refer to the last interval. All other values are
-    since the start: 'late' is how late a timer is called (99th percentile), 'over' counts calls
-    that took longer than their budget_ms, and 'dropped' counts messages dropped from full queues.
+    'calls/s' is the rate of the last seconds, 'busy' the share of a thread in the last interval.
+    All other values are since the start: 'late' is how late a timer is called (99th percentile),
+    'over' counts calls that took longer than their budget_ms, and 'dropped' counts messages dropped
+    from full queues.
     """
     from composer.cli.support.callback_tables import SortKey
 
@@ -98,7 +99,11 @@ class _Follower:
     def __init__(self, session: Session, systems: Systems, report: SystemReport) -> None:
         self._session = session
         self._systems = systems
-        self._before = self._now = systems.whole(report)
+        from composer.cli.support.callback_tables import SystemMeter
+
+        self._now = systems.whole(report)
+        self._meter = SystemMeter()
+        self._rates = self._meter.read(self._now)
         self._silent: set[str] = set()  # processes that did not report during the last interval
 
     def wait(self, interval_s: float, quit_requested: Callable[[], bool]) -> bool:
@@ -121,7 +126,8 @@ class _Follower:
                     if now.callbacks_at(process) <= self._now.callbacks_at(process)
                 }
                 if silent <= self._silent or others.passed:
-                    self._before, self._now, self._silent = self._now, now, silent
+                    self._now, self._silent = now, silent
+                    self._rates = self._meter.read(now)
                     return True
             if deadline.passed:
                 raise CommandError(
@@ -132,15 +138,15 @@ class _Follower:
 
     def table(self, key: SortKey, max_lines: int | None) -> str:
         """Return a table of at most ``max_lines`` lines."""
-        from composer.cli.support.callback_tables import sorted_rates, top_table
+        from composer.cli.support.callback_tables import in_order, top_table
 
-        return top_table(self._now, sorted_rates(self._before, self._now, key), max_lines)
+        return top_table(self._now, in_order(self._rates, key), max_lines)
 
     def json(self, key: SortKey) -> str:
         """Return the same as one line of JSON."""
-        from composer.cli.support.callback_tables import sorted_rates, top_data
+        from composer.cli.support.callback_tables import in_order, top_data
 
-        return as_json(top_data(self._now, sorted_rates(self._before, self._now, key)))
+        return as_json(top_data(self._now, in_order(self._rates, key)))
 
 
 class _Screen:

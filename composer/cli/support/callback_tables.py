@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from composer.cli.support.terminal import columns, lines
-from composer.runtime.metrics.figures import CallbackRates, rates
+from composer.runtime.metrics.figures import CallbackMeter, CallbackRates
 from composer.runtime.protocol.reports import CallbackFigures
 
 if TYPE_CHECKING:
@@ -45,22 +46,35 @@ def summary_table(callbacks: Sequence[CallbackFigures], limit: int) -> str:
     return f"{table}\n{left} more callbacks took less time" if left > 0 else table
 
 
-def sorted_rates(before: SystemReport, now: SystemReport, key: SortKey) -> list[CallbackRates]:
-    """Return the callbacks with their rates between two reports, sorted."""
-    process_of = {node.node: node.process for node in now.nodes}
-    found: list[CallbackRates] = []
-    for process in ("", *now.processes):  # each reports at times of its own
-        of_process = [item for item in now.callbacks if process_of.get(item.node, "") == process]
-        elapsed_s = now.callbacks_at(process) - before.callbacks_at(process)
-        found += rates(before.callbacks, of_process, elapsed_s)
-    return sorted(found, key=lambda item: (_rank(item, key), item.figures.node))
+class SystemMeter:
+    """The rates of the callbacks of a system, each process of which reports at its own times."""
+
+    def __init__(self) -> None:
+        self._meters: defaultdict[str, CallbackMeter] = defaultdict(CallbackMeter)
+
+    def read(self, report: SystemReport) -> list[CallbackRates]:
+        """Return the callbacks with their rates, from the reports read so far."""
+        process_of = {node.node: node.process for node in report.nodes}
+        callbacks: defaultdict[str, list[CallbackFigures]] = defaultdict(list)
+        for item in report.callbacks:
+            callbacks[process_of.get(item.node, "")].append(item)
+        return [
+            rates
+            for process, items in callbacks.items()
+            for rates in self._meters[process].read(items, report.callbacks_at(process))
+        ]
+
+
+def in_order(callbacks: Iterable[CallbackRates], key: SortKey) -> list[CallbackRates]:
+    """Return callbacks sorted by ``key``."""
+    return sorted(callbacks, key=lambda item: (_rank(item, key), item.figures.node))
 
 
 def top_table(
     report: SystemReport, callbacks: list[CallbackRates], max_lines: int | None = None
 ) -> str:
     """Return a report as text of at most ``max_lines`` lines."""
-    busy = sum(item.busy for item in callbacks)
+    busy = sum(item.busy or 0.0 for item in callbacks)
     title = (
         f"{report.name}: {report.activity}, {report.message} "
         f"(host {report.host}, process {report.pid}), callbacks {busy * 100:.1f} % busy"
@@ -99,8 +113,12 @@ def _summary_row(item: CallbackFigures) -> tuple[str, ...]:
 
 def _top_row(item: CallbackRates) -> tuple[str, ...]:
     figures = item.figures
-    rate = (f"{item.calls_hz:.1f}", f"{item.busy * 100:.2f}")
+    rate = (_shown(item.calls_hz, 1), _shown(item.busy and item.busy * 100, 2))
     return (figures.node, figures.callback, *rate, *_durations(figures))
+
+
+def _shown(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _durations(item: CallbackFigures) -> tuple[str, ...]:
@@ -119,8 +137,8 @@ def _rank(item: CallbackRates, key: SortKey) -> float:
     """Return an ascending sort key."""
     figures = item.figures
     ranks = {
-        SortKey.BUSY: item.busy,
-        SortKey.CALLS: item.calls_hz,
+        SortKey.BUSY: item.busy or 0.0,
+        SortKey.CALLS: item.calls_hz or 0.0,
         SortKey.MEAN: figures.mean_ms,
         SortKey.P99: figures.p99_ms,
         SortKey.MAX: figures.longest_ms,

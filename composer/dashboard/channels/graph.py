@@ -121,7 +121,7 @@ class LiveFeed(Feed):
     follows_reports = True
 
     def __init__(self, _: Values, __: Declared | None) -> None:
-        self._pairs = ReportPairs(lambda report: report.at_s)
+        self._pairs = ReportPairs()
         self._measured: set[str] = set()
         self._rates: dict[str, CountedRate] = {}  # by the keys of edges
         #: What the topics to measure depend on.

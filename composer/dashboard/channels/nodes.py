@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import socket
 import time
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
-from composer.dashboard.observing.reports import ReportPair, ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
 from composer.runtime.process.computer import ProcessUsage, process_usage
@@ -184,7 +184,9 @@ class TimingFeed(Feed):
     """Timings once a second."""
 
     def __init__(self, _: Values, __: Declared | None) -> None:
-        self._pairs = ReportPairs(lambda report: report.callbacks_at_s)
+        from composer.runtime.metrics.figures import CallbackMeter
+
+        self._meters: defaultdict[str, CallbackMeter] = defaultdict(CallbackMeter)
 
     def start(self) -> None:
         """Subscribe to the timings."""
@@ -193,32 +195,32 @@ class TimingFeed(Feed):
     def poll(self) -> Iterator[Update]:
         """Yield the timings of all systems."""
         reports = self.ros.reports.current()
-        with_timings = {
-            name: report for name, report in reports.items() if report and report.callbacks_at_s
-        }
-        pairs = self._pairs.update(with_timings)
-        yield Update(to_json({"systems": [self._system(pair) for pair in pairs.values()]}))
+        with_timings = [
+            self._system(name, report)
+            for name, report in reports.items()
+            if report and report.callbacks_at_s
+        ]
+        for name in self._meters.keys() - reports.keys():
+            del self._meters[name]
+        yield Update(to_json({"systems": with_timings}))
 
-    def _system(self, pair: ReportPair) -> dict[str, Any]:
-        from composer.runtime.metrics.figures import rates
-
-        before = () if pair.before is None else pair.before.callbacks
-        found = rates(before, pair.now.callbacks, pair.passed_s)
+    def _system(self, name: str, report: SystemReport) -> dict[str, Any]:
+        found = self._meters[name].read(report.callbacks, report.callbacks_at_s)
         return {
-            "name": pair.now.name,
-            "time": pair.now.callbacks_at_s,
-            "chains": [asdict(chain) for chain in pair.now.chains],
-            "callbacks": [_callback(item, has_rates=pair.before is not None) for item in found],
+            "name": report.name,
+            "time": report.callbacks_at_s,
+            "chains": [asdict(chain) for chain in report.chains],
+            "callbacks": [_callback(item) for item in found],
         }
 
 
-def _callback(item: CallbackRates, *, has_rates: bool) -> dict[str, Any]:
+def _callback(item: CallbackRates) -> dict[str, Any]:
     from composer.runtime.metrics.statistics import parse_buckets
 
     return {
         **asdict(item.figures),
-        "calls_hz": item.calls_hz if has_rates else None,
-        "busy": item.busy if has_rates else None,
+        "calls_hz": item.calls_hz,
+        "busy": item.busy,
         "histogram": [
             [round(bound_s * _MS, 7), count]
             for bound_s, count in parse_buckets(item.figures.histogram)

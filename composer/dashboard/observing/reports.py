@@ -109,19 +109,16 @@ class SystemReports:
 
 @dataclass(frozen=True, slots=True)
 class ReportPair:
-    """Two reports of a system, ``passed_s`` apart; ``before`` is None for the first one."""
+    """Two reports of a system; ``before`` is None for the first one."""
 
     before: SystemReport | None
     now: SystemReport
-    passed_s: float
 
 
 class ReportPairs:
     """The last two reports of each system that are far enough apart."""
 
-    def __init__(self, at_s: Callable[[SystemReport], float]) -> None:
-        """``at_s`` returns the time of a report in seconds; 0 if it has none, as the first one."""
-        self._at_s = at_s
+    def __init__(self) -> None:
         self._pairs: dict[str, ReportPair] = {}
 
     def update(self, reports: Mapping[str, SystemReport | None]) -> dict[str, ReportPair]:
@@ -131,11 +128,11 @@ class ReportPairs:
             if report is None:
                 continue
             known = self._pairs.get(name)
-            if known is None or known.now.pid != report.pid or not self._at_s(known.now):
-                pairs[name] = ReportPair(None, report, 0.0)
+            if known is None or known.now.pid != report.pid:
+                pairs[name] = ReportPair(None, report)
                 continue
-            passed_s = self._at_s(report) - self._at_s(known.now)
+            passed_s = report.at_s - known.now.at_s
             is_new = passed_s >= _APART_S or passed_s < 0.0
-            pairs[name] = ReportPair(known.now, report, max(0.0, passed_s)) if is_new else known
+            pairs[name] = ReportPair(known.now, report) if is_new else known
         self._pairs = pairs
         return pairs

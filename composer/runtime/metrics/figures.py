@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from composer.base.fast_dataclass import dataclass
+from composer.runtime.metrics.message_rate import CountedRate
 from composer.runtime.metrics.statistics import CallbackStatistics, ChainStatistics
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
 _MS = 1e3
+#: Reports about changes of state are closer to the last one, too close to measure rates.
+_APART_S = 0.5
 
 
 def figures(node: str, statistics: CallbackStatistics) -> CallbackFigures:
@@ -58,24 +61,55 @@ def merged_chains(
 
 @dataclass(frozen=True, slots=True)
 class CallbackRates:
-    """A callback between two snapshots: calls per second, and the share of one thread in use."""
+    """A callback with its calls per second, and the share of one thread in the last interval.
+
+    The calls are counted from burst to burst, as messages are; until there are two bursts, in the
+    last interval. Both are None before the second report.
+    """
 
     figures: CallbackFigures
-    calls_hz: float
-    busy: float
+    calls_hz: float | None = None
+    busy: float | None = None
 
 
-def rates(
-    before: Iterable[CallbackFigures], now: Iterable[CallbackFigures], elapsed_s: float
-) -> list[CallbackRates]:
-    """Return the current figures with the rates over the ``elapsed_s`` since ``before``."""
-    known = {(item.node, item.kind, item.name): item for item in before}
-    return [_rates(known.get((item.node, item.kind, item.name)), item, elapsed_s) for item in now]
+@dataclass(slots=True)
+class _Reading:
+    """The last rates of a callback, and what they follow from."""
+
+    at_s: float
+    calls: CountedRate
+    rates: CallbackRates
 
 
-def _rates(before: CallbackFigures | None, now: CallbackFigures, elapsed_s: float) -> CallbackRates:
-    if before is None or elapsed_s <= 0.0:
-        return CallbackRates(now, 0.0, 0.0)
-    calls = max(0, now.count - before.count)
-    busy_ms = max(0.0, now.total_ms - before.total_ms)
-    return CallbackRates(now, calls / elapsed_s, busy_ms / (_MS * elapsed_s))
+class CallbackMeter:
+    """The rates of the callbacks of a process, from its reports."""
+
+    def __init__(self) -> None:
+        self._readings: dict[tuple[str, str, str], _Reading] = {}
+
+    def read(self, callbacks: Iterable[CallbackFigures], at_s: float) -> list[CallbackRates]:
+        """Return the rates of callbacks that were reported ``at_s``."""
+        before = self._readings
+        self._readings = {
+            key: _next(before.get(key), item, at_s)
+            for item in callbacks
+            for key in ((item.node, item.kind, item.name),)
+        }
+        return [reading.rates for reading in self._readings.values()]
+
+
+def _next(before: _Reading | None, now: CallbackFigures, at_s: float) -> _Reading:
+    last = None if before is None else before.rates.figures
+    if before is None or last is None or now.count < last.count or at_s < before.at_s:
+        calls = CountedRate()  # the first report, or a node that was created again
+        calls.read(now.count, at_s)
+        return _Reading(at_s, calls, CallbackRates(now))
+    elapsed_s = at_s - before.at_s
+    if elapsed_s < _APART_S:
+        return before
+    before.calls.read(now.count, at_s)
+    calls_hz = before.calls.current_hz(at_s)
+    if calls_hz is None:
+        calls_hz = (now.count - last.count) / elapsed_s
+    busy = max(0.0, now.total_ms - last.total_ms) / (_MS * elapsed_s)
+    return _Reading(at_s, before.calls, CallbackRates(now, calls_hz, busy))

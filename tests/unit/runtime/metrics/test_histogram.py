@@ -11,13 +11,14 @@ import pytest
 
 from composer.cli.support.callback_tables import (
     SortKey,
-    sorted_rates,
+    SystemMeter,
+    in_order,
     summary_table,
     top_data,
     top_table,
 )
 from composer.client.systems.system_reports import with_processes
-from composer.runtime.metrics.figures import figures, rates
+from composer.runtime.metrics.figures import CallbackMeter, CallbackRates, figures
 from composer.runtime.metrics.statistics import (
     CallbackStatistics,
     Histogram,
@@ -103,16 +104,28 @@ def test_figures_are_in_milliseconds() -> None:
     assert (found.longest_ms, found.late_longest_ms) == (4.0, 1.0)
 
 
-def test_rates_are_those_between_two_snapshots() -> None:
-    before = [CallbackFigures("/a", "timer", "tick", count=10, total_ms=100.0)]
-    now = [
-        CallbackFigures("/a", "timer", "tick", count=30, total_ms=500.0),
-        CallbackFigures("/new", "timer", "tick", count=7, total_ms=500.0),
+def read(meter: CallbackMeter, at_s: float, *counts: int) -> list[tuple[float | None, ...]]:
+    """Read a report with callbacks that are called for 10 ms; return their rates."""
+    callbacks = [
+        CallbackFigures(f"/n{number}", "timer", "tick", count=count, total_ms=10.0 * count)
+        for number, count in enumerate(counts)
     ]
-    found = rates(before, now, 2.0)
-    assert [(item.calls_hz, item.busy) for item in found] == [(10.0, 0.2), (0.0, 0.0)]
-    assert [item.calls_hz for item in rates(before, now, 0.0)] == [0.0, 0.0]
-    assert rates(now, before, 1.0)[0].busy == 0.0  # a node that was created again
+    return [(item.calls_hz, item.busy) for item in meter.read(callbacks, at_s)]
+
+
+def test_calls_are_counted_from_burst_to_burst_once_there_are_two() -> None:
+    meter = CallbackMeter()
+    assert read(meter, 100.0, 10) == [(None, None)]
+    assert read(meter, 102.0, 30, 7) == [(10.0, 0.1), (None, None)]
+    assert read(meter, 102.1, 99, 9) == [(10.0, 0.1), (None, None)]  # a report about a state
+    assert read(meter, 103.0, 32, 8) == [(2.0, pytest.approx(0.02)), (1.0, 0.01)]
+    assert read(meter, 104.0, 0, 8)[0] == (None, None)  # a node that was created again
+
+
+def test_the_rate_of_a_slow_callback_does_not_change_from_report_to_report() -> None:
+    meter = CallbackMeter()
+    found = [read(meter, 100.0 + second, second // 2)[0][0] for second in range(12)]
+    assert found[4:] == [0.5] * 8
 
 
 def report(at_s: float, *callbacks: CallbackFigures) -> SystemReport:
@@ -139,6 +152,11 @@ def two_reports() -> tuple[SystemReport, SystemReport]:
     return before, now
 
 
+def rates(*reports: SystemReport) -> list[CallbackRates]:
+    meter = SystemMeter()
+    return [meter.read(item) for item in reports][-1]
+
+
 @pytest.mark.parametrize(
     ("sorting", "first"),
     [
@@ -153,12 +171,12 @@ def two_reports() -> tuple[SystemReport, SystemReport]:
     ],
 )
 def test_top_sorts_by_the_requested_column(sorting: SortKey, first: str) -> None:
-    assert sorted_rates(*two_reports(), sorting)[0].figures.node == first
+    assert in_order(rates(*two_reports()), sorting)[0].figures.node == first
 
 
 def test_top_shows_one_line_per_callback_up_to_the_height_of_the_terminal() -> None:
     before, now = two_reports()
-    found = sorted_rates(before, now, SortKey.NODE)
+    found = in_order(rates(before, now), SortKey.NODE)
     assert top_table(now, found) == (
         "/robot: running, 0 of 0 nodes active (host robot1, process 12), callbacks 30.0 % busy\n"
         "node  callback             calls/s  busy %  mean ms  p99 ms  max ms  late ms  over  "
@@ -193,7 +211,7 @@ def test_rates_of_other_processes_are_those_between_their_own_reports() -> None:
 
     before, now = whole(1.0, 0.5, 10), whole(2.0, 2.5, 30)
     assert now.processes == {"acting": "/robot/acting"}
-    found = {item.figures.node: item.calls_hz for item in sorted_rates(before, now, SortKey.NODE)}
+    found = {item.figures.node: item.calls_hz for item in rates(before, now)}
     assert found == {"/a": 20.0, "/b": 10.0}
     assert [(chain.chain, chain.count) for chain in now.chains] == [("way", 30)]
 
