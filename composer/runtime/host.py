@@ -67,6 +67,7 @@ from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.start_and_end import SystemEnd, SystemStart
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
+from composer.runtime.supervision.virtual_time import ISOLATION, check_virtual_time
 
 _KEY_BYTES = 32
 
@@ -121,13 +122,18 @@ class Host:
 
         Raises StartRefused if the environment does not allow a start, or the system runs already.
         """
-        prepare_environment(self._system.discovery)
+        is_virtual = self._clock.is_virtual
+        if is_virtual:
+            check_virtual_time(self._system)
+            os.environ.update(ISOLATION)
+        discovery = None if is_virtual else self._system.discovery
+        prepare_environment(discovery)
         if self._end.uses_fast_exit:
             use_large_system_profile(os.environ)
-        if self._system.discovery is not None and self._system.discovery.interfaces:
+        if discovery is not None and discovery.interfaces:
             from composer.runtime.middleware.dds_xml import use_interfaces  # noqa: PLC0415 - slow, rare
 
-            self._node_set.warnings += use_interfaces(self._system.discovery, os.environ)
+            self._node_set.warnings += use_interfaces(discovery, os.environ)
         namespace = join(self._system.namespace, self._system.name.value)
         ends_process = self._options.ends_process
         signals = stop_signals(self.stop, self._main_queue.wakeup, ends_process=ends_process)
@@ -137,9 +143,12 @@ class Host:
             self._node_set.warnings += place_process(self._options.process)
         queue = self._main_queue
         wait = partial(queue.wait, lambda: queue.stopping, stoppable=True)
-        servers = discovery_servers(self._system.discovery, os.environ, self._reporter.log, wait)
-        discovery = active_variables(self._system.discovery, os.environ)
-        lock = hold_instance_lock(namespace, discovery, self._report_key)
+        servers = discovery_servers(discovery, os.environ, self._reporter.log, wait)
+        variables = active_variables(discovery, os.environ)
+        # A run in virtual time is isolated: the same system may run at the same time.
+        lock: AbstractContextManager[None] = nullcontext()
+        if not is_virtual:
+            lock = hold_instance_lock(namespace, variables, self._report_key)
         with lock, signals, servers:
             self._limits.limit_start()
             try:

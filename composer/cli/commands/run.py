@@ -9,6 +9,7 @@ import signal
 import sys
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
+from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -43,6 +44,7 @@ from composer.cli.support.terminal import say, write
 if TYPE_CHECKING:
     from composer.model import Process, System
     from composer.plan import Plan
+    from composer.runtime.clock.clock import Clock
     from composer.runtime.host_options import HostOptions
     from composer.runtime.supervision.events import Outcome
 
@@ -57,8 +59,17 @@ EPILOG = examples(
     "compose run pipeline --autostart inactive             configure nodes, do not activate",
     "compose run pipeline --wait --timeout 10              run in the background",
     "compose run robot.yaml --process perception           run one of its processes alone",
+    "compose run pipeline --time virtual --for 60          a minute in a second, always the same",
     "compose run pipeline --dashboard                      watch and control it in the browser",
 )
+
+
+class Time(StrEnum):
+    """The values of ``--time``."""
+
+    REAL = "real"
+    VIRTUAL = "virtual"
+
 
 #: The default of ``--timeout`` with ``--wait``.
 _WAIT_S = 60.0
@@ -85,6 +96,13 @@ def run(
             help="Shut down this long after the end of the bring-up.",
         ),
     ] = None,
+    time: Annotated[
+        Time,
+        typer.Option(
+            help="'virtual' jumps whenever nothing is left to do: the same run every time. "
+            "Needs --for, and nodes of this process only.",
+        ),
+    ] = Time.REAL,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the plan with its causes and exit.")
     ] = False,
@@ -173,6 +191,7 @@ def run(
     """
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
+    _check_time(time, run_for, is_observed=wait or dashboard or process is not None)
     from composer.cli.support.c_streams import C_STREAMS
 
     C_STREAMS.redirect()  # before libraries of ROS are loaded
@@ -212,6 +231,7 @@ def run(
         announce_discovery(part)
     start = given_options(context, (*START_OPTIONS, "tracing", "check_mutation"))
     from composer.cli.support.process import compose_command, run_in_background
+    from composer.runtime.process.computer import process_start_s
     from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
 
     if wait:
@@ -228,6 +248,8 @@ def run(
         all_or_nothing=all_or_nothing,
         process=member,
         report_key=os.environ.pop(REPORT_KEY_VARIABLE, ""),  # not for its own children
+        clock=_clock(time),
+        started_at_s=None if time is Time.VIRTUAL else process_start_s(),
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
     )
     shown = [*given_options(context, ("settings", "namespace", "autostart")), "--", system]
@@ -334,7 +356,6 @@ def _options(
     from composer.cli.support.process import end_within
     from composer.model import LogLevel
     from composer.runtime.host_options import HostOptions
-    from composer.runtime.process.computer import process_start_s
 
     return HostOptions(
         run_for_s=run_for,
@@ -343,5 +364,24 @@ def _options(
         log_level=LogLevel.INFO if level is None else LogLevel(level.value),
         end_within=end_within,
         ends_process=True,
-        started_at_s=process_start_s(),
     )
+
+
+def _check_time(time: Time, run_for: float | None, *, is_observed: bool) -> None:
+    """Raise UsageError for options that have no meaning in virtual time."""
+    if time is Time.REAL:
+        return
+    if run_for is None:
+        raise UsageError("--time virtual needs --for: the time would run away")
+    if is_observed:
+        raise UsageError(
+            "--time virtual cannot be used with --wait, --dashboard and --process: the run takes"
+            " part in nothing outside of its process"
+        )
+
+
+def _clock(time: Time) -> Clock:
+    from composer.runtime.clock.clock import COMPUTER
+    from composer.runtime.clock.virtual import VirtualClock
+
+    return VirtualClock() if time is Time.VIRTUAL else COMPUTER

@@ -15,6 +15,9 @@ from typing import Final
 class Clock(ABC):
     """The time of a system, and waits for it. Any thread may call the methods."""
 
+    #: Whether it jumps, instead of waiting, when nothing is left to do.
+    is_virtual = False
+
     @abstractmethod
     def monotonic(self) -> float:
         """Return a time in seconds that nothing adjusts; only differences have a meaning."""
@@ -30,6 +33,14 @@ class Clock(ABC):
     @abstractmethod
     def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
         """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
+
+    @abstractmethod
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread of the system."""
+
+    @abstractmethod
+    def join(self, thread: threading.Thread, timeout_s: float | None = None) -> None:
+        """Wait for the end of a thread, at most ``timeout_s`` seconds."""
 
     def time(self) -> float:
         """Return the seconds since 1970."""
@@ -47,6 +58,14 @@ class RealClock(Clock):
     def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
         """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
         return event.wait(timeout_s)
+
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread of the system."""
+        thread.start()
+
+    def join(self, thread: threading.Thread, timeout_s: float | None = None) -> None:
+        """Wait for the end of a thread, at most ``timeout_s`` seconds."""
+        thread.join(timeout_s)
 
     def since_boot_s(self) -> float:
         """Return the seconds since the computer has started, including suspends."""

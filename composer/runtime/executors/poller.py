@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from composer.runtime.clock.clock import Clock
+from composer.runtime.clock.virtual import VirtualClock, Wakeup
 
 #: The file descriptors that are ready, as (file descriptor, event mask).
 Ready = Sequence[tuple[int, int]]
@@ -137,3 +138,31 @@ class Poller:
         self._time[2], self._time[3] = divmod(nanoseconds, _NANOSECONDS)  # after the interval
         if _LIBC.timerfd_settime(self._timer_fd, _TFD_TIMER_ABSTIME, _pointer(self._time), None):
             raise OSError("timerfd_settime failed")
+
+
+class VirtualPoller:
+    """Waits for wake-ups and points in virtual time. No entity becomes ready: nothing uses DDS."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._wakeup = Wakeup(clock)
+        self.wake = self._wakeup.wake
+
+    def poll(self) -> Ready:
+        """Return what is ready: nothing."""
+        return ()
+
+    def register(self, fd: int) -> None:
+        """Do nothing."""
+
+    def unregister(self, fd: int) -> None:
+        """Do nothing."""
+
+    def wait(self, until_s: float) -> Ready:
+        """Wait until :meth:`wake` is called or the clock reaches ``until_s``."""
+        self._wakeup.wait(until_s)
+        return ()
+
+
+def poller_for(clock: Clock) -> Poller | VirtualPoller:
+    """Return a poller that waits by ``clock``."""
+    return VirtualPoller(clock) if isinstance(clock, VirtualClock) else Poller(clock)

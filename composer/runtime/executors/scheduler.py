@@ -17,7 +17,7 @@ from math import inf
 from composer.model import ExecutorKind
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.base_loop import BUSY_S, YIELD_S, ScheduledCall, TimerQueue
-from composer.runtime.executors.poller import Poller
+from composer.runtime.executors.poller import poller_for
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.tasks import Report, name_of
 from composer.runtime.executors.turns import Turn, TurnTaking
@@ -35,7 +35,7 @@ class Scheduler(TurnTaking):
     ) -> None:
         super().__init__(name, on_exception, kind, threads, clock)
         self._monotonic = clock.monotonic
-        self._poller = Poller(clock)
+        self._poller = poller_for(clock)
         self._timers = TimerQueue(clock)
         self._calls: deque[Callable[[], object]] = deque()
         self._ready: deque[SourceGroup] = deque()  # with something to take

@@ -99,7 +99,7 @@ class TurnTaking(BaseLoop):
 
     def start(self) -> None:
         """Start the thread of the loop."""
-        self._threads[0].start()
+        self.clock.start(self._threads[0])
 
     def native_thread_ids(self) -> tuple[int, ...]:
         """Return Linux's ids of all threads of the loop, once it was started."""
@@ -122,7 +122,7 @@ class TurnTaking(BaseLoop):
         if self.is_current():
             return False
         for thread in tuple(self._threads):
-            thread.join(max(0.0, until_s - self.clock.monotonic()))
+            self.clock.join(thread, max(0.0, until_s - self.clock.monotonic()))
         if not any(thread.is_alive() for thread in self._threads):
             return True
         for task in tuple(self._tasks):
@@ -231,7 +231,7 @@ class TurnTaking(BaseLoop):
             self._idle.pop()
             self._turns.put(turn)
         else:
-            self._add_thread(turn).start()
+            self.clock.start(self._add_thread(turn))
 
     def _resume(self, call: list[bool] | None) -> None:
         """Get the turn back from the thread that has it now, unless the loop stops."""

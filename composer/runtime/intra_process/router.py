@@ -85,12 +85,13 @@ def _server_reason(channel: Channel) -> str | None:
 def _topic_reason(channel: Channel) -> str | None:
     if channel.name in _NOT_BY_PORTS or channel.name.endswith(_ENDINGS_NOT_BY_PORTS):
         return "the runtime publishes it too"
-    if _is_timed(end.port.qos.profile for end in channel.ends):
+    if is_timed(end.port.qos.profile for end in channel.ends):
         return "its QoS has a deadline, lifespan or liveliness, which only the middleware monitors"
     return None
 
 
-def _is_timed(profiles: Iterable[QosProfile]) -> bool:
+def is_timed(profiles: Iterable[QosProfile]) -> bool:
+    """Return whether a profile has a time limit, which only the middleware monitors."""
     return any(
         profile.deadline_ms is not None
         or profile.lifespan_ms is not None

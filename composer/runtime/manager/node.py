@@ -195,7 +195,9 @@ class ManagerNode:
             self._reports.report,
             self._reports.timings,
         )
-        self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
+        self._query_socket: QuerySocket | None = None
+        if not status.clock.is_virtual:
+            self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)
         self._loop.call_soon(self._reports.publish)
@@ -206,7 +208,8 @@ class ManagerNode:
 
         In shared memory, a response would disappear together with the node.
         """
-        self._query_socket.close(_ENDS_WITHIN_S)
+        if self._query_socket is not None:
+            self._query_socket.close(_ENDS_WITHIN_S)
         self._status.on_change(lambda: None)
         self._loop.call_soon(self._reports.publish_now)
         if linger:

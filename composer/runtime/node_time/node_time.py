@@ -10,11 +10,13 @@ from collections.abc import Callable, Iterable
 from typing import Any, cast
 
 from rclpy.clock import ROSClock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.time import Time
 from rclpy.time_source import USE_SIM_TIME_NAME
 
+from composer.runtime.clock.virtual import VirtualClock
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import TimerHandle
 from composer.runtime.node_time.sim_time import UNKNOWN, SimTimers, SimTimeSource
@@ -41,7 +43,13 @@ class NodeTime:
         # rclpy's time source still follows the parameter and switches the clock, but without its
         # node it does not subscribe.
         node._time_source.detach_node()
-        node.add_post_set_parameters_callback(self._follow_parameter)
+        self._virtual = loop.clock if isinstance(loop.clock, VirtualClock) else None
+        if self._virtual is None:
+            node.add_post_set_parameters_callback(self._follow_parameter)
+        else:  # whatever the parameter says, there is one time
+            node.add_post_set_parameters_callback(self._keep_virtual_time)
+            self._keep_virtual_time()
+            self._virtual.follow(self._set_virtual_time)
 
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> _DelayedCall:
         """Call ``callback`` on the node's loop once, ``delay_s`` seconds from now.
@@ -67,6 +75,8 @@ class NodeTime:
         """Stop following /clock."""
         if self.is_simulated:
             self._sim_time.leave(self._set_time)
+        if self._virtual is not None:
+            self._virtual.unfollow(self._set_virtual_time)
 
     def schedule(self, delay_s: float, callback: Callable[[], object]) -> TimerHandle:
         """Call ``callback`` once, by the node's current time."""
@@ -93,6 +103,12 @@ class NodeTime:
         for call in tuple(self._delayed_calls):
             call.start()
         self._on_switch()
+
+    def _keep_virtual_time(self, _: object = ()) -> None:
+        self._ros._set_ros_time_is_active(True)
+
+    def _set_virtual_time(self, now_ns: int) -> None:
+        self._ros.set_ros_time_override(Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME))
 
     def _set_time(self, now: Time) -> None:
         self._ros.set_ros_time_override(now)

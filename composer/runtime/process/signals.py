@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 from composer.runtime.clock.clock import Clock
+from composer.runtime.clock.virtual import VirtualClock, Wakeup
 
 _MILLISECONDS = 1000
 _LONGEST_MS = 2**31 - 1  # the longest timeout of poll(2): 24 days
@@ -56,13 +57,18 @@ class WakeupPipe:
         return math.ceil(min(left_ms, _LONGEST_MS))
 
 
+def wakeup_for(clock: Clock) -> WakeupPipe | Wakeup:
+    """Return what wakes a thread that waits by ``clock``."""
+    return Wakeup(clock) if isinstance(clock, VirtualClock) else WakeupPipe(clock)
+
+
 #: SIGQUIT would leave sockets and shared memory behind.
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 @contextmanager
 def stop_signals(
-    stop: Callable[[str], None], wakeup: WakeupPipe, *, ends_process: bool
+    stop: Callable[[str], None], wakeup: WakeupPipe | Wakeup, *, ends_process: bool
 ) -> Iterator[None]:
     """Call ``stop(name of the signal)`` for each signal, on the main thread.
 

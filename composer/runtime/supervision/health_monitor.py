@@ -79,7 +79,7 @@ class HealthMonitor:
 
     def start(self) -> None:
         """Start the thread."""
-        self._thread.start()
+        self._clock.start(self._thread)
 
     def system_is_up(self) -> None:
         """Check silence and errors from now on: during the bring-up, some nodes wait for others."""
@@ -91,7 +91,7 @@ class HealthMonitor:
         """Stop the thread."""
         self._end.set()
         if self._thread.is_alive():
-            self._thread.join()
+            self._clock.join(self._thread)
 
     def _run(self) -> None:
         while not self._clock.wait(self._end, self._period_s):

@@ -12,7 +12,7 @@ from typing import Generic, TypeAlias, TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.plan import DesiredState, Fault
 from composer.runtime.clock.clock import Clock
-from composer.runtime.process.signals import WakeupPipe
+from composer.runtime.process.signals import wakeup_for
 
 
 class SharedDesiredState:
@@ -105,7 +105,7 @@ class MainQueue(Generic[T]):
         #: The clock of the system.
         self.clock = clock
         #: Woken for every item and request; wake it to make :meth:`wait` check its condition.
-        self.wakeup = WakeupPipe(clock)
+        self.wakeup = wakeup_for(clock)
         self._items: deque[T] = deque()
         self._held = threading.local()
         #: Why the system stops; None while no stop is requested.

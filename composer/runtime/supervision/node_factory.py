@@ -134,6 +134,9 @@ class NodeFactory:
         raise AssertionError(f"{node.full_name} runs in this process")
 
     def _loop_of(self, executor: Executor) -> Loop:
+        if self.clock.is_virtual:  # one order of everything
+            one = Located(DEFAULT_EXECUTOR, executor.span)
+            executor = Executor(one, ExecutorKind.EVENTS, executor.span)
         name = executor.name.value
         if name not in self.loops:
             self.loops[name] = Loop(

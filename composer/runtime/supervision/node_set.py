@@ -73,11 +73,17 @@ class NodeSet:
         Raises CreationFailed. Then no loop runs, and the nodes created until then remain.
         """
         refusal = self._factory.join(process)
+        if refusal is not None and self._clock.is_virtual:
+            reason = f"virtual time needs topics within the process: {refusal}"
+            raise CreationFailed("the system", reason)
         if refusal is not None:
             self.warnings.append(
                 "topics within the process use DDS, which takes more CPU time:"
                 f" {refusal}; see 'compose doctor', or set 'delivery: dds'"
             )
+        if self._clock.is_virtual and self._system.executors:
+            names = ", ".join(f"'{executor.name}'" for executor in self._system.executors)
+            self.warnings.append(f"in virtual time, one event loop runs the nodes of {names}")
         for node in self._system.nodes:
             before_each()
             try:

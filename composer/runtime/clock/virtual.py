@@ -1,0 +1,159 @@
+"""Virtual time: a clock that jumps to the next point in time whenever nothing is left to do.
+
+The threads of a system take turns: one runs, the others wait in a method of the clock. A thread
+that begins to wait passes the turn on: to the one that has waited longest of those whose wait has
+ended, or else, after a jump of the time, to the one whose wait ends first. So there is one order of
+everything that happens, whatever the computer does meanwhile, and no thread waits for real time.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from math import inf
+from threading import get_ident
+from typing import Final
+
+from composer.runtime.clock.clock import COMPUTER, Clock
+
+#: Virtual time begins in September 2001: not at zero, which means in ROS that no time is known.
+START_NS: Final = 10**18
+_NANOSECONDS = 1_000_000_000
+#: How often a system that has nothing to wait for looks for signals and other threads.
+_POLL_S = 0.001
+
+
+class _Waiting:
+    """A thread that waits for ``is_over()`` or ``until_s``, and then for its turn."""
+
+    __slots__ = ("is_over", "turn", "until_s")
+
+    def __init__(self, is_over: Callable[[], bool], until_s: float) -> None:
+        self.is_over = is_over
+        self.until_s = until_s
+        self.turn = threading.Lock()
+        self.turn.acquire()
+
+
+class VirtualClock(Clock):
+    """The time of a system that runs in virtual time.
+
+    The thread that creates it has the first turn. Other threads of the system begin by
+    :meth:`start`. Threads that did not are not of the system: they wait in real time.
+    """
+
+    is_virtual = True
+
+    def __init__(self) -> None:
+        self._now_s = 0.0
+        self._waiting: list[_Waiting] = []  # since when they wait, the longest first
+        self._members = {get_ident()}
+        self._alive: set[threading.Thread] = set()
+        self._followers: list[Callable[[int], None]] = []
+
+    def monotonic(self) -> float:
+        """Return the seconds since the start."""
+        return self._now_s
+
+    def time_ns(self) -> int:
+        """Return the nanoseconds since 1970, as if the system had started at :data:`START_NS`."""
+        return START_NS + round(self._now_s * _NANOSECONDS)
+
+    def sleep(self, delay_s: float, /) -> None:
+        """Block the calling thread for ``delay_s`` seconds of virtual time."""
+        self.wait_until(lambda: False, self._now_s + delay_s)
+
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
+        """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
+        return self.wait_until(event.is_set, inf if timeout_s is None else self._now_s + timeout_s)
+
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread of the system; it runs when it gets the turn."""
+        first = _Waiting(lambda: True, self._now_s)
+        run = thread.run
+
+        def run_in_turn() -> None:
+            self._members.add(get_ident())
+            first.turn.acquire()
+            try:
+                run()
+            finally:
+                self._members.discard(get_ident())
+                self._alive.discard(thread)
+                self._next().turn.release()
+
+        thread.run = run_in_turn  # type: ignore[method-assign]
+        self._alive.add(thread)
+        self._waiting.append(first)
+        thread.start()
+
+    def join(self, thread: threading.Thread, timeout_s: float | None = None) -> None:
+        """Wait for the end of a thread, at most ``timeout_s`` seconds."""
+        until_s = inf if timeout_s is None else self._now_s + timeout_s
+        if self.wait_until(lambda: thread not in self._alive, until_s):
+            thread.join()
+
+    def wait_until(self, is_over: Callable[[], bool], until_s: float = inf) -> bool:
+        """Block until ``is_over()``, at most until ``until_s`` (monotonic); return its value."""
+        if get_ident() in self._members:
+            waiting = _Waiting(is_over, until_s)
+            self._waiting.append(waiting)
+            chosen = self._next()
+            if chosen is not waiting:
+                chosen.turn.release()
+                waiting.turn.acquire()
+        else:
+            while not is_over() and self._now_s < until_s:
+                COMPUTER.sleep(_POLL_S)
+        return is_over()
+
+    def follow(self, follower: Callable[[int], None]) -> None:
+        """Call ``follower(nanoseconds since 1970)`` now and after each jump."""
+        self._followers.append(follower)
+        follower(self.time_ns())
+
+    def unfollow(self, follower: Callable[[int], None]) -> None:
+        """Stop calling a follower."""
+        self._followers.remove(follower)
+
+    def _next(self) -> _Waiting:
+        """Return the thread that has the next turn; it does not wait any more."""
+        while True:
+            for waiting in self._waiting:
+                if waiting.is_over():
+                    break
+            else:
+                waiting = min(self._waiting, key=lambda waiting: waiting.until_s)
+                if waiting.until_s == inf:
+                    COMPUTER.sleep(_POLL_S)
+                    continue
+                self._jump(waiting.until_s)
+            self._waiting.remove(waiting)
+            return waiting
+
+    def _jump(self, to_s: float) -> None:
+        if to_s > self._now_s:
+            self._now_s = to_s
+            for follower in self._followers:
+                follower(self.time_ns())
+
+
+class Wakeup:
+    """Wakes the current wait of a thread, or the next one, in virtual time."""
+
+    #: There is no file descriptor: Python calls signal handlers while a thread waits for its turn.
+    fd = -1
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
+        self._is_woken = False
+
+    def wake(self) -> None:
+        """End the current or the next wait, from any thread or a signal handler."""
+        self._is_woken = True
+
+    def wait(self, until_s: float = inf) -> bool:
+        """Wait for a wake-up; return False if ``until_s`` (monotonic) comes first."""
+        is_woken = self._clock.wait_until(lambda: self._is_woken, until_s)
+        self._is_woken = False
+        return is_woken

@@ -1,0 +1,154 @@
+"""Systems in virtual time: the same run every time, byte by byte."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from composer.runtime.process import StartRefused
+from composer.runtime.supervision.virtual_time import check_virtual_time
+from tests.cli.compose import compose as in_process
+from tests.ros.support.commands import COMPOSE, compose
+from tests.ros.support.in_process import system_of
+
+#: Timers, sleeps, calls that time out, a node that is restarted, a parallel executor, and stamps.
+SYSTEM = """
+system: recorded
+executors: {pool: {kind: multi_threaded, threads: 3}}
+lifecycle: {on_failure: restart, restart: {max_attempts: 5, window_ms: 20000, backoff_ms: 500}}
+nodes:
+  source:
+    behavior: parts:Source
+    publishers: {data: {type: std_msgs/msg/Header}}
+    clients: {decide: {type: std_srvs/srv/SetBool, timeout_ms: 300}}
+    timers: {tick: {period_ms: 70}, ask: {period_ms: 500}}
+  server:
+    executor: pool
+    behavior: parts:Server
+    services: {decide: {type: std_srvs/srv/SetBool}}
+  flaky:
+    publishers: {scan: {type: std_msgs/msg/String}}
+    timers: {measure: {rate_hz: 10, when: count < 30, publish: {scan: {data: "scan {count}"}}}}
+    lifecycle: {watch: {topic_silence_ms: 1000}}
+  recorder:
+    executor: pool
+    behavior: parts:Recorder
+    subscriptions: {data: {type: std_msgs/msg/Header}, scan: {type: std_msgs/msg/String}}
+    lifecycle: {depends_on: [flaky]}
+connections:
+  - {topic: /data, from: source.data, to: recorder.data}
+  - {topic: /scan, from: flaky.scan, to: recorder.scan}
+  - {service: /decide, server: server.decide, clients: source.decide}
+"""
+PARTS = """
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool
+
+from composer.behavior import Behavior, CallError
+
+
+class Source(Behavior):
+    def on_tick(self):
+        self.publishers.data.publish(Header(stamp=self.clock.stamp(), frame_id="map"))
+
+    async def on_ask(self):
+        try:
+            answer = await self.clients.decide.call(SetBool.Request(data=True))
+            self.log.info(f"answer: {answer.message}")
+        except CallError as error:
+            self.log.info(f"no answer: {error}")
+
+
+class Server(Behavior):
+    def on_activate(self):
+        self.requests = 0
+
+    async def on_decide(self, request, response):
+        self.requests += 1
+        await self.clock.sleep(0.1 * (self.requests % 5))
+        response.message = f"request {self.requests}"
+        return response
+
+
+class Recorder(Behavior):
+    def on_data(self, message):
+        self.log.info(serialize_message(message).hex())
+
+    def on_scan(self, message):
+        self.log.info(serialize_message(message).hex())
+"""
+
+
+def run(system: Path, hash_seed: str) -> tuple[str, str]:
+    """Run a system for a minute of virtual time, in a new interpreter; return what it prints."""
+    command = (*COMPOSE, "run", str(system), "--time", "virtual", "--for", "60")
+    environment = os.environ | {"PYTHONHASHSEED": hash_seed}
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+    return done.stdout, done.stderr
+
+
+def test_the_same_run_byte_by_byte_whatever_the_hash_seed(tmp_path: Path) -> None:
+    system = tmp_path / "recorded.yaml"
+    system.write_text(SYSTEM)
+    (tmp_path / "parts.py").write_text(PARTS)
+    first = run(system, "0")
+    log = first[1]
+    assert log.count("[recorder] 0001") > 800
+    assert "/flaky failed: silent for 1000 ms; restart 2" in log
+    assert "answer: request 1" in log
+    assert "no answer: service '/decide' did not answer within 300 ms" in log
+    assert "[59." in log
+    assert run(system, "1") == first
+
+
+@pytest.mark.parametrize("name", ["pipeline", "supervised"])
+def test_examples_take_a_minute_in_a_moment(name: str) -> None:
+    done = compose("run", f"systems/{name}.yaml", "--time", "virtual", "--for", "60")
+    assert "[60.000] [INFO] [compose] shutting down: --for elapsed" in done.stderr
+    assert "ran for 60.0 s" in done.stderr
+
+
+REFUSED = [
+    ('talker: {class: "demo:Talker"}', "/talker is a class of rclpy, which has the time of the"),
+    ("battery: {external: true}", "/battery is an external node, which has the time of the"),
+    ("camera: {executable: {command: [camera]}}", "/camera is an executable, which has the time"),
+    (
+        "a: {publishers: {scan: {type: std_msgs/msg/String, qos: {deadline_ms: 100}}}}",
+        "/scan of /a has a deadline, lifespan or lease",
+    ),
+    (
+        "{a: {publishers: {x: {type: std_msgs/msg/String}}},"
+        " b: {subscriptions: {x: {type: std_msgs/msg/String}}}}\n"
+        "connections: [{topic: /x, from: a.x, to: b.x, delivery: dds}]",
+        "topic /x needs the middleware: 'delivery: dds' is set",
+    ),
+]
+
+
+@pytest.mark.parametrize(("nodes", "reason"), REFUSED)
+def test_what_has_the_time_of_the_computer_is_refused(
+    tmp_path: Path, nodes: str, reason: str
+) -> None:
+    nodes = nodes if nodes.startswith("{") else f"{{{nodes}}}"
+    system = system_of(f"system: refused\nnodes: {nodes}\n", tmp_path)
+    with pytest.raises(StartRefused, match=f"refused cannot run in virtual time: {reason}"):
+        check_virtual_time(system)
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ((), "--time virtual needs --for"),
+        (("--for", "1", "--wait"), "--time virtual cannot be used with --wait"),
+        (("--for", "1", "--process", "x"), "--time virtual cannot be used with --wait"),
+    ],
+)
+def test_options_that_need_real_time_are_refused(options: tuple[str, ...], error: str) -> None:
+    done = in_process("run", "systems/minimal.yaml", "--time", "virtual", *options)
+    assert (done.code, error in done.err) == (2, True)
