@@ -18,7 +18,8 @@ INSTALL := $(PIP) install -qq
 INSTALL_PINNED := $(INSTALL) --require-hashes -r requirements
 INSTALL_PROJECT := $(INSTALL) --no-deps --no-build-isolation --editable .
 XDIST := --dist loadfile --no-loadscope-reorder --max-worker-restart 0
-INTERFACES := $(shell find interfaces -type f)
+INTERFACES := $(shell find interfaces -type f) composer/interfaces/jazzy.json
+UNPUBLISHED := composition_interfaces tf2_msgs
 READY := $(STAMPS)/composer $(STAMPS)/interfaces
 # Set only if this Python has no headers: create_environment.py downloads them into the environment.
 HEADERS = $(abspath $(shell ls -d $(VENV)/headers/usr/include/python3.* 2>/dev/null))
@@ -167,16 +168,18 @@ $(STAMPS)/tools: requirements/tools.txt $(STAMPS)/environment
 	@$(INSTALL_PINNED)/tools.txt
 	@touch $@
 
-# With the messages of tf2, which are not on PyPI: they are built from the definitions that come with the composer.
+# With the messages of tf2 and of component containers, which are not on PyPI: they are built from the definitions
+# that come with the composer.
 # pip cannot check hashes in the build environments that it makes, so this makes one itself.
 $(STAMPS)/interfaces: $(INTERFACES) requirements/interfaces.txt | $(STAMPS)/composer
-	@echo "==> compiling the example interfaces and tf2_msgs (once, about a minute)"
+	@echo "==> compiling the example interfaces and $(UNPUBLISHED) (once, about two minutes)"
 	@rm -rf $(BUILD) && $(BIN)/python -m venv --without-pip $(BUILD)
 	@$(PIP) --python $(BUILD) install -qq --require-hashes -r requirements/interfaces.txt
-	@$(BIN)/compose interface build tf2_msgs --generate $(BUILD)/tf2_msgs >/dev/null
+	@$(foreach package,$(UNPUBLISHED),\
+	  $(BIN)/compose interface build $(package) --generate $(BUILD)/$(package) >/dev/null &&) true
 	@$(if $(HEADERS),CPATH=$(HEADERS):$(dir $(HEADERS))) $(PIP) --python $(BUILD) wheel -qq \
 	  --no-deps --no-build-isolation --wheel-dir $(BUILD)/dist \
-	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) ./interfaces $(abspath $(BUILD))/tf2_msgs
+	  $(addprefix --config-settings=cmake.define.Python3_INCLUDE_DIR=,$(HEADERS)) ./interfaces $(addprefix $(abspath $(BUILD))/,$(UNPUBLISHED))
 	@$(INSTALL) --force-reinstall --no-deps --no-index $(BUILD)/dist/*.whl
 	@rm -rf $(BUILD)
 	@touch $@

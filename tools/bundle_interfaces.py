@@ -5,8 +5,9 @@ Run it in an environment with ROS 2 Jazzy and composer_interfaces when either of
     python tools/bundle_interfaces.py
 
 Packages that this environment lacks keep their definitions. These are not on PyPI; the snapshot has
-the fields and constants of the versions for Jazzy: control_msgs 5.8.0, example_interfaces 0.12.0,
-geographic_msgs 1.0.5, nav2_msgs 1.3.13, tf2_msgs 0.36.4 and vision_msgs 4.1.1.
+the fields and constants of the versions for Jazzy: composition_interfaces 2.0.3,
+control_msgs 5.8.0, example_interfaces 0.12.0, geographic_msgs 1.0.5, nav2_msgs 1.3.13,
+tf2_msgs 0.36.4 and vision_msgs 4.1.1.
 """
 
 from __future__ import annotations

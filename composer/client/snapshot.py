@@ -13,13 +13,16 @@ from composer.client.messages.rates import RateMeter
 from composer.client.session import Deadline, Session
 from composer.client.systems.node_services import NodeServices
 from composer.language.tree import Plain
+from composer.model.interface_packages import COMPOSITION
 from composer.model.names import is_hidden
 from composer.plan.drift import ObservedNode, Snapshot
+from composer.runtime.ros.messages import MessageError, interface_class
 from composer.runtime.ros.parameter_values import plain_value
 from composer.runtime.ros_graph.node_endpoints import endpoints, node_names, visible_topics
 
 #: How long to wait for the responses of nodes; later ones count as unknown.
 _RESPONSE_S = 2.0
+_LIST_COMPONENTS = "/_container/list_nodes"
 
 
 class GraphObserver:
@@ -43,6 +46,7 @@ class GraphObserver:
         counts = Counter(node_names(graph))
         states = self._states(ends.keys(), deadline)
         parameters = self.parameters(ends.keys(), deadline)
+        containers = self._containers(deadline)
         return Snapshot(
             tuple(
                 ObservedNode(
@@ -51,6 +55,7 @@ class GraphObserver:
                     state=states.get(name, ""),
                     parameters=parameters.get(name, {}),
                     count=max(counts[name], 1),
+                    container=containers.get(name, ""),
                 )
                 for name in sorted(ends)
             )
@@ -72,6 +77,29 @@ class GraphObserver:
         return {
             node: None if response is None else str(response.current_state.label)
             for node, response in responses.items()
+        }
+
+    def _containers(self, deadline: Deadline) -> dict[str, str]:
+        """Return the container of each loaded component, by full names, as far as they are known.
+
+        Without composition_interfaces, containers cannot be asked.
+        """
+        services = [
+            name for name, _ in self._session.graph.services() if name.endswith(_LIST_COMPONENTS)
+        ]
+        if not services:
+            return {}
+        try:
+            kind = interface_class(f"{COMPOSITION}/srv/ListNodes")
+        except MessageError:
+            return {}
+        requests = {service: kind.Request() for service in services}
+        responses = self._services.call_all(kind, requests, self._response_deadline(deadline))
+        return {
+            str(name): service.removesuffix(_LIST_COMPONENTS)
+            for service, response in responses.items()
+            if response is not None
+            for name in response.full_node_names
         }
 
     def parameters(

@@ -98,7 +98,7 @@ def _scene_node(
         note=_note(node, system, several),
         state=brought_up.states[node.name.value],
         steps=brought_up.steps.get(node.name.value, ""),
-        executor=_executor_key(system, _executor_name(node)),
+        executor=_executor_key(system, _executor_name(node, system)),
         ports=tuple(
             _scene_port(port, rates_hz.get(port.name.value), problems) for port in node.ports
         ),
@@ -173,14 +173,24 @@ def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
         if process.host is not None
     }
     prefix = f"{system.name.value} · " if several else ""
-    for name in dict.fromkeys([*declared, *map(_executor_name, system.nodes)]):
+    around: dict[str, str] = {}
+    for node in system.nodes:
+        name = _executor_name(node, system)
+        if name.startswith(_CONTAINER) and node.process is not None:
+            around[name] = f"{_PROCESS}{node.process.value}"
+    names = (_executor_name(node, system) for node in system.nodes)
+    for name in dict.fromkeys([*declared, *around.values(), *names]):
         kind = _kind(declared.get(name))
-        has_kind = name not in _OUTSIDE.values() and not name.startswith(_PROCESS)
+        has_kind = name not in _OUTSIDE.values() and not name.startswith((_PROCESS, _CONTAINER))
         label = f"{prefix}{name}: {kind}" if has_kind else f"{prefix}{name}{hosts.get(name, '')}"
-        yield ExecutorGroup(_executor_key(system, name), label)
+        parent = _executor_key(system, around[name]) if name in around else ""
+        yield ExecutorGroup(_executor_key(system, name), label, parent)
 
 
-def _executor_name(node: Node) -> str:
+def _executor_name(node: Node, system: System) -> str:
+    container = node.container.value if node.container is not None else node.name.value
+    if container in system.computed(_containers):
+        return f"{_CONTAINER}{container}"
     if node.process is not None:
         return f"{_PROCESS}{node.process.value}"
     if not node.implementation.in_process:
@@ -188,12 +198,28 @@ def _executor_name(node: Node) -> str:
     return node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
 
 
+def _containers(system: System) -> frozenset[str]:
+    """Return the nodes that load components."""
+    return frozenset(
+        node.container.value
+        for node in system.nodes
+        if node.container is not None and system.node(node.container.value) is not None
+    )
+
+
 #: The kinds of nodes that are noted on them.
-_NOTED = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
+_NOTED = (
+    ImplementationKind.CLASS,
+    ImplementationKind.EXECUTABLE,
+    ImplementationKind.COMPONENT,
+    ImplementationKind.EXTERNAL,
+)
 #: The groups of nodes that no executor runs.
 _PROCESS = "process "
+_CONTAINER = "container "
 _OUTSIDE = {
     ImplementationKind.EXECUTABLE: "child processes",
+    ImplementationKind.COMPONENT: "components",
     ImplementationKind.EXTERNAL: "external nodes",
 }
 
@@ -265,7 +291,9 @@ def _node_spans(node: Node) -> Iterator[Span]:
     if node.hosted_class is not None:
         yield node.hosted_class.reference.text.span
     if node.executable is not None:
-        yield from (node.executable.span, *(key.span for key in node.executable.given))
+        yield from (key.span for key in node.executable.given)
+    if node.outside is not None:
+        yield node.outside.span
     if node.executor is not None:
         yield node.executor.span
     for dependency in node.depends_on:

@@ -110,6 +110,8 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
         "behavior": node.behavior.text.value if node.behavior is not None else None,
         "class": node.hosted_class.reference.text.value if node.hosted_class is not None else None,
         "executable": str(node.executable) if node.executable is not None else None,
+        "component": str(node.component) if node.component is not None else None,
+        "container": node.container.value if node.container is not None else None,
         "inner_nodes": [*node.inner_nodes],
         "external": node.external is not None or None,
         "executor": _executor(node),

@@ -11,7 +11,7 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,13 @@ from launch.events import Shutdown as ShutdownEvent
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 from launch.utilities.type_utils import perform_typed_substitution
-from launch_ros.actions import LifecycleNode, LoadComposableNodes, Node
+from launch_ros.actions import (
+    ComposableNodeContainer,
+    LifecycleNode,
+    LoadComposableNodes,
+    Node,
+)
+from launch_ros.actions.load_composable_nodes import get_composable_node_load_request
 
 from composer.base.source import shown_path
 from composer.launch.parameter_values import parameter_values
@@ -38,6 +44,12 @@ _UNKNOWN_NAME = "<node_name_unspecified>"
 #: The name that launch gives to the module of each launch file.
 _LAUNCH_MODULE = "python_launch_file"
 _MAXIMUM_ENTITIES = 100_000
+#: The fields of rcl_interfaces/msg/ParameterValue, by its type.
+_VALUE_FIELDS = (
+    "",
+    *("bool_value", "integer_value", "double_value", "string_value", "byte_array_value"),
+    *("bool_array_value", "integer_array_value", "double_array_value", "string_array_value"),
+)
 #: What launch waits for after a signal by default, in seconds.
 _SIGNAL_TIMEOUT_S = 5.0
 
@@ -62,6 +74,10 @@ class Visitor:
             return
         if isinstance(entity, Node):
             self.nodes.append(self._node(entity, note))
+            self._add_components(entity, self.nodes[-1], note)
+        elif isinstance(entity, LoadComposableNodes):
+            self._add_components(entity, self._target(entity), note)
+            return
         elif isinstance(entity, TimerAction):
             period = f"after {self._text(entity.period)} s"
             self.left_out.append(f"timer: what it starts {period} starts at once")
@@ -77,8 +93,8 @@ class Visitor:
     def _left_out(self, entity: Any) -> list[str]:
         """Describe what cannot be a node of a system; nothing for what can be visited."""
         match entity:
-            case Node() | LoadComposableNodes():
-                return [self._component(item) for item in _components(entity)]
+            case Node():
+                return []
             case ExecuteProcess() | ExecuteLocal():
                 return [f"process: {self._command(entity)}"]
             case RegisterEventHandler():
@@ -132,9 +148,38 @@ class Visitor:
             found |= {self._text(name): self._text(value) for name, value in pairs}
         return found
 
-    def _component(self, component: Any) -> str:
-        plugin, package = self._text(component.node_plugin), self._text(component.package)
-        return f"component: {plugin} of package {package}"
+    def _target(self, action: Any) -> dict[str, Any]:
+        """Return the name and the namespace of the container that an action loads into."""
+        target = action._LoadComposableNodes__target_container
+        is_named = isinstance(target, ComposableNodeContainer)
+        full_name = str(target.node_name) if is_named else self._text(target)
+        namespace, _, name = full_name.rpartition("/")
+        return {"name": name, "namespace": f"/{namespace.strip('/')}"}
+
+    def _add_components(self, action: Any, container: Mapping[str, Any], note: str) -> None:
+        """Add the nodes that are loaded into a container, with the names of a load request."""
+        for description in _components(action):
+            request = get_composable_node_load_request(description, self._context)
+            if request is None:
+                continue
+            extra = {item.name: _plain(item.value) for item in request.extra_arguments}
+            component = {"package": request.package_name, "plugin": request.plugin_name}
+            self.nodes.append(
+                {
+                    "name": request.node_name or None,
+                    "namespace": request.node_namespace or "/",
+                    "executable": request.plugin_name.rpartition("::")[2],
+                    "component": component | ({"extra_arguments": extra} if extra else {}),
+                    "container": (container["namespace"], container["name"]),
+                    "remappings": dict(rule.split(":=", 1) for rule in request.remap_rules),
+                    "parameters": {item.name: _plain(item.value) for item in request.parameters},
+                    "sections": {},
+                    "problems": [],
+                    "ros_arguments": [],
+                    "note": note,
+                    "process": {"left_out": [], "ends_launch": False},
+                }
+            )
 
     def _command(self, entity: Any) -> str:
         return " ".join(self._text(word) for word in entity.cmd)
@@ -212,6 +257,13 @@ def _cause(error: BaseException) -> str:
     text = error.args[0] if isinstance(error, KeyError) and error.args else error
     first = (str(text).strip() or type(error).__name__).splitlines()[0]
     return f"{''.join(places[-1:])}{type(error).__name__}: {first}"
+
+
+def _plain(value: Any) -> Any:
+    """Return the value in a message of a parameter."""
+    name = _VALUE_FIELDS[value.type]
+    found: Any = getattr(value, name) if name else None
+    return list(found) if name.endswith("array_value") else found
 
 
 def _components(action: Any) -> Iterable[Any]:

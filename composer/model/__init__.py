@@ -9,12 +9,14 @@ from composer.model.discovery import Discovery, DiscoveryKind
 from composer.model.hosts import Host, Process
 from composer.model.implementation import (
     BehaviorReference,
+    Component,
     Executable,
     ExecutableKind,
     External,
     HostedClass,
     ImplementationKind,
     LifecycleKind,
+    Outside,
 )
 from composer.model.node import (
     DEFAULT_INTROSPECTION,

@@ -63,13 +63,14 @@ class DependencyEdge:
     """``node`` waits until ``on`` is in ``state``. Both are keys of ``System.nodes``.
 
     ``serves`` is the name of the service or action that ``on`` serves to ``node``; it is empty for
-    a declared dependency.
+    a declared dependency. With ``is_container``, ``node`` is a component that ``on`` loads.
     """
 
     node: str
     on: str
     serves: str = ""
     state: PrimaryState = PrimaryState.ACTIVE
+    is_container: bool = False
 
     @property
     def implied(self) -> bool:
@@ -82,7 +83,12 @@ def declared_edges(system: System) -> Iterator[DependencyEdge]:
     for node in system.nodes:
         for dependency in node.depends_on:
             if system.node(dependency.node.value) is not None:
-                yield DependencyEdge(node.name.value, dependency.node.value, state=dependency.state)
+                yield DependencyEdge(
+                    node.name.value,
+                    dependency.node.value,
+                    state=dependency.state,
+                    is_container=dependency.is_container,
+                )
 
 
 def implied_edges(system: System) -> Iterator[DependencyEdge]:

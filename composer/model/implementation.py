@@ -21,17 +21,25 @@ class ImplementationKind(StrEnum):
     BEHAVIOR = "behavior"
     CLASS = "class"
     EXECUTABLE = "executable"
+    COMPONENT = "component"
     EXTERNAL = "external"
 
     @property
     def in_process(self) -> bool:
         """Whether the node runs in the process of the composer."""
-        return self not in (ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
+        return self not in _OUTSIDE
 
     @property
     def declares_everything(self) -> bool:
         """Whether the node was written for the composer: it only has what it declares."""
         return self in (ImplementationKind.BEHAVIOR, ImplementationKind.DECLARATIVE)
+
+
+_OUTSIDE = (
+    ImplementationKind.EXECUTABLE,
+    ImplementationKind.COMPONENT,
+    ImplementationKind.EXTERNAL,
+)
 
 
 class ExecutableKind(StrEnum):
@@ -76,7 +84,30 @@ class HostedClass:
 
 
 @dataclass(frozen=True, slots=True)
-class Executable:
+class Outside:
+    """An implementation outside the process.
+
+    ``ready_timeout_ms`` is the time limit until the node is in the ROS graph with its ports.
+    """
+
+    span: Span = field(compare=False)
+    lifecycle: LifecycleKind = field(default=LifecycleKind.NONE, kw_only=True)
+    ready_timeout_ms: Located[float] | None = field(default=None, kw_only=True)
+
+    @property
+    def is_managed(self) -> bool:
+        """Whether the lifecycle services of the node drive it."""
+        return self.lifecycle is LifecycleKind.MANAGED
+
+    @property
+    def ready_timeout_s(self) -> float:
+        """The time limit of the start, in seconds."""
+        limit = self.ready_timeout_ms
+        return (DEFAULT_READY_TIMEOUT_MS if limit is None else limit.value) / 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Executable(Outside):
     """A program that runs as a child process.
 
     It is found by ``package`` and ``name``, as with ``ros2 run``, or started by ``command``; a
@@ -90,7 +121,6 @@ class Executable:
     entry.
     """
 
-    span: Span = field(compare=False)
     folder: Path
     package: Located[str] | None = None
     name: Located[str] | None = None
@@ -100,17 +130,9 @@ class Executable:
     environment: tuple[tuple[Located[str], str], ...] = ()
     working_directory: Located[str] | None = None
     kind: ExecutableKind = ExecutableKind.NODE
-    lifecycle: LifecycleKind = LifecycleKind.NONE
-    ready_timeout_ms: Located[float] | None = None
     sigterm_timeout_ms: float = 500.0
     sigkill_timeout_ms: float = 300.0
     given: tuple[Located[str], ...] = field(default=(), compare=False)  # the keys in YAML
-
-    @property
-    def ready_timeout_s(self) -> float:
-        """The time limit of the start, in seconds."""
-        limit = self.ready_timeout_ms
-        return (DEFAULT_READY_TIMEOUT_MS if limit is None else limit.value) / 1000.0
 
     def __str__(self) -> str:
         if self.command:
@@ -119,15 +141,20 @@ class Executable:
 
 
 @dataclass(frozen=True, slots=True)
-class External:
+class Component(Outside):
+    """A class of a package that a component container loads as a node.
+
+    ``extra_arguments`` are for the container, such as ``use_intra_process_comms``.
+    """
+
+    package: Located[str] | None = None
+    plugin: Located[str] | None = None
+    extra_arguments: tuple[tuple[Located[str], Plain], ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.package or '?'} {self.plugin or '?'}"
+
+
+@dataclass(frozen=True, slots=True)
+class External(Outside):
     """A node that is started by something else: the system waits for it and observes it."""
-
-    span: Span = field(compare=False)
-    lifecycle: LifecycleKind = LifecycleKind.NONE
-    ready_timeout_ms: Located[float] | None = None
-
-    @property
-    def ready_timeout_s(self) -> float:
-        """How long the bring-up waits for the node, in seconds."""
-        limit = self.ready_timeout_ms
-        return (DEFAULT_READY_TIMEOUT_MS if limit is None else limit.value) / 1000.0

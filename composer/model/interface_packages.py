@@ -11,10 +11,13 @@ from composer.interfaces.sources import Bundle
 if TYPE_CHECKING:
     from composer.model import Node, System
 
+#: The services of component containers.
+COMPOSITION = "composition_interfaces"
 #: Packages of the bundled definitions that are not among the wheels of ROS from PyPI.
 NOT_IN_WHEELS = frozenset(
     (
         "composer_interfaces",
+        COMPOSITION,
         "control_msgs",
         "example_interfaces",
         "geographic_msgs",
@@ -31,6 +34,8 @@ def used_packages(system: System) -> dict[str, Node]:
     for node in system.nodes:
         for port in node.all_ports if node.implementation.in_process else node.ports:
             users.setdefault(port.interface.value.partition("/")[0], node)
+        if node.component is not None and node.external is None:
+            users.setdefault(COMPOSITION, node)
     return users
 
 

@@ -13,10 +13,12 @@ from composer.base.source import Located, Span
 from composer.language.tree import Plain
 from composer.model.implementation import (
     BehaviorReference,
+    Component,
     Executable,
     External,
     HostedClass,
     ImplementationKind,
+    Outside,
 )
 from composer.model.names import join_node_name
 from composer.model.ports import (
@@ -180,10 +182,14 @@ class PrimaryState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Dependency:
-    """Another node that must be in ``state`` before this one enters it."""
+    """Another node that must be in ``state`` before this one enters it.
+
+    A container must be active before its component is configured.
+    """
 
     node: Located[str]
     state: PrimaryState = PrimaryState.ACTIVE
+    is_container: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +220,8 @@ class Node:
     behavior: BehaviorReference | None = None
     hosted_class: HostedClass | None = None
     executable: Executable | None = None
+    component: Component | None = None
+    container: Located[str] | None = None  # the node that loads its component
     conflicting: tuple[Located[str], ...] = ()  # the keys of its implementations, if several
     external: External | None = None  # takes precedence over the implementation of its type
     #: Names of nodes that its program keeps, besides its own. See ``Executable.nodes``.
@@ -266,11 +274,18 @@ class Node:
             return ImplementationKind.EXTERNAL
         if self.executable is not None:
             return ImplementationKind.EXECUTABLE
+        if self.component is not None:
+            return ImplementationKind.COMPONENT
         if self.hosted_class is not None:
             return ImplementationKind.CLASS
         if self.behavior is not None:
             return ImplementationKind.BEHAVIOR
         return ImplementationKind.DECLARATIVE
+
+    @property
+    def outside(self) -> Outside | None:
+        """What implements the node outside the process; None if it runs in the process."""
+        return self.external or self.executable or self.component
 
     @property
     def full_name(self) -> str:

@@ -86,7 +86,10 @@ def optional_nodes(system: System) -> frozenset[str]:
 
 
 def desired_states(system: System, desired: DesiredState) -> Mapping[str, PrimaryState]:
-    """Return the desired state of every node while the failed ones are kept down."""
+    """Return the desired state of every node while the failed ones are kept down.
+
+    A component is unloaded with its container, other nodes that depend on failed ones are inactive.
+    """
     if not desired.down:
         return desired.goals
     blocked = blocked_nodes(system, desired)
@@ -95,7 +98,11 @@ def desired_states(system: System, desired: DesiredState) -> Mapping[str, Primar
         if name in desired.down:
             goals[name] = PrimaryState.UNCONFIGURED
         elif name in blocked:
-            goals[name] = min(goal, PrimaryState.INACTIVE, key=rank)
+            node = system.node(name)
+            container = node.container.value if node and node.container else ""
+            is_lost = container in desired.down or container in blocked
+            limit = PrimaryState.UNCONFIGURED if is_lost else PrimaryState.INACTIVE
+            goals[name] = min(goal, limit, key=rank)
     return goals
 
 
@@ -143,8 +150,9 @@ def _reachable(
 
     A dependency that a user keeps down takes no node down, but no node is activated without it, nor
     before one without a state, which is in a transition or has failed. Nor is a class configured
-    before, unless the system leaves both inactive: its constructor may wait for the dependency. A
-    node whose failure is ignored is not brought up again.
+    before, unless the system leaves both inactive: its constructor may wait for the dependency. Nor
+    is a component loaded without its container. A node whose failure is ignored is not brought up
+    again.
     """
     reachable = dict(desired_states(system, desired))
     for name, needs in _needs(system, desired):
@@ -162,7 +170,8 @@ def _reachable(
             reachable.get(edge.on) != desired.goals.get(edge.on) for edge in missing
         )
         node = system.node(name)
-        if missing and is_awaited and node is not None and node.hosted_class is not None:
+        is_class = is_awaited and node is not None and node.hosted_class is not None
+        if (missing and is_class) or any(edge.is_container for edge in missing):
             reachable[name] = min(reachable.get(name, states[name]), states[name], key=rank)
     return reachable
 

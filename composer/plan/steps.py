@@ -128,11 +128,11 @@ def build_plan(phases: Iterable[Phase], causes: Mapping[str, str]) -> Plan:
 def _is_awaited(transition: TransitionName, node: Node) -> bool:
     """Return whether a plan waits for a transition.
 
-    External nodes have to appear, executables of this process have to start.
+    External nodes have to appear, executables of this process have to start, components to load.
     """
     if transition not in _UPWARD:
         return True
-    is_started_here = node.executable is not None and node.process is None
+    is_started_here = node.outside is not None and node.process is None
     return node.required and node.external is None and not is_started_here
 
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field
-from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Dependency, Node, PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
 from composer.plan.steps import Phase, Plan, build_plan, downward, nodes_of, rank, upward
 
-#: A node, and the ranks of its state and of its goal.
-_Movable: TypeAlias = tuple[Node, int, int]
 _ACTIVE, _INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
 
 
@@ -24,67 +21,79 @@ def plan_transitions(
 ) -> Plan:
     """Return the plan that takes the nodes from ``states`` to ``goals``, in dependency order.
 
-    First every transition down, in reverse order, then every transition up. A class is configured
-    once the nodes that it depends on are active. ``causes`` gives the reason for each node. Nodes
+    First every transition down, in reverse order, then every transition up. A class or a component
+    is configured once the nodes that it depends on are active, and a component is unloaded before
+    its container is deactivated. ``causes`` gives the reason for each node. Nodes
     without a state or a goal are left alone.
     """
     edges = dependency_edges(system)
     order = nodes_of(system, in_dependency_order(system))
-    movable = tuple(
-        (node, rank(states[node.name.value]), rank(goals[node.name.value]))
-        for node in order
-        if node.name.value in states and node.name.value in goals
-    )
-    reverse = tuple(reversed(movable))
-    phases = [
-        Phase(
-            "deactivate",
-            [node for node, state, goal in reverse if goal < rank(_ACTIVE) <= state],
-            downward(edges, _ACTIVE),
-        ),
-        Phase(
-            "cleanup",
-            [node for node, state, goal in reverse if goal < rank(_INACTIVE) <= state],
-            downward(edges, _INACTIVE),
-        ),
-    ]
-    for wave in _waves(movable, edges):
+    movable = [node for node in order if node.name.value in states and node.name.value in goals]
+    starts = {node.name.value: rank(states[node.name.value]) for node in movable}
+    ends = {node.name.value: rank(goals[node.name.value]) for node in movable}
+
+    def passing(nodes: Iterable[Node], state: PrimaryState, *, up: bool) -> list[Node]:
+        low, high = (starts, ends) if up else (ends, starts)
+        return [
+            node for node in nodes if low[node.name.value] < rank(state) <= high[node.name.value]
+        ]
+
+    phases: list[Phase] = []
+    for wave in _downward_waves(movable, edges):
         phases += (
-            Phase(
-                "configure",
-                [node for node, state, goal in wave if state < rank(_INACTIVE) <= goal],
-                upward(edges, _INACTIVE),
-            ),
-            Phase(
-                "activate",
-                [node for node, state, goal in wave if state < rank(_ACTIVE) <= goal],
-                upward(edges, _ACTIVE),
-            ),
+            Phase("deactivate", passing(wave, _ACTIVE, up=False), downward(edges, _ACTIVE)),
+            Phase("cleanup", passing(wave, _INACTIVE, up=False), downward(edges, _INACTIVE)),
+        )
+    for wave in _waves(movable, edges, _is_configured_later):
+        phases += (
+            Phase("configure", passing(wave, _INACTIVE, up=True), upward(edges, _INACTIVE)),
+            Phase("activate", passing(wave, _ACTIVE, up=True), upward(edges, _ACTIVE)),
         )
     return build_plan(phases, causes)
 
 
-def _waves(movable: Sequence[_Movable], edges: Iterable[DependencyEdge]) -> list[list[_Movable]]:
-    """Return the nodes that are configured, then activated together, in dependency order.
+def _is_configured_later(node: Node, edge: DependencyEdge) -> bool:
+    """Return whether a node is configured after the other one is active.
 
     A class does its work in its constructor, which may wait for messages and responses of the nodes
-    that it depends on: these are active before.
+    that it depends on. An inactive container may have no process.
+    """
+    return edge.is_container or (node.hosted_class is not None and edge.state is _ACTIVE)
+
+
+def _downward_waves(
+    movable: Sequence[Node], edges: Iterable[DependencyEdge]
+) -> Iterable[Sequence[Node]]:
+    """Return the nodes that are deactivated, then cleaned up together, in reverse order.
+
+    A component is unloaded before its container is deactivated, which may end the container.
+    """
+    waves = _waves(movable, edges, lambda _, edge: edge.is_container)
+    return (wave[::-1] for wave in reversed(waves))
+
+
+def _waves(
+    movable: Sequence[Node],
+    edges: Iterable[DependencyEdge],
+    is_later: Callable[[Node, DependencyEdge], bool],
+) -> list[list[Node]]:
+    """Return the nodes in waves: a node is at least in the wave of the nodes that it depends on.
+
+    It is in a later one where ``is_later`` says so.
     """
     needs: dict[str, list[DependencyEdge]] = {}
     for edge in edges:
         needs.setdefault(edge.node, []).append(edge)
-    waves: list[list[_Movable]] = [[]]
+    waves: list[list[Node]] = [[]]
     number: dict[str, int] = {}
-    for item in movable:
-        node = item[0]
+    for node in movable:
         own = 0
         for edge in needs.get(node.name.value, ()):
             if edge.on in number:
-                is_later = node.hosted_class is not None and edge.state is _ACTIVE
-                own = max(own, number[edge.on] + is_later)
+                own = max(own, number[edge.on] + is_later(node, edge))
         number[node.name.value] = own
         waves += [[] for _ in range(own + 1 - len(waves))]
-        waves[own].append(item)
+        waves[own].append(node)
     return waves
 
 
@@ -108,15 +117,18 @@ def tear_down(system: System, process: str | None = None) -> Plan:
     steps that a node's current state does not allow.
     """
     edges = dependency_edges(system)
-    order = nodes_of(system, reversed(in_dependency_order(system)))
+    order = nodes_of(system, in_dependency_order(system))
     if process is not None:
         order = tuple(node for node in order if node.process and node.process.value == process)
+    phases: list[Phase] = []
+    for wave in _downward_waves(order, edges):
+        phases += (
+            Phase("deactivate", wave, downward(edges, _ACTIVE)),
+            Phase("cleanup", wave, downward(edges, _INACTIVE)),
+        )
+    phases.append(Phase("shutdown", order[::-1], downward(edges, _INACTIVE)))
     return build_plan(
-        (
-            Phase("deactivate", order, downward(edges, PrimaryState.ACTIVE)),
-            Phase("cleanup", order, downward(edges, PrimaryState.INACTIVE)),
-            Phase("shutdown", order, downward(edges, PrimaryState.INACTIVE)),
-        ),
+        phases,
         {node.name.value: "system is shutting down" for node in system.nodes},
     )
 
@@ -161,7 +173,9 @@ def _cause(
 def _limit(dependency: Dependency, goals: Mapping[str, PrimaryState]) -> PrimaryState:
     """Return the highest state that a dependency allows its node."""
     reached = goals.get(dependency.node.value, dependency.state)
-    return PrimaryState.ACTIVE if rank(reached) >= rank(dependency.state) else reached
+    if rank(reached) >= rank(dependency.state):
+        return PrimaryState.ACTIVE
+    return PrimaryState.UNCONFIGURED if dependency.is_container else reached
 
 
 def _dependents(edges: Iterable[DependencyEdge]) -> dict[str, tuple[str, ...]]:

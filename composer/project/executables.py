@@ -19,7 +19,9 @@ from composer.base.resources import ament_prefixes
 if TYPE_CHECKING:
     from importlib.metadata import Distribution
 
-_INDEX = Path("share", "ament_index", "resource_index", "packages")
+_RESOURCES = Path("share", "ament_index", "resource_index")
+_INDEX = _RESOURCES / "packages"
+_COMPONENTS = _RESOURCES / "rclcpp_components"
 _RUN = "import sys; from {module} import {function} as main; sys.exit(main())"
 
 
@@ -61,6 +63,18 @@ def find_executable(
     for script in scripts:
         code = _RUN.format(module=script.module, function=script.attr.partition(".")[0])
         return (sys.executable, "-c", code)
+    return None
+
+
+def component_plugins(package: str, environment: Mapping[str, str]) -> tuple[str, ...] | None:
+    """Return the classes that a package registers as components; None if it registers none."""
+    if not package or "/" in package:
+        return None
+    for prefix in ament_prefixes(environment):
+        path = prefix / _COMPONENTS / package
+        if path.is_file():
+            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+            return tuple(line.partition(";")[0].strip() for line in lines if ";" in line)
     return None
 
 

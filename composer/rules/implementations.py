@@ -65,6 +65,11 @@ def check_class_setting(context: Context) -> Iterator[Diagnostic]:
             )
 
 
+_OTHERS = {
+    ImplementationKind.EXECUTABLE: "an executable",
+    ImplementationKind.COMPONENT: "a component",
+    ImplementationKind.EXTERNAL: "an external node",
+}
 #: Keys of a node's entry that need its process, or its code.
 _NOT_OF_OTHERS = frozenset({"executor", "introspection"})
 _NOT_OF_EXTERNAL = _NOT_OF_OTHERS | {"log_level"}
@@ -84,9 +89,7 @@ def check_in_process_setting(context: Context) -> Iterator[Diagnostic]:
         for what, span in settings:
             yield Diagnostic(
                 SETTING_WITHOUT_EFFECT,
-                f"{what} has no effect: node '{node.name}' is an {kind} node"
-                if kind == "external"
-                else f"{what} has no effect: node '{node.name}' is an executable",
+                f"{what} has no effect: node '{node.name}' is {_OTHERS[kind]}",
                 span,
                 hint="remove it",
             )

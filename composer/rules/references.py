@@ -81,9 +81,10 @@ def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
         name = dependency.node
         if is_unresolved(name.value) or context.system.node(name.value) is not None:
             continue
+        verb = "has the container" if dependency.is_container else "depends on"
         yield Diagnostic(
             UNKNOWN_NODE,
-            f"node '{node.name}' depends on '{name}', which is not a node of this system",
+            f"node '{node.name}' {verb} '{name}', which is not a node of this system",
             name.span,
             hint=suggestion(name.value, context.once(_node_names)),
             subjects=unknown_subjects("node", name.value, context.once(_node_names)),

@@ -149,7 +149,11 @@ def _collision(
             )
 
 
-_NAMES_IN_CODE = (ImplementationKind.CLASS, ImplementationKind.EXECUTABLE)
+_NAMES_IN_CODE = (
+    ImplementationKind.CLASS,
+    ImplementationKind.EXECUTABLE,
+    ImplementationKind.COMPONENT,
+)
 
 
 def check_unused_remapping(context: Context) -> Iterator[Diagnostic]:

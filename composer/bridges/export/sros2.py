@@ -6,7 +6,7 @@ has an enclave, because DDS checks participants; the profiles in it are those of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
 from xml.etree import ElementTree as Xml
 
@@ -14,7 +14,6 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import (
     USE_SIM_TIME,
     ImplementationKind,
-    LifecycleKind,
     Node,
     PortKind,
     System,
@@ -137,26 +136,41 @@ def _manager(namespace: str, system: System) -> Profile:
             name = node.full_name
             profile.allow(PortKind.CLIENT, f"{name}/change_state", f"{name}/get_state")
             profile.allow(PortKind.SUBSCRIPTION, f"{name}/transition_event")
+        if node.name.value in _containers(system.nodes):
+            profile.allow(PortKind.CLIENT, *_container_services(node))
     return profile
+
+
+def _containers(nodes: Iterable[Node]) -> set[str]:
+    """Return the keys of the nodes that load components."""
+    return {node.container.value for node in nodes if node.container is not None}
+
+
+def _container_services(node: Node) -> Iterator[str]:
+    for name in ("load_node", "unload_node", "list_nodes"):
+        yield f"{node.full_name}/_container/{name}"
 
 
 def _is_driven(node: Node) -> bool:
     """Return whether the manager drives a node by its lifecycle services."""
-    outside = node.external or node.executable
-    return outside is not None and outside.lifecycle is LifecycleKind.MANAGED
+    return node.outside is not None and node.outside.is_managed
 
 
-def _profiles(nodes: Iterable[Node]) -> Iterator[Profile]:
+def _profiles(nodes: Sequence[Node]) -> Iterator[Profile]:
+    containers = _containers(nodes)
     for node in nodes:
         if node.implementation is not ImplementationKind.EXTERNAL:
-            yield _profile(node)
+            profile = _profile(node)
+            if node.name.value in containers:
+                profile.allow(PortKind.SERVICE, *_container_services(node))
+            yield profile
 
 
 def _profile(node: Node) -> Profile:
     profile = Profile(node.ros_name.value, node.namespace.value)
     for port in node.visible_ports:
         profile.allow(port.kind, port.full_name)
-    if node.implementation is ImplementationKind.EXECUTABLE:
+    if not node.implementation.in_process:
         _allow_usual(profile, node)
         return profile
     offers = node.introspection
@@ -180,7 +194,7 @@ def _allow_usual(profile: Profile, node: Node) -> None:
     profile.allow(PortKind.PUBLISHER, "/rosout", "/parameter_events")
     profile.allow(PortKind.SUBSCRIPTION, "/parameter_events")
     profile.allow(PortKind.SERVICE, *PARAMETER_SERVICES, "get_type_description")
-    if node.executable is not None and node.executable.lifecycle is LifecycleKind.MANAGED:
+    if _is_driven(node):
         profile.allow(PortKind.SERVICE, *LIFECYCLE_SERVICES)
         profile.allow(PortKind.PUBLISHER, "transition_event")
     if node.initial_parameters.get(USE_SIM_TIME) is True:

@@ -43,7 +43,7 @@ class FoundParameter:
 class FoundNode:
     """A node. ``keys`` are those that say what implements it, such as ``external``.
 
-    ``namespace`` is absolute. ``values`` are values of parameters whose declarations are not known.
+    ``namespace`` is absolute. ``container`` is the full name of the node that loads it.
     """
 
     name: str
@@ -53,6 +53,7 @@ class FoundNode:
     parameters: tuple[FoundParameter, ...] = ()
     remappings: Mapping[str, str] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
+    container: str = ""
 
     @property
     def full_name(self) -> str:

@@ -10,7 +10,7 @@ from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSys
 from composer.bridges.importing.writing import free_name
 from composer.language.tree import Plain
 from composer.model import LogLevel
-from composer.model.names import join_node_name, parameter_name_problem
+from composer.model.names import join_node_name, parameter_name_problem, split_node_name
 from composer.model.resolve.parameters import rclpy_type
 
 _PORTS = (
@@ -30,6 +30,7 @@ def describe_launch_file(
         _node(item, node_name, left_out)
         for item, node_name in zip(found["nodes"], names, strict=True)
     )
+    nodes += tuple(_external_containers(nodes))
     sections = _sections(found["nodes"], left_out)
     command = " ".join(["compose import launch", path, *arguments])
     return FoundSystem(
@@ -46,8 +47,12 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
     comments: tuple[str, ...] = ()
     if item["note"]:
         comments += (f"Started {item['note']} by the launch file.",)
-    keys: dict[str, Plain] = {"executable": _executable(item)}
-    if item["name"] is None:
+    component = item.get("component")
+    keys: dict[str, Plain]
+    keys = {"executable": _executable(item)} if component is None else {"component": component}
+    if item["name"] is None and component is not None:
+        comments += (f"The launch file does not name it: {component['plugin']} does.",)
+    elif item["name"] is None:
         comments += ("The launch file does not name its nodes; list them under 'nodes'.",)
         if item["sections"]:
             comments += (f"Its parameter files name: {', '.join(sorted(item['sections']))}.",)
@@ -66,7 +71,18 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
         parameters=tuple(_declared(item["parameters"], full_name, left_out)),
         remappings=item["remappings"],
         comments=comments,
+        container=join_node_name(*item["container"]) if component is not None else "",
     )
+
+
+def _external_containers(nodes: Iterable[FoundNode]) -> Iterable[FoundNode]:
+    """Yield the containers that the launch file does not start."""
+    started = {node.full_name for node in nodes}
+    for full_name in dict.fromkeys(node.container for node in nodes if node.container):
+        if full_name not in started:
+            namespace, name = split_node_name(full_name)
+            comment = "The launch file loads components into it, and does not start it."
+            yield FoundNode(name, namespace, {"external": True}, comments=(comment,))
 
 
 def _names(items: Iterable[Mapping[str, Any]], left_out: list[str]) -> list[str]:

@@ -159,7 +159,14 @@ def _keys(node: ObservedNode) -> dict[str, Plain]:
 
 
 def _node_comments(node: ObservedNode) -> tuple[str, ...]:
-    return ("A lifecycle node that did not respond.",) if node.state is None else ()
+    comments = []
+    if node.state is None:
+        comments.append("A lifecycle node that did not respond.")
+    if node.container:
+        comments.append(
+            f"Loaded by {node.container}; with 'component' and 'container', a system loads it."
+        )
+    return tuple(comments)
 
 
 def describe_constructed(text: str, found: Mapping[str, Any]) -> FoundNode:

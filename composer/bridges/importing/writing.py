@@ -40,8 +40,12 @@ def write_system(found: FoundSystem, parameter_file: str | None = None) -> str:
         more = (f"... and {len(found.left_out) - _MAX_LISTED} more",) * (listed != found.left_out)
         comments[()] += ("", "Left out:", *(f"- {text}" for text in listed), *more)
     nodes: dict[str, Plain] = {}
-    for key, node in node_keys(found.nodes).items():
-        nodes[key] = _node(key, node, ("nodes", key), comments)
+    keys = node_keys(found.nodes)
+    key_of = {node.full_name: key for key, node in keys.items()}
+    for key, node in keys.items():
+        container = {"container": key_of[node.container]} if node.container else {}
+        written = replace(node, keys={**node.keys, **container})
+        nodes[key] = _node(key, written, ("nodes", key), comments)
     content: dict[str, Plain] = {"system": found.name}
     if parameter_file is not None:
         content["parameter_files"] = [parameter_file]

@@ -15,7 +15,11 @@ from composer.model.names import matches_wildcard
 
 WILDCARD = "*"
 #: Where a system names nodes, and where it names ports of nodes.
-_NODES = (("nodes", "*", "lifecycle", "depends_on"), ("processes", "*", "nodes"))
+_NODES = (
+    ("nodes", "*", "lifecycle", "depends_on"),
+    ("nodes", "*", "container"),
+    ("processes", "*", "nodes"),
+)
 _PORTS = tuple(("connections", "*", end) for end in ("from", "to", "server", "clients"))
 _CHAINS = ("chains", "*", "through")
 

@@ -23,6 +23,7 @@ from composer.language.tree_values import (
 )
 from composer.model import (
     BehaviorReference,
+    Component,
     Executable,
     ExecutableKind,
     External,
@@ -60,12 +61,13 @@ class Implementation:
     behavior: BehaviorReference | None = None
     hosted_class: HostedClass | None = None
     executable: Executable | None = None
+    component: Component | None = None
     conflicting: tuple[Located[str], ...] = ()
 
 
 def read_implementation(tree: Mapping, folders: SourceFolders) -> Implementation:
     """Return the implementation of a node type or an inline node."""
-    written = (tree.entry("behavior"), tree.entry("class"), tree.entry("executable"))
+    written = map(tree.entry, ("behavior", "class", "executable", "component"))
     several = [key(entry) for entry in written if entry is not None]
     if len(several) > 1:
         return Implementation(conflicting=tuple(several))
@@ -80,6 +82,7 @@ def read_implementation(tree: Mapping, folders: SourceFolders) -> Implementation
         executable=None
         if executable is None or not isinstance(executable.value, Mapping)
         else _executable(executable, executable.value, folders.folder(executable.key.span)),
+        component=_component(tree.entry("component")),
     )
 
 
@@ -129,6 +132,21 @@ def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
     )
 
 
+def _component(entry: Entry | None) -> Component | None:
+    if entry is None or not isinstance(entry.value, Mapping):
+        return None
+    tree = entry.value
+    extra = entries(tree.get("extra_arguments"))
+    return Component(
+        entry.key.span,
+        package=text(tree.get("package")),
+        plugin=text(tree.get("plugin")),
+        extra_arguments=tuple((key(item), plain(item.value)) for item in extra),
+        lifecycle=value_or(choice(tree.get("lifecycle"), LifecycleKind), LifecycleKind.NONE),
+        ready_timeout_ms=number(tree.get("ready_timeout_ms")),
+    )
+
+
 def _words(tree: Tree | None) -> tuple[Located[str], ...]:
     items = getattr(tree, "items", ())
     return tuple(Located(word(item), item.span) for item in items if isinstance(item, Scalar))
@@ -153,7 +171,9 @@ class Declaration:
     def gets_undeclared(self) -> bool:
         """Whether parameters and remappings reach a node that does not declare them."""
         implementation = self.implementation
-        is_foreign = implementation.hosted_class or implementation.executable
+        is_foreign = (
+            implementation.hosted_class or implementation.executable or implementation.component
+        )
         return is_foreign is not None and not self.only_declared
 
 
@@ -177,7 +197,7 @@ def declare(
 
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
 _REPLACED_KEYS = ("description", "only_declared", *(name for name, _ in NODE_EVENTS))
-_OVERLAID_KEYS = ("state", "arguments", "executable")
+_OVERLAID_KEYS = ("state", "arguments", "executable", "component")
 _TRANSFORMS = "transforms"
 _PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
 

@@ -132,6 +132,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     overridden = partial(with_overrides, overrides=parameters.qos_overrides)
     if transforms is not None:
         transforms = replace(transforms, ports=tuple(map(overridden, transforms.ports)))
+    container = text(tree.get("container"))
     lifecycle = tree.get("lifecycle")
     lifecycle = lifecycle if isinstance(lifecycle, Mapping) else Mapping((), tree.span)
     return Node(
@@ -147,6 +148,8 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         behavior=declared.implementation.behavior,
         hosted_class=declared.implementation.hosted_class,
         executable=declared.implementation.executable,
+        component=declared.implementation.component,
+        container=container,
         conflicting=declared.implementation.conflicting,
         external=external,
         inner_nodes=names.inner,
@@ -166,11 +169,11 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         process=text(tree.get("process")) or context.processes.get(entry.name),
         log_level=choice(tree.get("log_level"), LogLevel),
         required=flag(tree.get("required"), default=True),
-        depends_on=_dependencies(lifecycle.get("depends_on")),
+        depends_on=_dependencies(lifecycle.get("depends_on"), container),
         autostart=choice(lifecycle.get("autostart"), PrimaryState),
         supervision=read_supervision(lifecycle, context.supervision),
         introspection=DRIVEN_BY_MANAGER
-        if external is not None or declared.implementation.executable is not None
+        if external or declared.implementation.executable or declared.implementation.component
         else read_introspection(
             declared.introspection, context.introspection, tree.get("introspection")
         ),
@@ -288,12 +291,20 @@ def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:
     return tuple(Remapping(source, target) for source, target in found if target is not None)
 
 
-def _dependencies(tree: Tree | None) -> tuple[Dependency, ...]:
-    """Return the dependencies, from a list of names or a map of names to states."""
+def _dependencies(tree: Tree | None, container: Located[str] | None) -> tuple[Dependency, ...]:
+    """Return the dependencies, from a list of names or a map of names to states.
+
+    A component needs its container active.
+    """
     if isinstance(tree, Mapping):
-        return tuple(_dependency(entry) for entry in tree)
-    names = (text(item) for item in (tree.items if isinstance(tree, Sequence) else ()))
-    return tuple(Dependency(name) for name in names if name is not None)
+        declared = [_dependency(entry) for entry in tree]
+    else:
+        names = (text(item) for item in (tree.items if isinstance(tree, Sequence) else ()))
+        declared = [Dependency(name) for name in names if name is not None]
+    if container is None:
+        return tuple(declared)
+    others = (item for item in declared if item.node.value != container.value)
+    return (Dependency(container, is_container=True), *others)
 
 
 def _dependency(entry: Entry) -> Dependency:

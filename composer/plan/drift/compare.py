@@ -11,8 +11,8 @@ from composer.language.tree import Plain
 from composer.model import (
     ChannelKind,
     ExecutableKind,
-    LifecycleKind,
     Node,
+    Outside,
     Parameter,
     Port,
     PortKind,
@@ -86,21 +86,25 @@ def _differences(
 
 
 def _may_be_absent(node: Node, state: str) -> bool:
-    """Return whether a node has no process in ``state``, or has had one that is done."""
-    executable = node.executable
-    if executable is None or node.external is not None:
+    """Return whether a node is not started in ``state``, or has had a process that is done."""
+    if node.outside is None or node.external is not None:
         return False
+    executable = node.executable
+    if executable is None:
+        return _is_not_started(node.outside, state)
     are_unknown = node.keeps_names and not executable.nodes
     if are_unknown or executable.kind is ExecutableKind.TASK:
         return True
-    is_managed = executable.lifecycle is LifecycleKind.MANAGED
-    return state == "unconfigured" or (state == "inactive" and not is_managed)
+    return _is_not_started(executable, state)
+
+
+def _is_not_started(outside: Outside, state: str) -> bool:
+    return state == "unconfigured" or (state == "inactive" and not outside.is_managed)
 
 
 def _has_lifecycle(node: Node) -> bool:
     """Return whether the node itself is a lifecycle node, as far as it is declared."""
-    outside = node.external or node.executable
-    return outside is None or outside.lifecycle is LifecycleKind.MANAGED
+    return node.outside is None or node.outside.is_managed
 
 
 def _is_manager(system: System, other: ObservedNode) -> bool:

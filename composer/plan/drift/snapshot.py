@@ -75,7 +75,8 @@ class ObservedNode:
 
     ``state`` is its lifecycle state: empty if it has none, None if it did not respond.
     ``parameters`` are its values by name, None if it did not respond. ``count`` is the number of
-    nodes with that name; ``endpoints`` contains the endpoints of all of them.
+    nodes with that name; ``endpoints`` contains the endpoints of all of them. ``container`` is the
+    full name of the node that has loaded it.
     """
 
     full_name: str
@@ -83,6 +84,7 @@ class ObservedNode:
     state: str | None = ""
     parameters: Mapping[str, Plain] | None = field(default_factory=dict)
     count: int = 1
+    container: str = ""
 
     @property
     def is_hidden(self) -> bool:

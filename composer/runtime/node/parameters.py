@@ -14,6 +14,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.exceptions import InvalidParameterException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -130,6 +131,16 @@ def declare(node: Node, parameter: Parameter) -> Any:
     except (InvalidParameterException, InvalidParameterValueException, TypeError) as error:
         raise ParameterError(f"parameter '{name}': {error}") from error
     return _plain(value)
+
+
+def parameter_message(parameter: Parameter) -> ParameterMessage:
+    """Return a parameter as a message. Raises ParameterError if its value does not fit its type."""
+    declared = _ROS_TYPES[ParameterType(parameter.type.value)]
+    try:
+        value = ros_value(parameter)
+        return RosParameter(parameter.name.value, declared, value).to_parameter_msg()
+    except (TypeError, ValueError, AssertionError) as error:
+        raise ParameterError(f"parameter '{parameter.name}': {error}") from error
 
 
 def _declare_empty(node: Node, parameter: Parameter) -> None:

@@ -1,10 +1,4 @@
-"""A node that is implemented by an executable, in a child process.
-
-*Configure* finds the program, *activate* starts it and waits for its ports, *deactivate* ends it:
-an inactive node must not publish, and a plain program knows no other way to be silent. With
-``lifecycle: managed``, *configure* starts the program and *cleanup* ends it; its own services do
-the rest.
-"""
+"""A node that is implemented by an executable, in a child process."""
 
 from __future__ import annotations
 
@@ -15,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from composer.base.regular_files import write_whole
-from composer.model import Executable, ExecutableKind, LifecycleKind, LogLevel, Node
+from composer.model import Executable, ExecutableKind, LogLevel, Node
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
@@ -25,35 +19,27 @@ from composer.runtime.outside_nodes.outside_node import (
     INACTIVE,
     UNCONFIGURED,
     OutsideContext,
-    OutsideNode,
     TransitionRefused,
     elsewhere_text,
-    missing_text,
 )
-from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteLifecycle
+from composer.runtime.outside_nodes.started_node import END_SHARE, StartedNode
 
 #: How long a killed process may take to disappear.
 _KILLED_WITHIN_S = 1.0
 #: How long after the first node of a program its other ones are in the graph, usually.
 _ALL_NODES_WITHIN_S = 1.0
-#: The longest share of the time that is left for the shutdown of the system.
-_END_SHARE = 0.5
 
 
-class ExecutableNode(OutsideNode):
+class ExecutableNode(StartedNode[Child]):
     """The :class:`.ManagedNode` of an executable."""
 
+    _when_silent = "its process was ended"
+
     def __init__(self, model: Node, executable: Executable, context: OutsideContext) -> None:
-        super().__init__(model, context)
+        super().__init__(model, executable, context)
         self._executable = executable
         self._children = context.children
-        self._log_level = context.log_level
-        self._manager = context.manager
-        self._presence = NodePresence(self._manager, model)
-        self._earlier: frozenset[bytes] = frozenset()  # participants of earlier processes
         self._command: Command | None = None
-        self._child: Child | None = None
-        self._remote: RemoteLifecycle | None = None
 
     @property
     def transition_timeout_s(self) -> float:
@@ -64,7 +50,7 @@ class ExecutableNode(OutsideNode):
     @property
     def pid(self) -> int | None:
         """The process id, None while no process runs."""
-        return None if self._child is None else self._child.pid
+        return None if self._started is None else self._started.pid
 
     @property
     def figures(self) -> Mapping[str, Any]:
@@ -73,119 +59,29 @@ class ExecutableNode(OutsideNode):
 
     def destroy(self) -> None:
         """Kill the process, if there is one, without waiting for that."""
-        if self._child is not None:
-            self._children.end(self._child, 0.0, 0.0)
-            self._child = None
+        if self._started is not None:
+            self._children.end(self._started, 0.0, 0.0)
+            self._started = None
         self._close_remote()
 
-    @property
-    def _is_managed(self) -> bool:
-        return self._executable.lifecycle is LifecycleKind.MANAGED
-
-    async def _work(self, transition: str) -> None:
-        if self._is_managed:
-            await self._work_managed(transition)
-        elif transition == "configure":
-            self._find()
-        elif transition == "activate":
-            await self._activate()
-        elif transition in ("deactivate", "shutdown"):
-            await self._end_process()
-
     async def _activate(self) -> None:
+        if self._executable.kind is not ExecutableKind.TASK:
+            await super()._activate()
+            return
         child = await self._start(INACTIVE)
         end_s = self.loop.clock.monotonic() + self._executable.ready_timeout_s
-        if self._executable.kind is ExecutableKind.TASK:
-            await self._finish_task(child, end_s)
-            return
-        ready = partial(self._is_ready, child)
-        if not await self._until_ready(ready, end_s) or child.ended.done():
-            missing = self._presence.missing(self._earlier)
-            reason = _ended(child) or self._not_ready(child, missing_text(missing))
-            await self._end_process()
-            raise TransitionRefused(reason, INACTIVE)
-        self._check_names_later(child)
-
-    def _not_ready(self, child: Child, missing: str) -> str:
-        """Return why its process is not ready in time, with the nodes that it has instead."""
-        names = set() if child.pid is None else self._presence.names_in(child.pid)
-        limit = f"after {_seconds(self._executable)}"
-        return f"{missing} {limit}{elsewhere_text(self.model, names)}"
-
-    async def _finish_task(self, child: Child, end_s: float) -> None:
         if not await self._until_ready(child.ended.done, end_s):
-            await self._end_process()
-            raise TransitionRefused(f"still running after {_seconds(self._executable)}", INACTIVE)
-        self._child = None
+            await self._end()
+            limit = f"{self._executable.ready_timeout_s:g} s"
+            raise TransitionRefused(f"still running after {limit}", INACTIVE)
+        self._started = None
         if _status(child) != 0:
-            raise TransitionRefused(_ended(child), INACTIVE)
+            raise TransitionRefused(self._how_ended(child), INACTIVE)
 
-    def _is_ready(self, child: Child) -> bool:
-        return child.ended.done() or (
-            self._presence.has_node(self._earlier) and not self._presence.missing(self._earlier)
-        )
-
-    # --- lifecycle: managed
-
-    async def _work_managed(self, transition: str) -> None:
-        if transition == "configure":
-            await self._connect()
-        if transition == "shutdown":
-            await self._end_process()  # whatever its service would answer
-        else:
-            await self._change(transition)
-        if transition == "cleanup":
-            await self._end_process()
-
-    async def _connect(self) -> None:
-        """Start the process unless it runs, and wait for its lifecycle services."""
-        if self._child is not None and self._remote is not None:
-            return
-        self._find()
-        child = await self._start(UNCONFIGURED)
-        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
-        end_s = self.loop.clock.monotonic() + self._executable.ready_timeout_s
-        service = f"{self.full_name}/change_state"
-
-        def has_services() -> bool:
-            return child.ended.done() or self._presence.has_service(service, self._earlier)
-
-        if await self._until_ready(has_services, end_s) and not child.ended.done():
-            self._check_names_later(child)
-            return
-        reason = _ended(child) or self._not_ready(child, f"no service {service}")
-        await self._end_process()
-        raise TransitionRefused(reason, UNCONFIGURED)
-
-    async def _change(self, transition: str) -> None:
-        """Run a transition of the node by its services."""
-        child, remote = self._child, self._remote
-        if child is None or remote is None:
-            raise TransitionRefused("its process does not run", UNCONFIGURED)
-        limit_s = self._timeout_s
-        if self._end_s is not None:
-            limit_s = min(limit_s, max(0.0, self._end_s - self.loop.clock.monotonic()) * _END_SHARE)
-        request = self.loop.run_task(
-            remote.change(transition, self.loop.clock.monotonic() + limit_s)
-        )
-        child.ended.add_done_callback(lambda _: request.cancel())
-        try:
-            await self._until(request.done, float("inf"))
-            if request.cancelled():
-                await self._end_process()
-                raise TransitionRefused(_ended(child), UNCONFIGURED)
-            success, state = request.result()
-        except NotAnswered as error:
-            await self._end_process()
-            text = f"{error} within {limit_s:.3g} s; its process was ended"
-            raise TransitionRefused(text, UNCONFIGURED) from error
-        if not success:
-            raise TransitionRefused(f"its service reports a failure; it is {state}", state)
-
-    def _close_remote(self) -> None:
-        if self._remote is not None:
-            self._remote.close()
-            self._remote = None
+    def _not_ready(self, run: Child, missing: str) -> str:
+        """Return why its process is not ready in time, with the nodes that it has instead."""
+        names = set() if run.pid is None else self._presence.names_in(run.pid)
+        return super()._not_ready(run, missing) + elsewhere_text(self.model, names)
 
     # --- the process
 
@@ -203,18 +99,15 @@ class ExecutableNode(OutsideNode):
         """Start the process; if that fails, the node is in ``state``."""
         if self._command is None:
             raise TransitionRefused("its program was not found", UNCONFIGURED)
-        await self._end_process()
-        self._earlier = self._presence.participants()
+        await self._end()
+        self.earlier = self._presence.participants()
         try:
             command = self._with_parameters(self._command)
             child = self._children.start(command, self._log)
             await child.started
         except (OSError, StartFailed) as error:
             raise TransitionRefused(f"cannot be started: {error}", state) from error
-        self._child = child
-        child.ended.add_done_callback(
-            lambda _: self.loop.call_soon(partial(self._on_process_end, child))
-        )
+        self._watch(child)
         return child
 
     def _with_parameters(self, command: Command) -> Command:
@@ -225,13 +118,13 @@ class ExecutableNode(OutsideNode):
         write_whole(path, text)
         return replace(command, words=(*command.words, "--params-file", str(path)))
 
-    def _check_names_later(self, child: Child) -> None:
+    def _on_ready(self, run: Child) -> None:
         """Report several nodes in a program that all got the name of this one."""
-        self.loop.call_later(_ALL_NODES_WITHIN_S, partial(self._check_names, child))
+        self.loop.call_later(_ALL_NODES_WITHIN_S, partial(self._check_names, run))
 
     def _check_names(self, child: Child) -> None:
-        count = self._presence.namesakes(self._earlier)
-        if child is self._child and not self.model.keeps_names and count > 1:
+        count = self._presence.namesakes(self.earlier)
+        if child is self._started and not self.model.keeps_names and count > 1:
             self._listener.write_log(
                 LogLevel.WARN,
                 self._logger,
@@ -240,13 +133,12 @@ class ExecutableNode(OutsideNode):
                 " under 'nodes' of the executable",
             )
 
-    async def _end_process(self) -> None:
-        """End the process in order, and wait for that."""
-        child = self._child
+    async def _end(self) -> None:
+        child = self._started
         self._close_remote()
         if child is None:
             return
-        self._child = None  # its end is expected
+        self._started = None  # its end is expected
         terminate_s, kill_s = self._end_limits_s
         self._children.end(child, terminate_s, kill_s)
         end_s = self.loop.clock.monotonic() + terminate_s + kill_s + _KILLED_WITHIN_S
@@ -260,20 +152,14 @@ class ExecutableNode(OutsideNode):
         kill_s = self._executable.sigkill_timeout_ms / 1000.0
         if self._end_s is None:
             return terminate_s, kill_s
-        left_s = max(0.0, self._end_s - self.loop.clock.monotonic()) * _END_SHARE
+        left_s = max(0.0, self._end_s - self.loop.clock.monotonic()) * END_SHARE
         share = min(1.0, left_s / max(terminate_s + kill_s, 1e-3))
         return terminate_s * share, kill_s * share
 
-    def _on_process_end(self, child: Child) -> None:
-        """Report the end of the process as a fault, unless it was expected."""
-        if child is self._child and not self._lock.is_held:
-            self._child = None
-            self._close_remote()
-            self._fail(_ended(child))
-
-    def _on_settled(self) -> None:
-        if self._child is not None and self._child.ended.done():
-            self._on_process_end(self._child)
+    def _how_ended(self, run: Child) -> str:
+        if not run.ended.done():
+            return ""
+        return f"its process {run.how_ended or 'has not started'}"
 
     def _log(self, text: str, is_error: bool) -> None:
         level, logger, message = attribute_line(text, (self._logger,), is_error=is_error)
@@ -284,14 +170,3 @@ class ExecutableNode(OutsideNode):
 def _status(child: Child) -> int | None:
     """Return how a process has ended; None if it never started."""
     return None if child.ended.cancelled() else child.ended.result()
-
-
-def _ended(child: Child) -> str:
-    """Return how a process has ended, in words; empty while it runs."""
-    if not child.ended.done():
-        return ""
-    return f"its process {child.how_ended or 'has not started'}"
-
-
-def _seconds(executable: Executable) -> str:
-    return f"{executable.ready_timeout_s:g} s"

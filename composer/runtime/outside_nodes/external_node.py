@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from composer.model import External, LifecycleKind, Node
+from composer.model import External, Node
 from composer.runtime.outside_nodes.outside_node import (
     ACTIVE,
     INACTIVE,
@@ -15,7 +15,8 @@ from composer.runtime.outside_nodes.outside_node import (
 )
 from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteLifecycle
 
-_PERIOD_S = 0.5
+#: How often an external node is looked for.
+PERIOD_S = 0.5
 _NOTHING_EARLIER: frozenset[bytes] = frozenset()
 #: The states of the node itself in which its service is asked for a transition.
 _STARTS = {
@@ -39,28 +40,18 @@ class ExternalNode(OutsideNode):
         self._manager = context.manager
         self._presence = NodePresence(self._manager, model)
         self._remote: RemoteLifecycle | None = None
-        self._is_lost = False  # it is not there, and its return has not been reported
         self._is_left = False
-        self._timer = self.loop.call_every(_PERIOD_S, self._check)
+        self._timer = self.loop.call_every(PERIOD_S, self._check)
 
     @property
     def transition_timeout_s(self) -> float:
         """How long a transition may take, including the time until the node appears."""
         return self._timeout_s + self._external.ready_timeout_s
 
-    @property
-    def is_absent(self) -> bool:
-        """Whether it is not there."""
-        return self._is_lost
-
     def destroy(self) -> None:
         """Stop to observe the node."""
         self._timer.cancel()
         self._close_remote()
-
-    @property
-    def _is_managed(self) -> bool:
-        return self._external.lifecycle is LifecycleKind.MANAGED
 
     def leave(self) -> None:
         """Leave it in its state from now on: another system uses it. Thread-safe."""
@@ -69,7 +60,7 @@ class ExternalNode(OutsideNode):
     async def _work(self, transition: str) -> None:
         if self._is_left:
             return
-        if self._is_managed and transition != "shutdown":
+        if self._external.is_managed and transition != "shutdown":
             await self._work_managed(transition)
         elif transition == "activate":
             await self._await_ports()
@@ -78,7 +69,7 @@ class ExternalNode(OutsideNode):
 
     def _is_there(self) -> bool:
         """Return whether it can be used: with its service if it is managed, or all its ports."""
-        if self._is_managed:
+        if self._external.is_managed:
             service = f"{self.full_name}/change_state"
             return self._presence.has_service(service, _NOTHING_EARLIER)
         return self._presence.has_node() and not self._presence.missing()

@@ -20,7 +20,12 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
+from composer.runtime.node.managed_node import (
+    FINALIZED,
+    ManagedNode,
+    NodeListener,
+    TransitionOutcome,
+)
 from composer.runtime.outside_nodes.remote_node import DONE_IN, GOALS
 
 UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
@@ -65,7 +70,7 @@ class OutsideContext:
     """What a node outside the process uses in this process.
 
     ``manager`` is the ROS node that observes and calls it; ``timeout_s`` the limit of each of its
-    transitions.
+    transitions. ``nodes`` are the nodes of the process, by their keys.
     """
 
     loop: Loop
@@ -75,6 +80,7 @@ class OutsideContext:
     statistics: Statistics
     timeout_s: float
     log_level: LogLevel
+    nodes: Mapping[str, ManagedNode]
 
 
 class OutsideNode(ABC):
@@ -95,6 +101,12 @@ class OutsideNode(ABC):
         self._state = UNCONFIGURED
         self._lock = _TransitionLock()
         self._end_s: float | None = None
+        #: Whether it is not there, and its return will be reported.
+        self._is_lost = False
+        #: Called if it ends by itself, before that is reported.
+        self.followers: set[Callable[[], None]] = set()
+        #: The participants of its earlier processes, which DDS shows for a while.
+        self.earlier: frozenset[bytes] = frozenset()
 
     # --- the managed node
 
@@ -121,7 +133,7 @@ class OutsideNode(ABC):
     @property
     def is_absent(self) -> bool:
         """Whether it is not there, and something else has to start it."""
-        return False
+        return self._is_lost
 
     @property
     def callback_owners(self) -> tuple[object, ...]:
@@ -230,6 +242,8 @@ class OutsideNode(ABC):
     def _fail(self, reason: str, *, is_awaited: bool = False) -> None:
         """Report that the node has ended by itself, and is unconfigured now."""
         self._state = UNCONFIGURED
+        for follow in tuple(self.followers):
+            follow()
         self._listener.on_ended(reason, UNCONFIGURED, is_awaited=is_awaited)
 
     def _on_state(self, start: str, state: str) -> None:

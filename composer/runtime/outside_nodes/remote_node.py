@@ -89,8 +89,11 @@ class NodePresence:
 
     def has_service(self, service: str, earlier: frozenset[bytes]) -> bool:
         """Return whether the node provides a service, by its full name."""
-        servers = self._own(servers_of(self._manager, service))
-        return any(participant(endpoint) not in earlier for endpoint in servers)
+        return bool(self.servers(service) - earlier)
+
+    def servers(self, service: str) -> frozenset[bytes]:
+        """Return the participants in which the node provides a service."""
+        return frozenset(map(participant, self._own(servers_of(self._manager, service))))
 
     def _common_endpoints(self) -> list[TopicEndpointInfo]:
         return [
@@ -152,11 +155,60 @@ class NotAnswered(Exception):
     """A node did not answer in time."""
 
 
-class RemoteLifecycle:
+class RemoteServices:
+    """Clients of services of one node. Use it on ``loop``."""
+
+    def __init__(self, ros: RosNode, loop: Loop, full_name: str) -> None:
+        self._ros = ros
+        self._loop = loop
+        self._clock = loop.clock
+        self._full_name = full_name
+        self._clients: list[Any] = []
+
+    def close(self) -> None:
+        """Destroy the clients."""
+        while self._clients:
+            client = self._clients.pop()
+            self._loop.remove(client)
+            self._ros.destroy_client(client)
+
+    def _client(self, service: Any, name: str) -> Any:
+        client = self._ros.create_client(service, f"{self._full_name}/{name}")
+        self._clients.append(client)
+        self._loop.add_client(client)
+        return client
+
+    async def _ask(self, client: Any, request: Any, end_s: float) -> Any:
+        """Return the response to a request that is repeated each second.
+
+        Raises NotAnswered at ``end_s`` (monotonic).
+        """
+        while True:
+            future = client.call_async(request)
+            try:
+                response = await self._response(future, end_s)
+            finally:
+                client.remove_pending_request(future)
+            if response is not None:
+                return response
+
+    async def _response(self, future: Any, end_s: float) -> Any:
+        """Return the response, None if there is none within a second."""
+        now_s = self._clock.monotonic()
+        if now_s >= end_s:
+            raise NotAnswered(f"{self._full_name} does not answer")
+        until_s = min(now_s + _ASK_AGAIN_S, end_s)
+        while not future.done() and self._clock.monotonic() < until_s:
+            await sleep(
+                self._loop, _POLL_S if self._clock.monotonic() > now_s + _SOON_S else _SOON_S / 4
+            )
+        return future.result() if future.done() else None
+
+
+class RemoteLifecycle(RemoteServices):
     """Clients of the lifecycle services of one node. Use it on ``loop``.
 
-    A request that reads is repeated each second. A request for a transition is sent again only if
-    the node is still in the state it was in.
+    A request for a transition is sent again only if the node is still in the state it was in.
     """
 
     def __init__(
@@ -171,12 +223,9 @@ class RemoteLifecycle:
         ``start`` is the label of the state in which the last transition began. ``state`` is the
         primary state that the service of the node reports: any node can publish an event.
         """
-        self._ros = ros
-        self._loop = loop
-        self._clock = loop.clock
-        self._full_name = full_name
-        self._get_state = ros.create_client(GetState, f"{full_name}/get_state")
-        self._change_state = ros.create_client(ChangeState, f"{full_name}/change_state")
+        super().__init__(ros, loop, full_name)
+        self._get_state = self._client(GetState, "get_state")
+        self._change_state = self._client(ChangeState, "change_state")
         self._events = ros.create_subscription(
             TransitionEvent, f"{full_name}/transition_event", lambda _: None, _EVENTS_DEPTH
         )
@@ -184,30 +233,20 @@ class RemoteLifecycle:
         self._on_state = on_state
         self._event_start: str | None = None  # of the last event that is not confirmed yet
         self._confirmation: Future[None] | None = None
-        loop.add_client(self._get_state)
-        loop.add_client(self._change_state)
         loop.add_subscription(self._events, self._on_event)
 
     def close(self) -> None:
         """Destroy the clients."""
         if self._confirmation is not None:
             self._confirmation.cancel()
-        for entity in (self._get_state, self._change_state, self._events):
-            self._loop.remove(entity)
-        self._ros.destroy_client(self._get_state)
-        self._ros.destroy_client(self._change_state)
+        super().close()
+        self._loop.remove(self._events)
         self._ros.destroy_subscription(self._events)
 
     async def state(self, end_s: float) -> str:
         """Return the label of the state. Raises NotAnswered at ``end_s`` (monotonic)."""
-        while True:
-            future = self._get_state.call_async(GetState.Request())
-            try:
-                response = await self._response(future, end_s)
-            finally:
-                self._get_state.remove_pending_request(future)
-            if response is not None:
-                return str(response.current_state.label)
+        response = await self._ask(self._get_state, GetState.Request(), end_s)
+        return str(response.current_state.label)
 
     async def change(self, transition: str, end_s: float) -> tuple[bool, str]:
         """Run a transition; return whether it succeeded, and the state after it.
@@ -232,7 +271,7 @@ class RemoteLifecycle:
 
     def _on_event(self, taken: tuple[Any, Any]) -> None:
         self._event_start = str(taken[0].start_state.label)
-        if self._confirmation is None:
+        if self._clients and self._confirmation is None:  # it may have been closed
             self._confirmation = self._loop.run_task(self._confirm())
 
     async def _confirm(self) -> None:
@@ -252,14 +291,3 @@ class RemoteLifecycle:
         while (state := await self.state(end_s)) not in PRIMARY_STATES:
             await sleep(self._loop, _POLL_S)
         return state
-
-    async def _response(self, future: Any, end_s: float) -> Any:
-        """Return the response, None if there is none within a second."""
-        now_s = self._clock.monotonic()
-        if now_s >= end_s:
-            raise NotAnswered(f"{self._full_name} does not answer")
-        until_s = min(now_s + _ASK_AGAIN_S, end_s)
-        while not future.done() and self._clock.monotonic() < until_s:
-            is_late = self._clock.monotonic() > now_s + _SOON_S
-            await sleep(self._loop, _POLL_S if is_late else _SOON_S / 4)
-        return future.result() if future.done() else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from functools import partial
 
@@ -36,6 +36,7 @@ from composer.runtime.node.managed_node import (
 )
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
+from composer.runtime.outside_nodes.component_node import ComponentNode
 from composer.runtime.outside_nodes.executable_node import ExecutableNode
 from composer.runtime.outside_nodes.external_node import ExternalNode
 from composer.runtime.outside_nodes.outside_node import OutsideContext
@@ -66,6 +67,7 @@ class NodeFactory:
         self._seen_messages = MessageSnapshots() if options.check_mutation else None
         self._router = LocalRouter({})
         self._process: ProcessContext  # set by join()
+        self._nodes: Mapping[str, ManagedNode] = {}
         self.executors = {executor.name.value: executor for executor in system.executors}
         self.loops: dict[str, Loop] = {}
         self.clock = options.clock
@@ -76,12 +78,14 @@ class NodeFactory:
             system, namespace, options.member_command, write_log, together
         )
 
-    def join(self, process: ProcessContext) -> str | None:
+    def join(self, process: ProcessContext, nodes: Mapping[str, ManagedNode]) -> str | None:
         """Create the nodes in this process, and let them share messages there.
 
-        Return why the middleware does not allow that, or None.
+        ``nodes`` are those that have been created, by their keys. Return why the middleware does
+        not allow that, or None.
         """
         self._process = process
+        self._nodes = nodes
         self._router = LocalRouter(shared_channels(self._system))
         return self._router.refusal
 
@@ -121,6 +125,7 @@ class NodeFactory:
             statistics=statistics,
             timeout_s=self._timeout_s(node),
             log_level=self._log_level_of(node),
+            nodes=self._nodes,
         )
         if node.process is not None:
             process = self.other_processes.process(
@@ -131,6 +136,8 @@ class NodeFactory:
             return ExternalNode(node, node.external, context)
         if node.executable is not None:
             return ExecutableNode(node, node.executable, context)
+        if node.component is not None:
+            return ComponentNode(node, node.component, context)
         raise AssertionError(f"{node.full_name} runs in this process")
 
     def _loop_of(self, executor: Executor) -> Loop:

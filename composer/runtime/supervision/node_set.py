@@ -72,7 +72,7 @@ class NodeSet:
 
         Raises CreationFailed. Then no loop runs, and the nodes created until then remain.
         """
-        refusal = self._factory.join(process)
+        refusal = self._factory.join(process, self.nodes)
         if refusal is not None and self._clock.is_virtual:
             reason = f"virtual time needs topics within the process: {refusal}"
             raise CreationFailed("the system", reason)

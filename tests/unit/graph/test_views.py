@@ -47,6 +47,31 @@ def test_a_timer_with_a_condition_promises_no_rate() -> None:
     assert lines["node:/left/talker", "topic:/chatter"] == ("sensor_data",)
 
 
+def test_the_deployment_view_draws_components_in_their_containers() -> None:
+    component = 'component: {package: demo, plugin: "demo::Camera"}'
+    text = f"""
+        system: robot
+        processes: {{vision: {{nodes: [box, camera]}}}}
+        nodes:
+          box: {{external: true}}
+          camera: {{{component}, container: box}}
+          outer: {{executable: {{command: [sh]}}}}
+          lidar: {{{component}, container: outer}}
+          lost: {{{component}}}
+    """
+    graph = drawn(text, View.DEPLOYMENT)
+    frames = {cluster.key: (cluster.label, cluster.parent) for cluster in graph.clusters}
+    placed = {vertex.key: frames[vertex.cluster] for vertex in graph.vertices}
+    vision = next(key for key, (label, _) in frames.items() if label == "process vision")
+    assert placed == {
+        "node:/box": ("container box", vision),
+        "node:/camera": ("container box", vision),
+        "node:/outer": ("container outer", ""),
+        "node:/lidar": ("container outer", ""),
+        "node:/lost": ("components", ""),
+    }
+
+
 def test_the_position_of_a_diagnostic_is_marked() -> None:
     text = """
         system: broken

@@ -164,6 +164,69 @@ def test_a_class_is_not_configured_before_what_it_depends_on(
     assert [f"{step.transition} {step.node}" for step in plan.steps] == steps
 
 
+@pytest.mark.parametrize(
+    ("here", "goal", "down", "steps"),
+    [
+        (
+            *("uuu", "aaa", ""),
+            "configure box, activate box, configure camera, configure viewer, activate camera,"
+            " activate viewer",
+        ),
+        (
+            *("aaa", "uuu", ""),
+            "deactivate viewer, deactivate camera, cleanup viewer, cleanup camera, deactivate box,"
+            " cleanup box",
+        ),
+        (
+            "aaa",
+            "aaa",
+            "box",
+            "deactivate viewer, deactivate camera, cleanup camera, deactivate box",
+        ),
+        (
+            "aaa",
+            "aaa",
+            "sensor",
+            "deactivate viewer, deactivate camera, cleanup camera, deactivate",
+        ),
+        ("iuu", "iaa", "", "configure viewer"),
+        ("aaa", "aaa", "camera", "deactivate viewer, deactivate camera, cleanup camera"),
+    ],
+)
+def test_a_component_is_loaded_while_its_container_is_active(
+    here: str, goal: str, down: str, steps: str
+) -> None:
+    system = system_of(
+        """
+        system: robot
+        nodes:
+          viewer: {lifecycle: {depends_on: [camera]}}
+          camera:
+            component: {package: demo, plugin: "demo::Camera", lifecycle: managed}
+            container: box
+          box: {external: true, lifecycle: {depends_on: [sensor]}}
+          sensor: {}
+        """
+    )
+    at, goals = (
+        {
+            name: LETTERS[letter]
+            for name, letter in zip(("box", "camera", "viewer"), text, strict=True)
+        }
+        | {"sensor": ACTIVE}
+        for text in (here, goal)
+    )
+    desired = DesiredState(goals)
+    if down:
+        desired = desired.fail(fault(down))
+    plan = ", ".join(
+        f"{step.transition} {step.node}" for step in reconcile(system, desired, at, "").steps
+    )
+    assert plan.startswith(steps)
+    if not down:
+        assert plan == steps
+
+
 def test_a_second_fault_of_a_failed_node_is_ignored() -> None:
     desired = DesiredState(states("aaaaa")).fail(fault("sensor"))
     assert decide(robot(), desired, fault("sensor"), NOW_S) is None

@@ -96,6 +96,22 @@ def test_nodes_without_a_name_and_with_that_of_another_have_a_free_one() -> None
     assert left_out == ("the name 'program' of a second node: it is 'program_3' here",)
 
 
+def test_components_name_their_containers() -> None:
+    component = {"package": "demo", "plugin": "demo::Camera"}
+    nodes, left_out = described(
+        node("box", namespace="/a"),
+        node("camera", component=component, container=("/a", "box")),
+        node(None, executable="Camera", component=component, container=("/", "other")),
+    )
+    assert nodes == {
+        "box": {"namespace": "/a", "executable": {"package": "p", "name": "program"}},
+        "camera": {"component": component, "container": "box"},
+        "Camera": {"component": component, "container": "other"},
+        "other": {"external": True},
+    }
+    assert not left_out
+
+
 def test_what_is_written_is_valid_and_has_the_parameters_of_inner_nodes(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(PARAMETERS)
     sources = [(str(tmp_path / "robot.yaml"), True), ("speed:=2", False)]
