@@ -45,6 +45,8 @@ def _kind_outside(node: Node) -> str | None:
         return "is an external node"
     if node.executable is not None:
         return "is an executable"
+    if node.component is not None:
+        return "is a component"
     if node.hosted_class is not None:
         return "is a class of rclpy"
     return None

@@ -117,7 +117,7 @@ def test_load_unload_crash_and_reload(rounds: int, tmp_path: Path, peer: Peer) -
         (
             'plugin: "demo::Talker"',
             "services: {reset: {type: std_srvs/srv/Trigger, external: true}}",
-            "it has no service /robot/reset after 3 s",
+            "it has no service /robot/reset after 1.5 s",
         ),
     ],
 )
@@ -127,7 +127,7 @@ def test_a_failed_load_says_why_and_leaves_nothing(
     odd = f"""
   odd:
     required: false
-    component: {{package: demo, {component}, ready_timeout_ms: 3000}}
+    component: {{package: demo, {component}, ready_timeout_ms: 1500}}
     container: container
     {more}
 """
@@ -139,7 +139,7 @@ def test_a_failed_load_says_why_and_leaves_nothing(
         assert loaded(peer) == ["/robot/odd"] * is_kept
 
 
-def test_a_node_that_is_no_container(tmp_path: Path) -> None:
+def test_a_node_that_does_not_load_components(tmp_path: Path) -> None:
     text = robot(
         "\n  talker:\n    container: container\n"
         '    component: {package: demo, plugin: "demo::Talker", ready_timeout_ms: 500}\n'

@@ -51,7 +51,7 @@ class Broken(Node):
 
 class Slow(Talker):
     def __init__(self, **options: Any) -> None:
-        time.sleep(2.5)
+        time.sleep(1.2)
         super().__init__(**options)
 
 

@@ -343,8 +343,9 @@ def test_a_prefix_changes_keys_and_not_the_names_in_ros(tmp_path: Path) -> None:
     camera = """\
 system: camera
 nodes:
-  driver: {name: camera_driver, on_activate: {log: go}}
+  driver: {name: camera_driver, external: true}
   viewer: {lifecycle: {depends_on: [driver]}, on_activate: {log: go}}
+  filter: {component: {package: demo, plugin: Filter}, container: driver}
 """
     project(
         tmp_path,
@@ -361,7 +362,10 @@ include:
     assert {node.name.value: node.full_name for node in system.nodes} == {
         "left_driver": "/left/camera_driver",
         "left_viewer": "/left/left_viewer",
+        "left_filter": "/left/left_filter",
         "right_driver": "/right/camera_driver",
         "right_viewer": "/right/right_viewer",
+        "right_filter": "/right/right_filter",
     }
     assert system.nodes[1].depends_on[0].node.value == "left_driver"
+    assert str(system.nodes[2].container) == "left_driver"
