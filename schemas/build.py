@@ -17,12 +17,15 @@ from composer.language.tree import plain
 FOLDER = Path(__file__).resolve().parent
 NAMES = ("system", "node", "project")
 _DEFINITIONS = "#/definitions/"
+_CONDITIONS = ("for_each", "if", "unless")
 
 
 def build(name: str) -> str:
     """Return the text of a schema."""
     schema = _read(name)
     definitions = {**_read("shared"), **schema.pop("definitions")}
+    if "executor" in definitions:
+        definitions["overridden_executor"] = _unconditional(definitions["executor"])
     needed = sorted(_reachable(schema, definitions))
     schema["definitions"] = {definition: definitions[definition] for definition in needed}
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
@@ -39,6 +42,12 @@ def _read(part: str) -> dict[str, Any]:
         raise SystemExit("\n".join(f"{item.primary}: {item.message}" for item in diagnostics))
     content: dict[str, Any] = plain(tree)
     return content
+
+
+def _unconditional(part: dict[str, Any]) -> dict[str, Any]:
+    """Return a map without the keys that decide whether it is there."""
+    keys = {key: value for key, value in part["properties"].items() if key not in _CONDITIONS}
+    return {**part, "properties": keys}
 
 
 def _reachable(schema: dict[str, Any], definitions: dict[str, Any]) -> set[str]:

@@ -23,6 +23,7 @@ EMPTY_COLLECTION = error("RC107", "empty-collection")
 
 UNKNOWN_VARIABLE = error("RC281", "unknown-variable")
 MALFORMED_VARIABLE = error("RC282", "malformed-variable")
+MISSING_VARIABLE = error("RC287", "missing-variable")
 CYCLE = error("RC283", "cycle")
 DUPLICATE_NAME = error("RC225", "duplicate-name")
 UNUSED_DECLARATION = info("RC242", "unused-declaration")

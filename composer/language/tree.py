@@ -82,6 +82,22 @@ class Mapping:
 Tree: TypeAlias = "Scalar | Sequence | Mapping"
 
 
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """An entry that is left out, by a condition or an empty ``for_each``, at ``span``.
+
+    ``name`` has a ``*`` for each name of the ``for_each``. ``key`` is that of the cause,
+    ``condition`` is the condition as the file has it, and ``include`` an include that is left out.
+    """
+
+    section: str
+    name: str
+    span: Span
+    key: str
+    condition: str
+    include: Tree | None = None
+
+
 def plain(tree: Tree) -> Plain:
     """Return the tree as plain Python data, without locations."""
     match tree:

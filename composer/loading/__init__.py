@@ -10,13 +10,14 @@ import gc
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Map
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
 
 from composer.base.diagnostics import (
     Diagnostic,
     Severity,
+    has_errors,
     in_order,
     registered_rules,
     shown,
@@ -26,13 +27,23 @@ from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
 from composer.language.document import parse_bytes, read_document
 from composer.language.document.limits import MAX_ENTRIES
-from composer.language.expand import expand
-from composer.language.rules import TOO_LARGE
+from composer.language.expand import expand, missing_names
+from composer.language.expand.arguments import read_declarations
+from composer.language.rules import MISSING_VARIABLE, TOO_LARGE
 from composer.language.schema import check_schema, kind_of, kinds
 from composer.language.schema.kinds import check_kind
-from composer.language.tree import Mapping
+from composer.language.tree import Entry, LeftOut, Mapping, plain
 from composer.language.tree import Sequence as ListTree
+from composer.language.tree_values import word
+from composer.loading.combinations import (
+    Checked,
+    argument_combinations,
+    chosen_values,
+    joined_diagnostics,
+    places_of,
+)
 from composer.loading.reported import Identity, LoadResult, identity, may_be_included
+from composer.model import System
 from composer.model.assembly import NodeTypeFile, assemble, inherit
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
@@ -71,18 +82,27 @@ def load(
 ) -> LoadResult:
     """Read, resolve and check the system or node type in the file ``path``.
 
-    ``shown`` is the name of the file in diagnostics, ``overrides`` are options of a command line.
-    Pass ``interfaces`` to load many files of one project: reading the interfaces takes most time.
+    ``shown`` is the name of the file in diagnostics, ``overrides`` are words of a command line.
+    Only the combination of arguments that these give is checked. Pass ``interfaces`` to load many
+    files of one project: reading the interfaces takes most time.
     """
     parsed, diagnostics = read_overrides(overrides)
     definitions = _Definitions.of(_real_folder(path), interfaces)
-    return _check([_resolve(_read(path, shown), definitions, parsed, diagnostics)])[0]
+    document = _read(path, shown)
+    resolved = _resolve(document, definitions, parsed, diagnostics)
+    [variant] = resolved.variants
+    if not has_errors(variant.diagnostics):  # else a declaration may be wrong
+        variant.diagnostics += _missing_arguments(document, parsed.arguments)
+    return _check([resolved])[0]
 
 
 @_without_cycle_collection()
 def load_files(paths: Iterable[Path]) -> list[LoadResult]:
-    """Load the files. Files of one project share its interfaces."""
-    return _check(_resolve_files(paths))
+    """Load the files, with all combinations of arguments that they allow.
+
+    Files of one project share its interfaces.
+    """
+    return _check(_resolve_files(paths, all_combinations=True))
 
 
 @_without_cycle_collection()
@@ -90,19 +110,19 @@ def load_models(paths: Iterable[Path]) -> list[LoadResult]:
     """Load the files without checking them; ``diagnostics`` say what reading them found."""
     return [
         LoadResult(
-            None if item.context is None else item.context.system,
-            item.diagnostics,
+            item.variants[0].system,
+            item.variants[0].diagnostics,
             item.source,
             item.definitions.project,
             item.definitions.node_types,
             item.definitions.interfaces,
-            item.merged.tree,
+            item.variants[0].merged.tree,
         )
         for item in _resolve_files(paths)
     ]
 
 
-def _resolve_files(paths: Iterable[Path]) -> list[_Resolved]:
+def _resolve_files(paths: Iterable[Path], *, all_combinations: bool = False) -> list[_Resolved]:
     """Turn files into their models. Files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
     by_folder: dict[Path, _Definitions] = {}
@@ -111,7 +131,8 @@ def _resolve_files(paths: Iterable[Path]) -> list[_Resolved]:
         folder = _real_folder(path)
         if folder not in by_folder:
             by_folder[folder] = _Definitions.with_shared_interfaces(folder, shared)
-        resolved.append(_resolve(_read(path), by_folder[folder]))
+        document = _read(path)
+        resolved.append(_resolve(document, by_folder[folder], all_combinations=all_combinations))
     return resolved
 
 
@@ -119,10 +140,13 @@ def _resolve_files(paths: Iterable[Path]) -> list[_Resolved]:
 def load_bytes(
     content: bytes, folder: Path, *, shown: str, interfaces: Interfaces | None = None
 ) -> LoadResult:
-    """Load a text, such as standard input, as if it were the file ``shown`` in ``folder``."""
+    """Load a text, such as standard input, as if it were the file ``shown`` in ``folder``.
+
+    All combinations of arguments that it allows are checked.
+    """
     document = _Document(*parse_bytes(content, shown))
     definitions = _Definitions.of(_real_folder(folder / shown), interfaces)
-    return _check([_resolve(document, definitions)])[0]
+    return _check([_resolve(document, definitions, all_combinations=True)])[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +192,8 @@ class _Merged:
 
     ``tree`` is what ``compose config`` shows, ``expanded`` has values in place of variables.
     ``folders`` and ``included`` are the folders of all files and the places that include them, by
-    file name. ``is_partial`` is true if nodes may be missing.
+    file name. ``is_partial`` is true if nodes may be missing. ``left_out`` are entries that
+    conditions leave out.
     """
 
     tree: Mapping | None = None
@@ -177,17 +202,38 @@ class _Merged:
     folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
     is_partial: bool = False
+    left_out: tuple[LeftOut, ...] = ()
+
+
+@dataclass(slots=True)
+class _Variant:
+    """A file with one combination of its arguments. ``context`` is None if there is no model.
+
+    ``equal`` is a variant with the same tree: only that one is checked.
+    """
+
+    values: Map[str, str]
+    merged: _Merged
+    diagnostics: list[Diagnostic]
+    context: Context | None = None
+    equal: _Variant | None = None
+
+    @property
+    def system(self) -> System | None:
+        """The model."""
+        return None if self.context is None else self.context.system
 
 
 @dataclass(slots=True)
 class _Resolved:
-    """A file with its model, before the rules. ``context`` is None if there is no model."""
+    """A file with its models, before the rules.
+
+    There is at least one variant: the first one has the given arguments and the defaults.
+    """
 
     source: SourceFile
     definitions: _Definitions
-    merged: _Merged
-    diagnostics: list[Diagnostic]
-    context: Context | None = None
+    variants: list[_Variant]
 
 
 def _resolve(
@@ -195,46 +241,90 @@ def _resolve(
     definitions: _Definitions,
     overrides: Overrides | None = None,
     override_diagnostics: Iterable[Diagnostic] = (),
+    *,
+    all_combinations: bool = False,
 ) -> _Resolved:
-    """Turn a file into its model."""
-    # Kind, includes or inheritance, variables and copies, schema.
-    merged = _merge(document, definitions)
-    diagnostics = [*document.diagnostics, *override_diagnostics, *merged.diagnostics]
-    resolved = _Resolved(document.source, definitions, merged, diagnostics)
+    """Turn a file into its models: one, or one for each combination of its arguments."""
+    given = overrides or Overrides()
+    chosen: list[dict[str, Entry]] = [dict(given.arguments)]
+    diagnostics = [*document.diagnostics, *override_diagnostics]
+    is_system = document.tree is not None and kind_of(document.tree) == kinds.SYSTEM
+    if all_combinations and is_system and document.tree is not None:
+        chosen, problems = argument_combinations(document.tree, given.arguments)
+        diagnostics += problems
+    variants: list[_Variant] = []
+    by_tree: dict[str, _Variant] = {}
+    for arguments in chosen:
+        # Kind, includes or inheritance, arguments, copies and conditions, schema.
+        merged = _merge(document, definitions, arguments)
+        values = chosen_values(document.tree, arguments) if document.tree and is_system else {}
+        variant = _Variant(values, merged, [*diagnostics, *merged.diagnostics])
+        variants.append(variant)
+        if len(chosen) > 1:
+            text = repr(merged.expanded and plain(merged.expanded))
+            equal = by_tree.setdefault(text, variant)
+            if equal is not variant:
+                variant.equal = equal
+                continue
+        _resolve_model(variant, document.source, definitions, given)
+    return _Resolved(document.source, definitions, variants)
+
+
+def _resolve_model(
+    variant: _Variant, source: SourceFile, definitions: _Definitions, overrides: Overrides
+) -> None:
+    """Add the model to a variant."""
+    merged = variant.merged
     if merged.expanded is None:
-        return resolved
+        return
     system, found = resolve(
         merged.expanded,
-        document.source,
+        source,
         definitions.node_types,
         folders=merged.folders,
-        overrides=overrides or Overrides(),
+        overrides=overrides,
     )
-    diagnostics += found
+    variant.diagnostics += found
     if system is not None:
+        system = replace(system, left_out=merged.left_out)
         errors = tuple(
             item.primary
-            for item in diagnostics
+            for item in variant.diagnostics
             if item.severity is Severity.ERROR or item.rule is PARAMETER_SUBSTITUTION
         )
-        resolved.context = Context(
+        variant.context = Context(
             system,
             definitions.interfaces,
             definitions.node_types,
             errors,
             is_partial=merged.is_partial,
         )
-    return resolved
+
+
+def _missing_arguments(document: _Document, given: Map[str, Entry]) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for each argument of a system without a value."""
+    tree = document.tree
+    if tree is None or kind_of(tree) != kinds.SYSTEM:
+        return
+    declared = read_declarations(tree, kinds.SYSTEM) or {}
+    for name in missing_names(tree, given):
+        choices = " or ".join(f"{name}={word(item)}" for item in declared[name].alternatives)
+        yield Diagnostic(
+            MISSING_VARIABLE,
+            f"argument '{shown(name)}' needs a value",
+            declared[name].key.span,
+            hint=f"add it to the command: {choices or f'{name}=VALUE'}",
+        )
 
 
 def _check(files: Sequence[_Resolved]) -> list[LoadResult]:
     """Check the models. The type checker runs over Python code while the rules are evaluated."""
-    contexts = [item.context for item in files if item.context is not None]
-    types = TypeCheck.of(contexts)
+    variants = [variant for item in files for variant in item.variants]
+    types = TypeCheck.of([item.context for item in variants if item.context is not None])
     try:
-        for item in files:
-            if item.context is not None:
-                item.diagnostics += run_checks(item.context)
+        for variant in variants:
+            if variant.context is not None:
+                variant.diagnostics += run_checks(variant.context)
         checked = {_location(item) for item in files}
         return [_finish(item, types, checked) for item in files]
     finally:
@@ -247,47 +337,71 @@ def _location(file: _Resolved) -> Path:
 
 def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> LoadResult:
     """Return what is reported of a file in the end; ``checked`` are all files of this run."""
-    source, context = file.source, file.context
+    source, first = file.source, file.variants[0]
     project = file.definitions.project
-    diagnostics = file.diagnostics
-    follow_ups: frozenset[Identity] = frozenset()
-    if context is not None:
-        diagnostics += reported(context, types.diagnostics(context, diagnostics))
-        kept = without_consequences(diagnostics, project.diagnostics)
-        kept = joined(deduplicate(kept, context.system.nodes))
-        follow_ups = frozenset(map(identity, diagnostics)).difference(map(identity, kept))
-        diagnostics = kept
+    kept: set[Identity] = set()
+    follow_ups: set[Identity] = set()
+    for variant in file.variants:
+        context = variant.context
+        if context is not None:
+            variant.diagnostics += reported(
+                context, types.diagnostics(context, variant.diagnostics)
+            )
+            follow_ups.update(map(identity, variant.diagnostics))
+            remaining = without_consequences(variant.diagnostics, project.diagnostics)
+            variant.diagnostics = joined(deduplicate(remaining, context.system.nodes))
+            kept.update(map(identity, variant.diagnostics))
+    follow_ups -= kept
+    diagnostics = joined_diagnostics(
+        [
+            Checked(
+                item.values,
+                (item.equal or item).diagnostics,
+                _places(item, is_needed=len(file.variants) > 1),
+            )
+            for item in file.variants
+        ]
+    )
 
     # Selection: comments in the files and settings of the project silence diagnostics.
-    diagnostics = add_include_labels(diagnostics, file.merged.included)
+    included = {
+        path: spans for item in file.variants for path, spans in item.merged.included.items()
+    }
+    diagnostics = add_include_labels(diagnostics, included)
     # Comments in a node type may be about rules that only apply to the systems that use it.
-    is_complete = context is not None and not context.system.node_type
-    kept, used = without_ignored(
+    is_complete = first.system is not None and not first.system.node_type
+    selected, used = without_ignored(
         diagnostics,
         source,
         complete=is_complete,
         may_be_needed=partial(may_be_included, _location(file), project, checked),
     )
-    follow_ups |= {(UNUSED_IGNORE.code, str(comment)) for comment in used}
+    follow_ups.update((UNUSED_IGNORE.code, str(comment)) for comment in used)
     all_checks()  # import every rule, so that all names in the settings are known
     selected = [
-        *apply_rule_settings(kept, project.settings),
+        *apply_rule_settings(selected, project.settings),
         *project.diagnostics,
         *check_rule_settings(project.settings, tuple(registered_rules())),
     ]
     return LoadResult(
-        None if context is None else context.system,
+        first.system,
         in_order(selected),
         source,
         project,
         file.definitions.node_types,
         file.definitions.interfaces,
-        file.merged.tree,
-        follow_ups,
+        first.merged.tree,
+        frozenset(follow_ups),
+        tuple(item.system for item in file.variants[1:] if item.system is not None),
     )
 
 
-def _merge(document: _Document, definitions: _Definitions) -> _Merged:
+def _places(variant: _Variant, *, is_needed: bool) -> frozenset[str]:
+    tree = variant.merged.expanded if is_needed else None
+    return frozenset() if tree is None else frozenset(places_of(tree))
+
+
+def _merge(document: _Document, definitions: _Definitions, arguments: Map[str, Entry]) -> _Merged:
     tree = document.tree
     if not tree:
         return _Merged()
@@ -295,7 +409,7 @@ def _merge(document: _Document, definitions: _Definitions) -> _Merged:
         case kinds.SYSTEM if (surplus := _surplus_entry(tree)) is not None:
             return _Merged(diagnostics=[surplus])
         case kinds.SYSTEM:
-            return _merge_system(tree, document.source, definitions)
+            return _merge_system(tree, document.source, definitions, arguments)
         case kinds.NODE:
             return _merge_node_type(tree, document.source, definitions)
         case _:
@@ -303,9 +417,11 @@ def _merge(document: _Document, definitions: _Definitions) -> _Merged:
             return _Merged(diagnostics=[] if problem is None else [problem])
 
 
-def _merge_system(tree: Mapping, source: SourceFile, definitions: _Definitions) -> _Merged:
+def _merge_system(
+    tree: Mapping, source: SourceFile, definitions: _Definitions, arguments: Map[str, Entry]
+) -> _Merged:
     # Each file is expanded and checked against the schema before it is merged.
-    assembly = assemble(tree, source, definitions.folder, definitions.project)
+    assembly = assemble(tree, source, definitions.folder, definitions.project, arguments)
     surplus = None if assembly.tree is None else _surplus_entry(assembly.tree)
     if surplus is not None:
         return _Merged(diagnostics=[*assembly.diagnostics, surplus])
@@ -316,6 +432,7 @@ def _merge_system(tree: Mapping, source: SourceFile, definitions: _Definitions) 
         assembly.folders,
         assembly.included,
         assembly.is_partial,
+        assembly.left_out,
     )
 
 
@@ -339,7 +456,7 @@ def _merge_node_type(tree: Mapping, source: SourceFile, definitions: _Definition
     inherited = inherit(file)
     if inherited.tree is None:
         return _Merged(diagnostics=inherited.diagnostics)
-    expanded, found = expand(inherited.tree, {})
+    expanded, found, _ = expand(inherited.tree, {})
     diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
     return _Merged(inherited.tree, expanded, diagnostics, inherited.folders)
 

@@ -46,6 +46,8 @@ class LoadResult:
     #: What was left out because it follows from another diagnostic, also if other systems with
     #: the same node types report it; and the used comments that they would report as unused.
     follow_ups: frozenset[Identity] = frozenset()
+    #: The models with the other combinations of arguments, if all of them were checked.
+    other_systems: tuple[System, ...] = ()
 
     @property
     def is_valid(self) -> bool:
@@ -98,7 +100,12 @@ def _lacks_node_types(result: LoadResult) -> bool:
 
 def project_diagnostics(results: Collection[LoadResult]) -> list[Diagnostic]:
     """Return the diagnostics that need several files, such as unused node types."""
-    systems = [result.system for result in results if result.system is not None]
+    systems = [
+        system
+        for result in results
+        for system in (result.system, *result.other_systems)
+        if system is not None
+    ]
     if any(_lacks_node_types(result) for result in results):
         return []
     settings = {result.source.path: result.project.settings for result in results}

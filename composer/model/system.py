@@ -9,8 +9,10 @@ from typing import Any, TypeVar, cast
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
+from composer.language.tree import LeftOut
 from composer.model.discovery import Discovery
 from composer.model.hosts import Host, Process
+from composer.model.names import matches_wildcard
 from composer.model.node import (
     DEFAULT_SUPERVISION,
     Node,
@@ -176,6 +178,8 @@ class System:
     parameter_files: frozenset[SourceFile] = frozenset()  # those with values
     unmatched_parameters: tuple[UnmatchedParameters, ...] = ()
     unknown: tuple[UnknownKey, ...] = ()  # unknown names from the command line
+    arguments: tuple[str, ...] = field(default=(), compare=False)  # given, as name=value
+    left_out: tuple[LeftOut, ...] = field(default=(), compare=False)  # by conditions
     _nodes: dict[str, Node] = field(init=False, repr=False, compare=False)
     _computed: dict[object, Any] = field(init=False, repr=False, compare=False)
 
@@ -192,6 +196,13 @@ class System:
     def node(self, name: str) -> Node | None:
         """Return the node with the given key in ``nodes``, or None."""
         return self._nodes.get(name)
+
+    def left_out_entry(self, section: str, name: str) -> LeftOut | None:
+        """Return what leaves an entry of a section out; None if no condition does."""
+        for item in self.left_out:
+            if item.section == section and matches_wildcard(item.name, name):
+                return item
+        return None
 
     def port(self, endpoint: Endpoint) -> Port | None:
         """Return the port of an endpoint, or None."""

@@ -25,7 +25,7 @@ from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.formatting import number
 from composer.rules.analysis.rates import Cause, Rates, rates
 from composer.rules.analysis.subjects import unknown_subjects, used_parameters
-from composer.rules.references import UNDECLARED_NAME
+from composer.rules.references import UNDECLARED_NAME, absence
 
 EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")
 EXECUTOR_SETTINGS = warning("RC417", "executor-settings")
@@ -43,11 +43,13 @@ def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
         name = node.executor
         if name is None or name.value in known or is_unresolved(name.value):
             continue
+        why = absence(context.system, "executors", name.value, "an executor")
         yield Diagnostic(
             UNDECLARED_NAME,
-            f"node '{node.name}' runs on '{name}', which is not an executor of this system",
+            f"node '{node.name}' runs on '{name}', {why.text}",
             name.span,
-            hint=suggestion(name.value, known),
+            why.labels,
+            why.hint or suggestion(name.value, known),
             subjects=unknown_subjects("executor", name.value, known),
         )
 

@@ -18,7 +18,7 @@ from composer.model.hosts import (
     workspace_problem,
 )
 from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.references import UNDECLARED_NAME
+from composer.rules.references import UNDECLARED_NAME, absence
 
 INVALID_HOST = error("RC492", "invalid-host")
 ENVIRONMENT_VARIABLE = error("RC494", "environment-variable")
@@ -34,11 +34,13 @@ def check_unknown_host(context: Context) -> Iterator[Diagnostic]:
         name = process.host
         if name is None or name.value in hosts or is_unresolved(name.value):
             continue
+        why = absence(system, "hosts", name.value, "a host")
         yield Diagnostic(
             UNDECLARED_NAME,
-            f"process '{process.name}' runs on '{name}', which is not a host of this system",
+            f"process '{process.name}' runs on '{name}', {why.text}",
             name.span,
-            hint=suggestion(name.value, hosts) or "declare it under 'hosts:'",
+            why.labels,
+            why.hint or suggestion(name.value, hosts) or "declare it under 'hosts:'",
         )
 
 

@@ -251,6 +251,9 @@ def check_unmatched_parameters(context: Context) -> Iterator[Diagnostic]:
     has_programs = any(node.gets_undeclared and node.executable for node in context.system.nodes)
     of_programs: dict[str, list[Located[str]]] = {}
     for unmatched in context.system.unmatched_parameters if is_known else ():
+        node_name = split_node_name(unmatched.section.value)[1]
+        if context.system.left_out_entry("nodes", node_name) is not None:
+            continue
         if unmatched.parameter is not None:
             name = unmatched.parameter.value
             yield Diagnostic(

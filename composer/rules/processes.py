@@ -12,7 +12,7 @@ from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.subjects import NODES_OF_PROCESSES, unknown_subjects
 from composer.rules.executors import LOST_BETWEEN_PROCESSES
-from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE
+from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE, absence
 
 CONFLICTING_PROCESS = error("RC479", "conflicting-process")
 MANY_SERVICES = warning("RC488", "many-services")
@@ -28,11 +28,13 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
         name = node.process
         if name is None or name.value in processes or is_unresolved(name.value):
             continue
+        why = absence(system, "processes", name.value, "a process")
         yield Diagnostic(
             UNDECLARED_NAME,
-            f"node '{node.name}' runs in '{name}', which is not a process of this system",
+            f"node '{node.name}' runs in '{name}', {why.text}",
             name.span,
-            hint=suggestion(name.value, processes),
+            why.labels,
+            why.hint or suggestion(name.value, processes),
             subjects=unknown_subjects("process", name.value, processes),
         )
     nodes = [node.name.value for node in system.nodes]

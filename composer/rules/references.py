@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, Subject, error, suggestion
 from composer.base.fast_dataclass import dataclass
@@ -33,6 +34,26 @@ def endpoints(system: System) -> Iterator[tuple[Endpoint, Connection | None]]:
         yield from ((end, None) for end in chain.through)
 
 
+class Absence(NamedTuple):
+    """Why a name is not in a section of a system: the end of a message, with labels and a hint."""
+
+    text: str
+    labels: tuple[Label, ...] = ()
+    hint: str | None = None
+
+
+def absence(system: System, section: str, name: str, noun: str) -> Absence:
+    """Return why ``name`` is not there: a condition leaves it out, or nothing declares it."""
+    left_out = system.left_out_entry(section, name)
+    if left_out is None:
+        return Absence(f"which is not {noun} of this system")
+    text = f"which its '{left_out.key}' leaves out"
+    labels = (Label(left_out.span, "left out here"),)
+    condition = f"{left_out.key}: {left_out.condition}"
+    hint = f"write '{condition}' here too, or remove the condition" if left_out.condition else None
+    return Absence(text, labels, hint)
+
+
 def _names_given(context: Context, connection: Connection | None) -> tuple[Subject, ...]:
     """Return what is not known of a connection that names the wrong port."""
     return () if connection is None else connection_subjects(context.system, connection)
@@ -47,11 +68,14 @@ def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         yield from _unknown_dependencies(context, node)
     for unknown in context.system.unknown:
+        why = absence(context.system, "nodes", unknown.name.value, "a node")
+        message = f"'{unknown.name}' is not a node of this system"
         yield Diagnostic(
             UNKNOWN_NODE,
-            f"'{unknown.name}' is not a node of this system",
+            f"'{unknown.name}' names a node {why.text}" if why.labels else message,
             unknown.name.span,
-            hint=suggestion(unknown.name.value, unknown.known),
+            why.labels,
+            None if why.labels else suggestion(unknown.name.value, unknown.known),
             subjects=unknown_subjects("node", unknown.name.value, unknown.known),
         )
 
@@ -67,11 +91,13 @@ def _node_of_endpoint(
         message = f"'{endpoint.text}' is not of the form 'node.port'"
         yield Diagnostic(UNKNOWN_NODE, message, endpoint.text.span, subjects=names)
         return
+    why = absence(context.system, "nodes", name, "a node")
     yield Diagnostic(
         UNKNOWN_NODE,
-        f"'{endpoint.text}' names node '{name}', which is not a node of this system",
+        f"'{endpoint.text}' names node '{name}', {why.text}",
         part_of(endpoint.text, 0, len(name)),
-        hint=suggestion(name, context.once(_node_names)),
+        why.labels,
+        why.hint or suggestion(name, context.once(_node_names)),
         subjects=(*unknown_subjects("node", name, context.once(_node_names)), *names),
     )
 

@@ -22,9 +22,9 @@ from tests.examples import examples
 from tests.properties.trees import maps, trees
 from tests.properties.validating import SHIPPED
 
-#: Systems that can be included anywhere, with variables and nodes to override.
+#: Systems that can be included anywhere, with arguments and nodes to override.
 PARTS: dict[str, dict[str, Any]] = {
-    "robot.yaml": {"variables": {"start": [1.0, 2.5]}, "nodes": {"planner": {"executor": "slow"}}},
+    "robot.yaml": {"arguments": {"start": [1.0, 2.5]}, "nodes": {"planner": {"executor": "slow"}}},
     "fleet.yaml": {"nodes": {"tower": {"lifecycle": {"timeout_ms": 10}}}},
     "toolbox.yaml": {"nodes": {"source": {"parameters": {"rate_hz": 2.5}}}},
     "navigation.yaml": {},
@@ -43,8 +43,8 @@ def fleets(draw: st.DrawFn) -> dict[str, Any]:
         include["for_each"] = {"i": draw(st.sampled_from([1, 2, ["a", "b"], [True]]))}
         if draw(st.booleans()):
             include["namespace"] = draw(st.sampled_from(["/hall", "hall", "hall/${i}", "a_${i}"]))
-        if draw(st.booleans()) and "variables" in changes:
-            include["variables"] = changes["variables"]
+        if draw(st.booleans()) and "arguments" in changes:
+            include["arguments"] = changes["arguments"]
         if draw(st.booleans()) and "nodes" in changes:
             include["overrides"] = {"nodes": changes["nodes"]}
         includes.append(include)
@@ -71,7 +71,7 @@ def check_round_trip(loading: LoadResult) -> None:
     assert diagnostics == []
     assert tree is not None
     if tree.entry("system") is not None:
-        assert all(entry.name not in {"include", "variables"} for entry in tree)
+        assert all(entry.name not in {"include", "arguments"} for entry in tree)
         assert plain(canonical(loading.tree)) == plain(tree)
 
 

@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from composer.language.document.limits import MAX_VALUES
-from composer.language.expand import expand, missing_variables
+from composer.language.expand import expand, missing_names
 from composer.language.expand.scope import measure
 from composer.language.schema import SCHEMAS, check_schema, schema
 from composer.language.tree import Mapping, Plain, plain
@@ -54,8 +54,8 @@ def tree_of(content: Plain) -> Mapping:
 @example(tree_of({"system": "a", "nodes": {"a": {"typ": {}}}, "connections": [{"topc": 1}]}), {})
 def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
     trees = {entry.name: entry for entry in tree_of(arguments)} if arguments else {}
-    missing_variables(tree, trees)
-    expanded, diagnostics = expand(tree, trees)
+    missing_names(tree, trees)
+    expanded, diagnostics, _ = expand(tree, trees)
     assert measure(expanded).values <= 2 * MAX_VALUES
     for kind in SCHEMAS:
         diagnostics += check_schema(expanded, kind)
@@ -68,8 +68,8 @@ def test_any_tree(tree: Mapping, arguments: dict[str, Plain]) -> None:
 @examples(100)
 @given(files())
 def test_expanding_a_complete_tree_again_changes_nothing(tree: Mapping) -> None:
-    once, diagnostics = expand(tree, {})
+    once, diagnostics, _ = expand(tree, {})
     if "${" not in json.dumps(plain(once)):
-        twice, _ = expand(once, {})
+        twice, _, _ = expand(once, {})
         assert repr(plain(twice)) == repr(plain(once))
         assert not any(diagnostic.rule.name == "cycle" for diagnostic in diagnostics)

@@ -34,7 +34,7 @@ OTHERS = (
         "system": "corridor",
         "include": [
             {"file": "robot.yaml", "for_each": {"i": 2}, "prefix": "r${i}_", "namespace": "r${i}"},
-            {"file": "executors.yaml", "variables": {}, "overrides": {
+            {"file": "executors.yaml", "arguments": {}, "overrides": {
                 "nodes": {"observer": {"lifecycle": {"timeout_ms": 10}}},
                 "executors": {"control": {"kind": "events"}},
             }},

@@ -64,7 +64,7 @@ def test_one_run_shows_what_every_stage_finds(tmp_path: Path, interfaces: Interf
         """\
 system: robot
 system: again
-variables: {unit: [1]}
+arguments: {unit: [1]}
 nodes:
   front: {type: camera}
   talker:

@@ -58,13 +58,13 @@ class Service:
     def command(self, file: str) -> list[str]:
         """Return the words after ``compose`` that run it; ``file`` is that of the system."""
         if self.is_server:
-            return ["hosts", "discovery-server", file]
+            return ["hosts", "discovery-server", file, *self.options]
         return ["run", file, *self.options]
 
     def readiness(self, file: str) -> list[str]:
         """Return the words after ``compose`` that ask whether it is ready."""
         if self.is_server:
-            return ["hosts", "discovery-server", file, "--ready"]
+            return ["hosts", "discovery-server", file, *self.options, "--ready"]
         return ["ps", self.full_name, "--ready"]
 
     @property
@@ -116,14 +116,15 @@ def services(system: System) -> tuple[Service, ...]:
     names = [f"{system.name}-discovery" + (f"-{host}" if host else "") for host in servers]
     labels = _labels([system.name.value, *processes, *names])
     awaits = ("--await-processes",) if system.processes else ()
-    found = [Service(labels[0], namespace, awaits, None, _priority(system, None))]
+    given = system.arguments
+    found = [Service(labels[0], namespace, (*given, *awaits), None, _priority(system, None))]
     for label, process in zip(labels[1:], system.processes, strict=False):
         name = process.name.value
-        options = ("--process", name)
+        options = (*given, "--process", name)
         priority = _priority(system, process)
         found.append(Service(label, f"{namespace}/{name}", options, process, priority))
     for label, host in zip(labels[len(found) :], servers, strict=True):
-        found.append(Service(label, namespace, is_server=True, server_host=host))
+        found.append(Service(label, namespace, given, is_server=True, server_host=host))
     return tuple(found)
 
 

@@ -9,7 +9,7 @@ import typer
 from composer.cli.support.errors import FAILED
 from composer.cli.support.options import examples
 from composer.cli.support.results import as_json
-from composer.cli.support.system_arguments import SystemName, load_system
+from composer.cli.support.system_arguments import Arguments, SystemName, load_system
 from composer.cli.support.terminal import say, write, write_raw
 
 EPILOG = examples(
@@ -21,14 +21,15 @@ EPILOG = examples(
 
 def config(
     system: SystemName,
+    arguments: Arguments = None,
     *,
     json: Annotated[bool, typer.Option("--json", help="Print JSON instead of YAML.")] = False,
 ) -> None:
     """Print a system as a single resolved file.
 
-    Includes, copies (for_each) and variables are replaced by their results. The output is a system
-    in canonical YAML, equivalent to the original if saved in the same folder. For a node type, the
-    output contains everything that it extends. ROS is not needed.
+    Includes, copies (for_each), conditions and arguments are replaced by their results. The output
+    is a system in canonical YAML, equivalent to the original if saved in the same folder. For a
+    node type, the output contains everything that it extends. ROS is not needed.
 
     Exit code 1 if the system has errors; then nothing is printed.
     """
@@ -39,7 +40,7 @@ def config(
     from composer.model.assembly.canonical import canonical
 
     path = system_file(system)
-    result = load_system(path, shown=system)
+    result = load_system(path, shown=system, arguments=arguments)
     if result.tree is None or not result.is_valid:
         raise typer.Exit(FAILED)
     whole = canonical(result.tree)

@@ -18,6 +18,7 @@ from composer.cli.support.options import Autostart, AutostartTo, Namespace, Sett
 from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
+    Arguments,
     ShowWarnings,
     complete_system,
     example_systems,
@@ -49,6 +50,7 @@ def dashboard(
             autocompletion=complete_system,
         ),
     ] = None,
+    arguments: Arguments = None,
     *,
     host: Annotated[
         str, typer.Option(metavar="ADDRESS", help="The address to listen on.")
@@ -94,7 +96,8 @@ def dashboard(
     """
     descriptor = follow_parent()
     require_dashboard("compose dashboard")
-    declared = None if system is None else _declared(system, settings or [], namespace, autostart)
+    overrides = (arguments or [], settings or [])
+    declared = None if system is None else _declared(system, overrides, namespace, autostart)
     require_ros("compose dashboard", None if declared is None else declared.system)
     from composer.dashboard.access import InvalidTokenFileError
     from composer.dashboard.context import Options
@@ -139,7 +142,10 @@ def _open(url: str) -> None:
 
 
 def _declared(
-    text: str, settings: list[str], namespace: str | None, autostart: Autostart | None
+    text: str,
+    overrides: tuple[list[str], list[str]],
+    namespace: str | None,
+    autostart: Autostart | None,
 ) -> Declared | None:
     """Return the system of a file; None for the name of a running system without a known file."""
     from composer.dashboard.declared import Declared
@@ -149,8 +155,9 @@ def _declared(
     if not is_file and text.rpartition("/")[2] not in {**project_systems(), **example_systems()}:
         return None
     name = text if is_file else text.rpartition("/")[2]
+    arguments, settings = overrides
     system, path, result = runnable_system(
-        name, settings=settings, namespace=namespace, warnings=ShowWarnings.ALL
+        name, arguments, settings=settings, namespace=namespace, warnings=ShowWarnings.ALL
     )
     goal = PrimaryState(autostart.value) if autostart is not None else None
     return Declared(system, str(path), tuple(result.diagnostics), goal)

@@ -21,7 +21,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
-from composer.cli.support.system_arguments import SystemName, runnable_system
+from composer.cli.support.system_arguments import Arguments, SystemName, runnable_system
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ Compare = Callable[["Snapshot"], tuple["Drift", ...]]
 
 def diff(
     system: SystemName,
+    arguments: Arguments = None,
     *,
     settings: Settings = None,
     namespace: Namespace = None,
@@ -83,7 +84,9 @@ def diff(
 
     Exit code 1 if there are differences.
     """
-    declared = runnable_system(system, settings=settings or (), namespace=namespace).system
+    declared = runnable_system(
+        system, arguments, settings=settings or (), namespace=namespace
+    ).system
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
         from composer.client.snapshot import GraphObserver

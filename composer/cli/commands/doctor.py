@@ -23,7 +23,12 @@ from composer.cli.support.hosts import (
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
-from composer.cli.support.system_arguments import ShowWarnings, complete_system, runnable_system
+from composer.cli.support.system_arguments import (
+    Arguments,
+    ShowWarnings,
+    complete_system,
+    runnable_system,
+)
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
@@ -51,6 +56,7 @@ def doctor(
             autocompletion=complete_system,
         ),
     ] = None,
+    arguments: Arguments = None,
     *,
     hosts: Annotated[
         bool,
@@ -79,10 +85,12 @@ def doctor(
         require_hosts("compose doctor --hosts")
     results = []
     declared = (
-        None if system is None else runnable_system(system, warnings=ShowWarnings.NONE).system
+        None
+        if system is None
+        else runnable_system(system, arguments, warnings=ShowWarnings.NONE).system
     )
     # Loaded before the checks: they take seconds, and their results would be lost.
-    loaded = load_for_hosts(system) if hosts and system is not None else None
+    loaded = load_for_hosts(system, arguments) if hosts and system is not None else None
     elsewhere = () if loaded is None else _check_hosts(loaded, timeout)
     for result in chain(_check_all(declared, timeout), elsewhere):
         results.append(result)

@@ -17,7 +17,7 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
 from composer.cli.support.results import as_json
-from composer.cli.support.system_arguments import SystemName
+from composer.cli.support.system_arguments import Arguments, SystemName
 from composer.cli.support.terminal import write
 
 if TYPE_CHECKING:
@@ -45,7 +45,13 @@ NewPath = Annotated[
 @export_app.command(
     "launch", epilog=examples("compose export launch pipeline -o launch/pipeline.launch.py")
 )
-def export_launch(system: SystemName, *, output: NewFile = None, force: Force = False) -> None:
+def export_launch(
+    system: SystemName,
+    arguments: Arguments = None,
+    *,
+    output: NewFile = None,
+    force: Force = False,
+) -> None:
     """Write a launch file that runs a system.
 
     It has launch arguments for the namespace, simulated time and the log level, and ends with the
@@ -53,7 +59,7 @@ def export_launch(system: SystemName, *, output: NewFile = None, force: Force = 
     """
     from composer.bridges.export.launch_file import launch_file
 
-    declared, path, _ = exported_system(system)
+    declared, path, _ = exported_system(system, arguments)
     write_output(launch_file(declared, path, output), output, replace=force)
 
 
@@ -67,6 +73,7 @@ def export_launch(system: SystemName, *, output: NewFile = None, force: Force = 
 )
 def export_systemd(
     system: SystemName,
+    arguments: Arguments = None,
     *,
     user: Annotated[
         bool, typer.Option("--user", help="For the service manager of a user, not of the system.")
@@ -83,7 +90,7 @@ def export_systemd(
     from composer.bridges.export.systemd import Installation, units
     from composer.client.hosts.remote_command import python_words
 
-    declared, path, result = exported_system(system)
+    declared, path, result = exported_system(system, arguments)
     python = (sys.executable, "-P", "-m", "composer")
     file = os.path.relpath(path.resolve(), result.project.root)
 
@@ -114,6 +121,7 @@ add_image_commands(export_app)
 )
 def export_sros2(
     system: SystemName,
+    arguments: Arguments = None,
     *,
     namespace: Namespace = None,
     output: NewPath = None,
@@ -127,7 +135,7 @@ def export_sros2(
     """
     from composer.bridges.export.sros2 import policy
 
-    declared = exported_system(system, namespace=namespace).system
+    declared = exported_system(system, arguments, namespace=namespace).system
     write_output(policy(declared), output, replace=force)
 
 

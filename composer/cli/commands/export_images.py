@@ -12,7 +12,12 @@ import typer
 from composer.cli.support.errors import CommandError
 from composer.cli.support.new_files import write_and_say
 from composer.cli.support.options import examples
-from composer.cli.support.system_arguments import RunnableSystem, SystemName, runnable_system
+from composer.cli.support.system_arguments import (
+    Arguments,
+    RunnableSystem,
+    SystemName,
+    runnable_system,
+)
 from composer.cli.support.terminal import write_raw
 
 if TYPE_CHECKING:
@@ -63,6 +68,7 @@ def add_image_commands(app: typer.Typer) -> None:
 
 def export_docker_compose(
     system: SystemName,
+    arguments: Arguments = None,
     *,
     image: Image = None,
     output: NewFolder = None,
@@ -76,7 +82,7 @@ def export_docker_compose(
     """
     from composer.bridges.export.docker_compose import compose_file
 
-    declared, path, result = exported_system(system)
+    declared, path, result = exported_system(system, arguments)
     contents, name = _image(declared, result, path, image)
     build: dict[str, str] = {}
     if output is not None:
@@ -87,9 +93,11 @@ def export_docker_compose(
     _write_image_and(output, {"compose.yaml": text}, contents, result, replace=force)
 
 
-def exported_system(text: str, namespace: str | None = None) -> RunnableSystem:
+def exported_system(
+    text: str, arguments: list[str] | None = None, namespace: str | None = None
+) -> RunnableSystem:
     """Return a system whose path can be a line of any format. Raises CommandError."""
-    found = runnable_system(text, namespace=namespace)
+    found = runnable_system(text, arguments, namespace=namespace)
     if not str(found.path.resolve()).isprintable():
         raise CommandError(
             f"the path '{found.path}' has control characters", hint="rename the file or its folder"

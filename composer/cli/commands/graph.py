@@ -12,7 +12,12 @@ import typer
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
-from composer.cli.support.system_arguments import complete_system, load_system, system_file
+from composer.cli.support.system_arguments import (
+    complete_system,
+    is_argument,
+    load_system,
+    system_file,
+)
 from composer.cli.support.terminal import say, write_bytes
 from composer.graph.diagram_options import FORMATS_BY_SUFFIX, Format, View
 
@@ -29,6 +34,7 @@ EPILOG = examples(
     "compose graph frames --view frames -o frames.svg       draw the frames of tf2",
     "compose graph pipeline -f dot | dot -Tpdf > p.pdf     use Graphviz",
     "compose graph pipeline robot -o both.svg               draw several systems together",
+    "compose graph fleet robots=3 -o fleet.svg              draw it with these arguments",
     "compose graph --live -o now.html                      draw the running ROS graph",
 )
 
@@ -42,8 +48,8 @@ def graph(
     systems: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SYSTEM...",
-            help="System files or names of example systems, drawn in one diagram.",
+            metavar="SYSTEM... [NAME=VALUE]...",
+            help="System files or names of example systems, drawn in one diagram, and arguments.",
             autocompletion=complete_system,
         ),
     ] = None,
@@ -119,8 +125,11 @@ def graph(
 def _declared(names: list[str]) -> Scene:
     systems: list[System] = []
     diagnostics: list[Diagnostic] = []
+    arguments = [name for name in names if is_argument(name)]
     for name in names:
-        result = load_system(system_file(name), shown=name)
+        if name in arguments:
+            continue
+        result = load_system(system_file(name), shown=name, arguments=arguments)
         if result.system is None:
             raise CommandError(f"'{name}' cannot be drawn because of its errors")
         systems.append(result.system)

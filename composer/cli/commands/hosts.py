@@ -31,7 +31,12 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.process import compose_command
 from composer.cli.support.ros import require_ros
-from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
+from composer.cli.support.system_arguments import (
+    Arguments,
+    ShowWarnings,
+    SystemName,
+    runnable_system,
+)
 from composer.cli.support.terminal import say
 from composer.model.names import PROGRAM_LOGGER
 
@@ -59,6 +64,7 @@ hosts_app = command_group(
 def run(
     context: typer.Context,
     system: SystemName,
+    arguments: Arguments = None,
     *,
     settings: Settings = None,
     namespace: Namespace = None,
@@ -74,20 +80,21 @@ def run(
     must be the same. The options apply to all processes.
     """
     require_hosts("compose hosts run")
-    loaded = load_for_hosts(system, settings or (), namespace, use_sim_time=use_sim_time)
+    loaded = load_for_hosts(system, arguments, settings or (), namespace, use_sim_time=use_sim_time)
     result, declared, relative = loaded
     require_ros("compose hosts run", declared)
     from composer.client.hosts.deployment import DeploymentOptions
     from composer.client.hosts.start import question_about, remote_processes, run_on_hosts
 
-    start = given_options(context, (*START_OPTIONS, "all_or_nothing"))
+    options = given_options(context, (*START_OPTIONS, "all_or_nothing"))
+    start = [*declared.arguments, *options]
     processes = remote_processes(declared)
     check_workspaces([item.host for item in processes])
     question = question_about(declared, result.project.root / relative, result.project)
     with reported_problems(), process_logs(declared, processes) as log:
         root = result.project.root
-        options = DeploymentOptions(root, str(relative), start, compose_command(), say, log)
-        code = run_on_hosts(processes, options, question)
+        deployment = DeploymentOptions(root, str(relative), start, compose_command(), say, log)
+        code = run_on_hosts(processes, deployment, question)
     if code:
         raise typer.Exit(code)
 
@@ -101,6 +108,7 @@ def run(
 )
 def discovery_server(
     system: SystemName,
+    arguments: Arguments = None,
     *,
     ready: Annotated[
         bool,
@@ -113,7 +121,7 @@ def discovery_server(
     it by this command if it shall not end with the system. It is the server of Fast DDS, started
     again if it ends. Of several servers, those with addresses of this computer are run.
     """
-    discovery = _discovery(system)
+    discovery = _discovery(system, arguments)
     if ready:
         if not _is_running(discovery):
             say(f"no discovery server runs here at {_listed(discovery)}")
@@ -122,11 +130,11 @@ def discovery_server(
     _run_server(discovery)
 
 
-def _discovery(text: str) -> Discovery:
+def _discovery(text: str, arguments: list[str] | None) -> Discovery:
     """Return the discovery of a system, with servers to be started. Raises CommandError."""
     from composer.model import DiscoveryKind
 
-    system = runnable_system(text, warnings=ShowWarnings.NONE, exit_code=CONFIG).system
+    system = runnable_system(text, arguments, warnings=ShowWarnings.NONE, exit_code=CONFIG).system
     discovery = system.discovery
     if discovery is None or discovery.kind.value is not DiscoveryKind.SERVER:
         raise CommandError(

@@ -32,13 +32,21 @@ from composer.cli.support.options import (
     finite,
     given_options,
 )
+from composer.cli.support.results import as_json
 from composer.cli.support.ros import (
     announce_discovery,
     require_interfaces,
     require_modules,
     require_ros,
 )
-from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
+from composer.cli.support.system_arguments import (
+    Arguments,
+    ShowWarnings,
+    SystemName,
+    declared_arguments,
+    runnable_system,
+    system_file,
+)
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
@@ -52,6 +60,8 @@ EPILOG = examples(
     "compose run pipeline                                  run an example system until Ctrl-C",
     "compose run systems/pipeline.yaml --for 10            run for ten seconds",
     "compose run pipeline --dry-run                        print the plan; needs no ROS",
+    "compose run fleet robots=3 simulation=true            set arguments of the system",
+    "compose run fleet --help-arguments                    list the arguments of a system",
     "compose run pipeline --set planner.max_velocity=0.5   set a parameter",
     "compose run pipeline --namespace /robot1              use another namespace",
     "compose run pipeline --for 10 --fail-on-error         test that no handler fails",
@@ -85,7 +95,12 @@ _START_S = 20.0
 def run(
     context: typer.Context,
     system: SystemName,
+    arguments: Arguments = None,
     *,
+    help_arguments: Annotated[
+        bool,
+        typer.Option("--help-arguments", help="List the arguments of the system and exit."),
+    ] = False,
     run_for: Annotated[
         float | None,
         typer.Option(
@@ -189,6 +204,9 @@ def run(
     errors or lacks an interface package. Errors of handlers are reported in the summary; use
     --fail-on-error in tests.
     """
+    if help_arguments:
+        _print_arguments(system)
+        return
     if await_processes and process is not None:
         raise UsageError("--await-processes cannot be used with --process, which starts no other")
     _check_time(time, run_for, is_observed=wait or dashboard or process is not None)
@@ -204,6 +222,7 @@ def run(
     with loading_libraries() if is_loading_ros else nullcontext():
         runnable = runnable_system(
             system,
+            arguments,
             settings=settings or (),
             namespace=namespace,
             use_sim_time=use_sim_time,
@@ -215,8 +234,6 @@ def run(
             update_typings(runnable.result.project)
     declared = runnable.system
     member = None if process is None else _member(declared, process)
-    if member is not None:
-        os.environ.update({name.value: value for name, value in member.environment})
     part, up, down = _planned(declared, member, autostart)
     if dry_run:
         if up.steps:
@@ -229,7 +246,8 @@ def run(
     _require(part, dashboard=dashboard)
     if member is None:
         announce_discovery(part)
-    start = given_options(context, (*START_OPTIONS, "tracing", "check_mutation"))
+    options = given_options(context, (*START_OPTIONS, "tracing", "check_mutation"))
+    start = [*declared.arguments, *options]
     from composer.cli.support.process import compose_command, run_in_background
     from composer.runtime.process.computer import process_start_s
     from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
@@ -240,7 +258,7 @@ def run(
         limit_s = up_s + grace + _START_S
         write(run_in_background(part.name.value, [system, *start], limit_s))
         return
-    options = replace(
+    host_options = replace(
         _options(run_for, timeout, grace, log_level),
         tracing=tracing,
         check_mutation=check_mutation,
@@ -252,20 +270,41 @@ def run(
         started_at_s=None if time is Time.VIRTUAL else process_start_s(),
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
     )
-    shown = [*given_options(context, ("settings", "namespace", "autostart")), "--", system]
-    outcome = _run(part, (up, down), options, shown if dashboard else None)
+    shown = given_options(context, ("settings", "namespace", "autostart"))
+    shown += ["--", system, *declared.arguments]
+    outcome = _run(part, (up, down), host_options, shown if dashboard else None)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
 
+def _print_arguments(text: str) -> None:
+    """Print the arguments of a system, as 'ros2 launch --show-args' does."""
+    from composer.language.tree import plain
+    from composer.language.tree_values import word
+
+    declared = declared_arguments(system_file(text))
+    if not declared:
+        say(f"'{text}' has no arguments")
+    for name, argument in declared.items():
+        kind = f" ({argument.type})" if argument.type else ""
+        default = "needs a value"
+        if argument.value is not None:
+            default = f"default: {as_json(plain(argument.value))}"
+        choices = ", ".join(word(item) for item in argument.choices)
+        listed = f"; one of: {choices}" if choices else ""
+        write(f"{name}{kind}: {argument.description}".rstrip(": "))
+        write(f"    {default}{listed}")
+
+
 def _member(system: System, name: str) -> Process:
-    """Return a process of the system by its name."""
+    """Return a process of the system by its name, and set its environment variables."""
     from composer.base.diagnostics import suggestion
 
     found = {process.name.value: process for process in system.processes}
     if name not in found:
         hint = suggestion(name, list(found)) or "the system has no 'processes'"
         raise UsageError(f"'{name}' is not a process of system '{system.name}'", hint=hint)
+    os.environ.update({key.value: value for key, value in found[name].environment})
     return found[name]
 
 

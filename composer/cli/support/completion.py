@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import wraps
+from typing import ParamSpec
 
 #: A busy system delays a key press no longer than this.
 _WITHIN_S = 0.3
 
+P = ParamSpec("P")
 Complete = Callable[[str], list[str]]
 
 
-def silent(complete: Complete) -> Complete:
+def silent(complete: Callable[P, list[str]]) -> Callable[P, list[str]]:
     """Return ``complete`` without its errors: nothing is offered instead."""
 
     @wraps(complete)
-    def without_errors(incomplete: str) -> list[str]:
+    def without_errors(*args: P.args, **kwargs: P.kwargs) -> list[str]:
         try:
-            return complete(incomplete)
+            return complete(*args, **kwargs)
         except Exception:  # whatever it is, the shell cannot show it
             return []
 

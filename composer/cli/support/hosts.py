@@ -31,6 +31,7 @@ def require_hosts(command: str) -> None:
 
 def load_for_hosts(
     text: str,
+    arguments: Sequence[str] | None = (),
     settings: Sequence[str] = (),
     namespace: str | None = None,
     *,
@@ -38,7 +39,12 @@ def load_for_hosts(
 ) -> tuple[LoadResult, System, Path]:
     """Return a system without errors, and its file relative to the project. Raises CommandError."""
     system, path, result = runnable_system(
-        text, settings=settings, namespace=namespace, use_sim_time=use_sim_time, exit_code=CONFIG
+        text,
+        arguments,
+        settings=settings,
+        namespace=namespace,
+        use_sim_time=use_sim_time,
+        exit_code=CONFIG,
     )
     if not system.hosts:
         raise CommandError(

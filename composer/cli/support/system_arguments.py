@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable
 from enum import Enum, auto
@@ -10,14 +11,17 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from composer.cli.support.completion import complete_running_system
+from composer.cli.support.completion import complete_running_system, silent
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.terminal import say, say_raw, use_color
 
 if TYPE_CHECKING:
+    from composer.language.expand.arguments import Declared
     from composer.loading.reported import LoadResult
     from composer.model import System
 
+_ARGUMENT = re.compile(r"[A-Za-z_][A-Za-z0-9_]*=.*", re.DOTALL)
+_LAUNCH_ARGUMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*):=(.*)", re.DOTALL)
 #: Suffixes of folders and files that are suggested for a mistyped path.
 _SUFFIXES = ("", ".yaml", ".yml")
 
@@ -56,6 +60,55 @@ AnyRunningSystem = Annotated[
         autocompletion=complete_running_system,
     ),
 ]
+
+
+def is_argument(text: str) -> bool:
+    """Return whether a word is NAME=VALUE, and no file."""
+    return _ARGUMENT.fullmatch(text) is not None and not path_exists(Path(text))
+
+
+def _argument_words(words: list[str] | None) -> list[str]:
+    """Return the values of NAME=VALUE. Raises typer.BadParameter."""
+    for word in words or ():
+        if _ARGUMENT.fullmatch(word) is None:
+            launch = _LAUNCH_ARGUMENT.fullmatch(word)
+            example = f"; write {launch[1]}={launch[2]}" if launch is not None else ""
+            raise typer.BadParameter(f"'{word}' is not of the form name=value{example}.")
+    return words or []
+
+
+@silent
+def complete_argument(context: typer.Context, incomplete: str) -> list[str]:
+    """Complete the names of the arguments of a system, and their choices."""
+    from composer.language.tree_values import word as value
+
+    words = []
+    for name, declared in declared_arguments(system_file(context.params["system"])).items():
+        values = [value(item) for item in declared.alternatives] or [""]
+        words += [f"{name}={text}" for text in values]
+    return [text for text in words if text.startswith(incomplete)]
+
+
+#: The arguments of a system on a command line.
+Arguments = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[NAME=VALUE]...",
+        help="Values for the arguments of the system: 'compose run SYSTEM --help-arguments'.",
+        callback=_argument_words,
+        autocompletion=complete_argument,
+        show_default=False,
+    ),
+]
+
+
+def declared_arguments(path: Path) -> dict[str, Declared]:
+    """Return the arguments that a system declares, by name; none if the file cannot be read."""
+    from composer.language.document import read_document
+    from composer.language.expand.arguments import read_declarations
+
+    tree, _, _ = read_document(path)
+    return {} if tree is None else read_declarations(tree, "system") or {}
 
 
 def system_file(text: str) -> Path:
@@ -176,6 +229,7 @@ def load_system(
     path: Path,
     *,
     shown: str | None = None,
+    arguments: Iterable[str] | None = (),
     settings: Iterable[str] = (),
     namespace: str | None = None,
     use_sim_time: bool = False,
@@ -193,7 +247,7 @@ def load_system(
     result = load(
         path,
         shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
-        overrides=OverrideOptions(tuple(settings), namespace, use_sim_time),
+        overrides=OverrideOptions(tuple(settings), namespace, use_sim_time, tuple(arguments or ())),
     )
     severities = {Severity.ERROR, *([Severity.WARNING] if warnings is ShowWarnings.ALL else [])}
     reported = [item for item in result.diagnostics if item.severity in severities]
@@ -216,6 +270,7 @@ class RunnableSystem(NamedTuple):
 
 def runnable_system(
     text: str,
+    arguments: Iterable[str] | None = (),
     *,
     settings: Iterable[str] = (),
     namespace: str | None = None,
@@ -225,12 +280,15 @@ def runnable_system(
 ) -> RunnableSystem:
     """Return the system of a SYSTEM argument; print its diagnostics as :func:`load_system` does.
 
+    ``arguments`` are values of its arguments, as ``name=value``.
+
     Raises UsageError; CommandError or typer.Exit with ``exit_code`` if it is not runnable.
     """
     path = system_file(text)
     result = load_system(
         path,
         shown=text,
+        arguments=arguments,
         settings=settings,
         namespace=namespace,
         use_sim_time=use_sim_time,

@@ -1,70 +1,96 @@
-"""Expand load-time variables (``${name}``) and copies (``for_each``).
+"""Expand arguments and variables (``${name}``), copies (``for_each``) and conditions (``if``).
 
-A scalar that is only ``${name}`` becomes the value of the variable, of any type. Within a text, the
-text of the value is inserted. ``$${`` stands for ``${``. A declared variable without value stays as
-written.
+A system declares ``arguments``, a node type ``variables``. A scalar that is only ``${name}``
+becomes the value of that name, of any type. Within a text, the text of the value is inserted.
+``$${`` stands for ``${``. A declared name without value stays as written.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Map
+from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, shown
 from composer.language import rules
 from composer.language.document.limits import Stopped, TooManyErrors
-from composer.language.expand.copies import COPYING
+from composer.language.expand.arguments import default_problems, typed
+from composer.language.expand.copies import SECTIONS, expand_section
 from composer.language.expand.scope import Scope, dependency_order, measure, read_scope
 from composer.language.expand.substitution import Substitution, references
 from composer.language.schema import kind_of
-from composer.language.tree import Entry, Mapping, Scalar
+from composer.language.tree import Entry, LeftOut, Mapping, Scalar
 
-__all__ = ["expand", "missing_variables"]
+__all__ = ["Expanded", "expand", "missing_names"]
 
-_SECTION = "variables"
 _MAX_CYCLE_NAMES = 8  # maximum number of names in a message
 
 
-def expand(tree: Mapping, given: Map[str, Entry]) -> tuple[Mapping, list[Diagnostic]]:
-    """Return ``tree`` with variables and copies expanded, and the diagnostics.
+class Expanded(NamedTuple):
+    """A file with its names expanded, the diagnostics, and the entries that are left out."""
 
-    ``given`` are the arguments of a node type or an included system, by name; they override the
-    file's own values. A value in place of a whole ``${name}`` keeps the location where it was
-    written, so that a diagnostic points at the argument; a text with inserted values keeps its own
-    location. The section ``variables`` stays as it is. The time is linear in the size of the
-    result, which is limited.
+    tree: Mapping
+    diagnostics: list[Diagnostic]
+    left_out: tuple[LeftOut, ...] = ()
+
+
+def expand(tree: Mapping, given: Map[str, Entry]) -> Expanded:
+    """Return ``tree`` with names, copies and conditions expanded.
+
+    ``given`` are the arguments of an included system, of a command line or of a node type, by name;
+    they override the defaults. A value in place of a whole ``${name}`` keeps the location where it
+    was written, so that a diagnostic points at the argument; a text with inserted values keeps its
+    own location. The declarations stay as they are. The time is linear in the size of the result,
+    which is limited.
     """
-    scope = read_scope(tree, is_node_type=kind_of(tree) == "node")
+    scope = read_scope(tree)
     substitution = Substitution(scope)
     unknown = dict(_unknown_arguments(tree, scope, given))
-    diagnostics: list[Diagnostic] = []
+    given, diagnostics = _typed(scope, given)
+    left_out: list[LeftOut] = []
     try:
         diagnostics += _evaluate(substitution, given)
-        expanded = _expand_sections(substitution, tree)
+        expanded = _expand_sections(substitution, tree, left_out)
     except TooManyErrors as stopped:
-        return tree, stopped.diagnostics
+        return Expanded(tree, stopped.diagnostics)
     except Stopped as stopped:
-        found = [*unknown.values(), *diagnostics, *substitution.diagnostics]
-        return tree, [*found, stopped.diagnostic]
+        problems = [*unknown.values(), *diagnostics, *substitution.diagnostics]
+        return Expanded(tree, [*problems, stopped.diagnostic])
     # What the file uses and does not declare is reported there.
     arguments = [item for name, item in unknown.items() if name not in substitution.unknown]
-    found = [*arguments, *diagnostics, *substitution.diagnostics]
+    problems = [*arguments, *diagnostics, *substitution.diagnostics]
     # An unknown variable may be meant to be the unused one.
-    is_unknown = any(item.rule is rules.UNKNOWN_VARIABLE for item in found)
-    return expanded, found if is_unknown else [*found, *_unused(scope)]
+    if not any(item.rule is rules.UNKNOWN_VARIABLE for item in problems):
+        problems += _unused(scope)
+    return Expanded(expanded, problems, tuple(left_out))
 
 
-def missing_variables(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
-    """Return the variables of a node type that have no default and are not ``given``.
+def missing_names(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
+    """Return the declared names that have no default and are not ``given``.
 
     A variable that was given under another name is left out: ``expand`` reports it.
     """
-    scope = read_scope(tree, is_node_type=True)
+    scope = read_scope(tree)
     unknown = [name for name in given if name not in scope.declared]
     for name in unknown:
         scope.hint(name)
     missing = _without_value(scope, given)
     return () if len(unknown) == len(missing) == 1 else missing
+
+
+def _typed(scope: Scope, given: Map[str, Entry]) -> tuple[dict[str, Entry], list[Diagnostic]]:
+    """Return values as their declared types, and diagnostics of them and of the defaults."""
+    diagnostics = [*default_problems(scope.declared, scope.word)]
+    converted = dict(given)
+    for name, entry in given.items():
+        if name in scope.declared:
+            value, problem = typed(entry.value, scope.declared[name], scope.word)
+            if problem is None:
+                converted[name] = Entry(entry.key, value)
+            else:
+                diagnostics.append(problem)
+                converted.pop(name)  # the default may be right
+    return converted, diagnostics
 
 
 def _without_value(scope: Scope, given: Collection[str]) -> tuple[str, ...]:
@@ -90,18 +116,18 @@ def _evaluate(substitution: Substitution, given: Map[str, Entry]) -> list[Diagno
     return [_cycle(cycle, scope) for cycle in cycles]
 
 
-def _expand_sections(substitution: Substitution, tree: Mapping) -> Mapping:
-    """Return the file with variables and copies expanded, except the section ``variables``."""
+def _expand_sections(substitution: Substitution, tree: Mapping, left_out: list[LeftOut]) -> Mapping:
+    """Return the file with its sections expanded, except the declarations."""
     substitution.growth.values = 0
     substitution.grow(1 + len(tree.entries), tree)
-    sections = COPYING if kind_of(tree) == "system" else {}
+    is_system = kind_of(tree) == "system"
 
     def expanded_entry(entry: Entry) -> Entry:
-        if entry.name == _SECTION:
+        if entry.name == substitution.scope.section:
             return entry
-        copying = sections.get(entry.name)
-        if copying is not None:
-            return Entry(entry.key, copying(entry.value, substitution))
+        if is_system and entry.name in SECTIONS:
+            section = expand_section(entry.name, entry.value, substitution, left_out)
+            return Entry(entry.key, section)
         return Entry(entry.key, substitution.add(entry.value, depth=1).tree)
 
     return Mapping(tuple(expanded_entry(entry) for entry in tree), tree.span)
@@ -116,7 +142,7 @@ def _unknown_arguments(
     for argument, entry in given.items():
         if argument not in scope.declared:
             owner = f"'{shown(name.value)}'" if isinstance(name, Scalar) else "this file"
-            message = f"{owner} has no variable '{shown(argument)}'"
+            message = f"{owner} has no {scope.word} '{shown(argument)}'"
             hint = scope.hint(argument)
             missing = _without_value(scope, given)
             if hint is None and len(missing) == 1:
@@ -137,7 +163,7 @@ def _cycle(names: tuple[str, ...], scope: Scope) -> Diagnostic:
     first, *others = names[:_MAX_CYCLE_NAMES]
     rest = ["..."] if len(names) > _MAX_CYCLE_NAMES else []
     written = " -> ".join([*map(shown, (first, *others)), *rest, shown(first)])
-    message = f"variable '{shown(first)}' is defined by itself"
+    message = f"{scope.word} '{shown(first)}' is defined by itself"
     if others:
         message += f": {written}"
     labels = tuple(Label(scope.declared[name].key.span, "through this") for name in others)
@@ -151,7 +177,7 @@ def _unused(scope: Scope) -> Iterator[Diagnostic]:
         scope.used.update(references(variable.value) if variable.value is not None else ())
     for name, variable in scope.declared.items():
         if name not in scope.used:
-            message = f"variable '{shown(name)}' is never used"
+            message = f"{scope.word} '{shown(name)}' is never used"
             hint = f"use it as '${{{shown(name)}}}', or remove it"
             span = variable.key.span
             errors = (errors_subject(span),)

@@ -1,76 +1,126 @@
-"""Copies (``for_each``) of nodes, connections and includes.
+"""Copies (``for_each``) and conditions of the entries of a system.
 
     camera_${index}:
       for_each: {index: [0, 1, 2]}
 
-Each name takes its values one after the other, in the entry and in the name of the node. Several
-names give one copy per combination. A number N stands for the values 0 to N - 1.
+Each name takes its values one after the other, in the entry and in its name. Several names give one
+copy per combination. A number N stands for the values 0 to N - 1; without values, there is no copy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from collections.abc import Mapping as Map
+from dataclasses import replace
 from itertools import product
 from math import prod
 
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.language import rules
 from composer.language.document.limits import MAX_COPIES
-from composer.language.expand.scope import Declared
-from composer.language.expand.substitution import Substitution, has_reference, references
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.expand.arguments import Declared
+from composer.language.expand.conditions import failed_condition, without_conditions
+from composer.language.expand.substitution import Substitution, has_reference, pieces, references
+from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree
+from composer.language.tree_values import word
 
 FOR_EACH = "for_each"
 
 _DIFFERENT = "give 'for_each' values that make the names different"
 _DEPTH = 2  # of the entries of a section
-
-
-def _nodes(section: Tree, substitution: Substitution) -> Tree:
-    """Return the copies of the entries of a map, with variables expanded in the keys too."""
-    if not isinstance(section, Mapping):
-        return substitution.add(section, 1).tree
-    substitution.grow(1, section)
-    found: dict[str, Entry] = {}
-    written: dict[str, Entry] = {}
-    for entry in section:
-        for copy, body in _copies(entry.value, substitution):
-            substitution.grow(1, entry.key)
-            key = copy.key(entry.key)
-            made = Entry(key, copy.add(body, _DEPTH).tree)
-            if made.name in found and has_reference(made.name):
-                continue  # a variable in the name is unknown
-            if made.name in found:
-                substitution.diagnostics.append(
-                    _duplicate_name(entry, written[made.name], made.name)
-                )
-            else:
-                found[made.name], written[made.name] = made, entry
-    return Mapping(tuple(found.values()), section.span)
-
-
-def _items(section: Tree, substitution: Substitution) -> Tree:
-    if not isinstance(section, Sequence):
-        return substitution.add(section, 1).tree
-    substitution.grow(1, section)
-    items = tuple(
-        copy.add(body, _DEPTH).tree
-        for item in section.items
-        for copy, body in _copies(item, substitution)
-    )
-    return Sequence(items, section.span)
-
-
-#: The sections of a system whose entries can have copies.
-COPYING: Map[str, Callable[[Tree, Substitution], Tree]] = {
-    "include": _items,
-    "nodes": _nodes,
-    "connections": _items,
+#: The sections of a system whose entries can have copies and conditions, and what an entry is.
+SECTIONS: Map[str, str] = {
+    "include": "include",
+    "nodes": "node",
+    "connections": "connection",
+    "executors": "executor",
+    "processes": "process",
+    "hosts": "host",
+    "chains": "chain",
 }
 
 
-def _copies(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substitution, Tree]]:
+def expand_section(
+    name: str, section: Tree, substitution: Substitution, left_out: list[LeftOut]
+) -> Tree:
+    """Return a section with its copies, without the entries that are left out.
+
+    Variables are expanded, in keys too.
+    """
+    match section:
+        case Mapping():
+            return _named_entries(name, section, substitution, left_out)
+        case Sequence():
+            return _items(name, section, substitution, left_out)
+        case _:
+            return substitution.add(section, 1).tree
+
+
+def _named_entries(
+    section_name: str, section: Mapping, substitution: Substitution, left_out: list[LeftOut]
+) -> Tree:
+    substitution.grow(1, section)
+    made: dict[str, Entry] = {}
+    written: dict[str, Entry] = {}
+    for entry in section:
+        copies = _copies(entry.value, substitution)
+        if not copies:
+            left_out.append(_without_copies(section_name, entry))
+        for copy, body in copies:
+            substitution.grow(1, entry.key)
+            key = copy.key(entry.key)
+            failed = failed_condition(body, copy)
+            if failed is not None:
+                left_out.append(_left_out(section_name, str(key.value), failed))
+                continue
+            new = Entry(key, copy.add(without_conditions(body), _DEPTH).tree)
+            if new.name in made and has_reference(new.name):
+                continue  # a variable in the name is unknown
+            if new.name in made:
+                noun = SECTIONS[section_name]
+                problem = _duplicate_name(noun, entry, written[new.name], new.name)
+                substitution.diagnostics.append(problem)
+            else:
+                made[new.name], written[new.name] = new, entry
+    return Mapping(tuple(made.values()), section.span)
+
+
+def _items(
+    section_name: str, section: Sequence, substitution: Substitution, left_out: list[LeftOut]
+) -> Tree:
+    substitution.grow(1, section)
+    made = []
+    for item in section.items:
+        for copy, body in _copies(item, substitution):
+            failed = failed_condition(body, copy)
+            if failed is None:
+                made.append(copy.add(without_conditions(body), _DEPTH).tree)
+            elif section_name == "include":
+                include = copy.add(without_conditions(body), _DEPTH).tree
+                left_out.append(replace(_left_out(section_name, "", failed), include=include))
+    return Sequence(tuple(made), section.span)
+
+
+def _left_out(section: str, name: str, condition: Entry) -> LeftOut:
+    text = word(condition.value)
+    return LeftOut(section, name, condition.key.span, condition.name, text)
+
+
+def _without_copies(section: str, entry: Entry) -> LeftOut:
+    """Return an entry whose ``for_each`` has no values, with a pattern for its names."""
+    parts = pieces(entry.name)
+    name = "".join(part if isinstance(part, str) else "*" for part in parts)
+    loops = entry.value.entry(FOR_EACH) if isinstance(entry.value, Mapping) else None
+    span = entry.key.span if loops is None else loops.key.span
+    return LeftOut(section, name, span, FOR_EACH, "")
+
+
+def _copies(tree: Tree, substitution: Substitution) -> list[tuple[Substitution, Tree]]:
+    """Return the copies of an entry; see :func:`_each_copy`."""
+    return list(_each_copy(tree, substitution))
+
+
+def _each_copy(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substitution, Tree]]:
     """Yield a substitution and the tree to apply it to, for each copy of ``tree``."""
     for_each = tree.entry(FOR_EACH) if isinstance(tree, Mapping) else None
     if for_each is None or not isinstance(tree, Mapping):
@@ -85,6 +135,9 @@ def _copies(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substituti
         yield substitution.within(substitution.scope.inner(unknown, is_known=False)), tree
         return
     values = [(key, _distinct(choices, substitution.diagnostics)) for key, choices in values]
+    if not all(choices for _, choices in values):
+        for name in references(tree):
+            substitution.scope.use(name)
     substitution.grow_copies(prod(len(choices) for _, choices in values), for_each.value)
     body = Mapping(tuple(entry for entry in tree if entry is not for_each), tree.span)
     for chosen in product(*(choices for _, choices in values)):
@@ -97,8 +150,13 @@ def _values(loops: Tree) -> list[tuple[Scalar, tuple[Tree, ...]]] | None:
     """Return the values of each name, or None if they are malformed."""
     if not isinstance(loops, Mapping) or not loops.entries:
         return None
-    found = [(entry.key, _choices(entry.value)) for entry in loops]
-    return found if all(choices for _, choices in found) else None
+    found = []
+    for entry in loops:
+        choices = _choices(entry.value)
+        if choices is None:
+            return None
+        found.append((entry.key, choices))
+    return found
 
 
 def _distinct(choices: tuple[Tree, ...], diagnostics: list[Diagnostic]) -> tuple[Tree, ...]:
@@ -117,25 +175,25 @@ def _distinct(choices: tuple[Tree, ...], diagnostics: list[Diagnostic]) -> tuple
     return tuple(found.values())
 
 
-def _choices(tree: Tree) -> tuple[Tree, ...]:
+def _choices(tree: Tree) -> tuple[Tree, ...] | None:
     match tree:
         case Sequence(items=items) if all(_is_plain(item) for item in items):
             return items
         case Scalar(value=bool()):
-            return ()
-        case Scalar(value=int() as count) if count > 0:
+            return None
+        case Scalar(value=int() as count) if count >= 0:
             # One more than the maximum is enough to exceed it.
             numbers = range(min(count, MAX_COPIES + 1))
             return tuple(Scalar(number, tree.span, verbatim=False) for number in numbers)
         case _:
-            return ()
+            return None
 
 
 def _is_plain(tree: Tree) -> bool:
     return isinstance(tree, Scalar) and tree.value is not None
 
 
-def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
+def _duplicate_name(noun: str, entry: Entry, earlier: Entry, name: str) -> Diagnostic:
     """Report a name that was made twice, from the same entry or from two."""
     span = entry.key.span
     loops = entry.value.get(FOR_EACH) if isinstance(entry.value, Mapping) else None
@@ -145,8 +203,12 @@ def _duplicate_name(entry: Entry, earlier: Entry, name: str) -> Diagnostic:
         hint = _DIFFERENT
         if unused:
             hint = f"make the names unique: '{'_'.join((shown(entry.name), *unused))}'"
-        message = f"copies of this node have the same name, '{shown(name)}'"
+        message = f"copies of this {noun} have the same name, '{shown(name)}'"
         return Diagnostic(rules.DUPLICATE_NAME, message, span, hint=hint)
     label = Label(earlier.key.span, "the other one")
-    message = f"two nodes are called '{shown(name)}'"
+    message = f"two {_plural(noun)} are called '{shown(name)}'"
     return Diagnostic(rules.DUPLICATE_NAME, message, span, (label,), "rename one of them")
+
+
+def _plural(noun: str) -> str:
+    return f"{noun}es" if noun.endswith("s") else f"{noun}s"

@@ -1,4 +1,4 @@
-"""The variables of a file: declarations, arguments and values, and in which order to read them."""
+"""The names that a file declares, with their values, and in which order to read them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from dataclasses import field
 from composer.base.diagnostics import nearest, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.graphs import cycles, strong_groups
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
+from composer.language.expand.arguments import Declared, read_declarations, section_name
+from composer.language.schema import kind_of
+from composer.language.tree import Mapping, Scalar, Sequence, Tree
 
 #: Maximum number of comparisons for hints in one file, to limit the time.
 _MAX_COMPARISONS = 20_000
@@ -27,28 +29,26 @@ class Sized:
     height: int
 
 
-@dataclass(frozen=True, slots=True)
-class Declared:
-    """A declared variable; ``value`` is None if an argument is required."""
-
-    key: Scalar
-    value: Tree | None
-
-
 @dataclass(slots=True)
 class Scope:
     """The names in a file and their values.
 
-    ``values`` are the variables evaluated so far. A declared variable without a value, because it
-    was not given or is part of a cycle, stays as written.
+    ``section`` declares them. ``values`` are those evaluated so far. A declared name without a
+    value, because it was not given or is part of a cycle, stays as written.
     """
 
+    section: str
     declared: dict[str, Declared]
     is_known: bool  # False if the section is malformed, so that the declarations are unknown
     values: dict[str, Sized] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     outer: Scope | None = None
     _compared: int = 0
+
+    @property
+    def word(self) -> str:
+        """What the file calls a declared name."""
+        return self.section.removesuffix("s")
 
     def inner(self, declared: dict[str, Declared], *, is_known: bool = True) -> Scope:
         """Return a nested scope in which these names take precedence."""
@@ -57,7 +57,7 @@ class Scope:
             for name, variable in declared.items()
             if variable.value is not None
         }
-        return Scope(declared, self.is_known and is_known, values, outer=self)
+        return Scope(self.section, declared, self.is_known and is_known, values, outer=self)
 
     def find(self, name: str) -> Sized | None:
         """Return the value of ``name`` if it is known, and count it as used."""
@@ -66,8 +66,12 @@ class Scope:
             return self.values.get(name)
         return self.outer.find(name)
 
+    def use(self, name: str) -> None:
+        """Count ``name`` as used."""
+        self.find(name)
+
     def declares(self, name: str) -> bool:
-        """Return whether ``name`` is a declared variable."""
+        """Return whether ``name`` is declared."""
         return name in self.declared or (self.outer is not None and self.outer.declares(name))
 
     def hint(self, name: str) -> str | None:
@@ -90,26 +94,11 @@ class Scope:
         return f"did you mean '{close}'?"
 
 
-def read_scope(tree: Mapping, is_node_type: bool) -> Scope:
-    """Return the variables that a file declares, not yet evaluated.
-
-    A system declares values, a node type defaults.
-    """
-    section = tree.get("variables")
-    if section is None:
-        return Scope({}, is_known=True)
-    if not isinstance(section, Mapping):
-        return Scope({}, is_known=False)
-    read = _default if is_node_type else _value
-    return Scope({entry.name: Declared(entry.key, read(entry)) for entry in section}, is_known=True)
-
-
-def _value(entry: Entry) -> Tree | None:
-    return entry.value
-
-
-def _default(entry: Entry) -> Tree | None:
-    return entry.value.get("default") if isinstance(entry.value, Mapping) else None
+def read_scope(tree: Mapping) -> Scope:
+    """Return the names that a file declares, not yet evaluated."""
+    kind = kind_of(tree)
+    declared = read_declarations(tree, kind)
+    return Scope(section_name(kind), declared or {}, is_known=declared is not None)
 
 
 def measure(tree: Tree) -> Sized:

@@ -8,6 +8,7 @@ from dataclasses import field
 
 from composer.base.diagnostics import Diagnostic, Label, Rule, shown
 from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.language import rules
 from composer.language.document.limits import (
     MAX_BYTES,
@@ -223,13 +224,16 @@ class Substitution:
             hint = "write '$${' for a literal '${', and '{...}' for an expression"
             self._report(rules.MALFORMED_VARIABLE, message, reference, scalar, hint)
             return None
+        return self.lookup(name, scalar, scalar.part(reference.start, len(reference.written)))
+
+    def lookup(self, name: str, scalar: Scalar, span: Span) -> Sized | None:
+        """Return the value of a name that ``scalar`` uses at ``span``; None if it has none."""
         found = self.scope.find(name)
         if not self.scope.declares(name) and self.scope.is_known:
             self.unknown.add(name)
-            message = f"there is no variable '{shown(name)}'"
-            hint = self.scope.hint(name) or "declare it under 'variables'"
+            message = f"there is no {self.scope.word} '{shown(name)}'"
+            hint = self.scope.hint(name) or f"declare it under '{self.scope.section}'"
             subject = ("variable", f"{scalar.span.file.path}: {name}")
-            span = scalar.part(reference.start, len(reference.written))
             self.diagnostics.append(
                 Diagnostic(rules.UNKNOWN_VARIABLE, message, span, hint=hint, subjects=(subject,))
             )

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping as Map
 from dataclasses import field
 from pathlib import Path
+from types import MappingProxyType
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.document.limits import Stopped
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
-from composer.language.tree import Mapping
+from composer.language.tree import Entry, LeftOut, Mapping
 from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
@@ -35,7 +36,7 @@ class AssembledSystem:
 
     ``folders`` are the folders of all files and ``included`` the places that include them, by file
     name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
-    ``diagnostics``.
+    ``diagnostics``. ``left_out`` are entries that conditions leave out.
     """
 
     tree: Mapping | None
@@ -43,10 +44,17 @@ class AssembledSystem:
     is_partial: bool = False
     folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+    left_out: tuple[LeftOut, ...] = ()
 
 
-def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) -> AssembledSystem:
-    """Return the system ``tree`` with its variables and copies expanded, merged with its includes.
+def assemble(
+    tree: Mapping,
+    source: SourceFile,
+    folder: Path,
+    project: Project,
+    arguments: Map[str, Entry] = MappingProxyType({}),
+) -> AssembledSystem:
+    """Return the system ``tree`` with its ``arguments`` expanded, merged with its includes.
 
     ``folder`` is the folder of its file; all included files must be in ``project``. Each file is
     checked against the schema.
@@ -55,7 +63,8 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
     limits = IncludeLimits()
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
-        merged = resolver.merge(SystemFile(folder / Path(source.path).name, source, tree), {})
+        file = SystemFile(folder / Path(source.path).name, source, tree)
+        merged = resolver.merge(file, dict(arguments))
     except Stopped as stopped:
         return AssembledSystem(None, [stopped.diagnostic])
     is_partial = (
@@ -64,4 +73,6 @@ def assemble(tree: Mapping, source: SourceFile, folder: Path, project: Project) 
         or any(is_opaque(entry.name) for entry in entries(merged.get("nodes")))
     )
     included = {path: tuple(places.values()) for path, places in resolver.included.items()}
-    return AssembledSystem(merged, diagnostics, is_partial, resolver.folders, included)
+    return AssembledSystem(
+        merged, diagnostics, is_partial, resolver.folders, included, resolver.left_out
+    )

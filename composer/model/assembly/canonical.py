@@ -11,14 +11,14 @@ from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 T = TypeVar("T")
 
-_VARIABLES = "variables"
+_ARGUMENTS = "arguments"
 _NODES = "nodes"
 
 
 def canonical(tree: Mapping) -> Mapping:
     """Return an assembled tree as one equivalent file, with its keys in the usual order.
 
-    The variables of a system have been expanded, so the section is left out. Any text that still
+    The arguments of a system have been expanded, so the section is left out. Any text that still
     looks like a variable is escaped.
     """
     if tree.entry(SYSTEM) is None:
@@ -35,7 +35,7 @@ def canonical(tree: Mapping) -> Mapping:
             _nodes(entry.value, node_keys) if entry.name == _NODES else _escape(entry.value),
         )
         for entry in tree
-        if entry.name != _VARIABLES
+        if entry.name != _ARGUMENTS
     ]
     return _sort_keys(Mapping(tuple(entries), tree.span), system["properties"])
 

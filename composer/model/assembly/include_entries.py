@@ -14,7 +14,7 @@ from composer.language.document import read_document, similar_file
 from composer.language.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.language.schema.kinds import SYSTEM, check_kind
 from composer.language.tree import Entry, Mapping, Tree
-from composer.language.tree_values import is_opaque, text
+from composer.language.tree_values import entries, is_opaque, text
 from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits
 from composer.model.assembly.namespacing import Placement
 from composer.model.names import namespace_problem
@@ -51,7 +51,7 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
         return None
     if entry is None:
         return Include(file, Placement(), {}, None, file.span)
-    variables, overrides = entry.get("variables"), entry.get("overrides")
+    arguments, overrides = entry.get("arguments"), entry.get("overrides")
     before = len(diagnostics)
     namespace = _namespace(entry, diagnostics)
     # the value of a loop may be in both; it is reported once
@@ -61,7 +61,7 @@ def read_include(tree: Tree, diagnostics: list[Diagnostic]) -> Include | None:
     return Include(
         file,
         Placement(_prefix(entry, found), namespace),
-        {item.name: item for item in variables} if isinstance(variables, Mapping) else {},
+        {item.name: item for item in entries(arguments)},
         overrides if isinstance(overrides, Mapping) else None,
         file.span if (given := entry.get("prefix")) is None else given.span,
     )

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from collections.abc import Iterator
+from dataclasses import field, replace
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language.document.limits import MAX_INCLUDE_DEPTH
-from composer.language.expand import expand
+from composer.language.expand import expand, missing_names
 from composer.language.expand.scope import measure
-from composer.language.rules import CYCLE
+from composer.language.rules import CYCLE, EMPTY_COLLECTION, MISSING_VARIABLE
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import SYSTEM, with_intended_sections
-from composer.language.tree import Entry, Mapping, Tree
-from composer.language.tree_values import items
+from composer.language.tree import Entry, LeftOut, Mapping, Tree, plain
+from composer.language.tree_values import entries, items
 from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
 from composer.model.assembly.limits import IncludeLimits, exceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
-from composer.model.assembly.namespacing import add_namespace
-from composer.model.assembly.references import expand_wildcards
+from composer.model.assembly.namespacing import PREFIXED, add_namespace
+from composer.model.assembly.references import expand_references, without_left_out
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,8 @@ class IncludeResolver:
     """Merges systems with the files that they include.
 
     ``is_partial`` is true if an included file is unavailable. ``folders`` are the folders of all
-    files and ``included`` the places that include them, each once, by file name.
+    files and ``included`` the places that include them, each once, by file name. ``left_out`` are
+    the entries that conditions leave out of the file that was merged last.
     """
 
     reader: IncludeReader
@@ -45,6 +47,7 @@ class IncludeResolver:
     is_partial: bool = False
     folders: dict[str, Path] = field(default_factory=dict)
     included: dict[str, dict[str, Span]] = field(default_factory=dict)
+    left_out: tuple[LeftOut, ...] = ()
     _stack: list[_Frame] = field(default_factory=list)
 
     def merge(self, file: SystemFile, arguments: dict[str, Entry]) -> Mapping:
@@ -55,15 +58,25 @@ class IncludeResolver:
         self.folders[file.source.path] = file.path.parent
         tree, misspelled = with_intended_sections(file.tree, SYSTEM)
         self.diagnostics += misspelled
-        expanded, found = expand(tree, arguments)
+        expanded, found, left_out = expand(tree, arguments)
         if self._stack:
             self.limits.count("values", measure(expanded).values, self._stack[-1].span)
-        found += check_schema(expanded, SYSTEM)
+            found += _missing(tree, arguments, self._stack[-1].span)
+        found += _without_emptied(check_schema(expanded, SYSTEM), tree)
         self.diagnostics += found
         includes = expanded.get(INCLUDE)
         if any(_is_in_section(item.primary, INCLUDE, expanded) for item in found):
             self.is_partial = True
-        parts = [part for item in items(includes) if (part := self._part(item, file)) is not None]
+        all_left_out = [*left_out]
+        for absent in left_out:
+            if absent.include is not None:
+                all_left_out += self._nodes_of(absent, absent.include, file)
+        parts = []
+        for item in items(includes):
+            part = self._part(item, file)
+            if part is not None:
+                parts.append(part)
+                all_left_out += part.left_out
         conflicts: list[Diagnostic] = []
         joined = join_parts(expanded, parts, conflicts)
         # The copies of an include with an error may have the same names because of it, and an
@@ -71,7 +84,8 @@ class IncludeResolver:
         if not self.is_partial:
             wrong = {_line(item) for item in self.diagnostics}
             self.diagnostics += (item for item in conflicts if not _lines(item) & wrong)
-        return expand_wildcards(joined, self.limits)
+        self.left_out = tuple(all_left_out)
+        return expand_references(joined, self.left_out, self.limits)
 
     def _part(self, item: Tree, includer: SystemFile) -> Part | None:
         include = read_include(item, self.diagnostics)
@@ -89,6 +103,17 @@ class IncludeResolver:
         finally:
             self._stack.pop()
 
+    def _nodes_of(self, absent: LeftOut, item: Tree, includer: SystemFile) -> Iterator[LeftOut]:
+        """Yield the nodes of an include that is left out. Its errors are not reported."""
+        diagnostics, is_partial = len(self.diagnostics), self.is_partial
+        part = self._part(item, includer)
+        del self.diagnostics[diagnostics:]
+        self.is_partial = is_partial
+        if part is not None:
+            for node in entries(part.tree.get("nodes")):
+                yield replace(absent, section="nodes", name=node.name, include=None)
+            yield from part.left_out
+
     def _merge_included(self, file: SystemFile, include: Include) -> Part:
         span = include.file.span
         if len(self._stack) > MAX_INCLUDE_DEPTH:
@@ -96,14 +121,21 @@ class IncludeResolver:
             raise exceeded(message, span, "include the file directly")
         self.included.setdefault(file.source.path, {}).setdefault(str(span), span)
         tree = self.merge(file, include.arguments)
+        left_out = self.left_out
         if include.overrides is not None:
             # In a partial tree, an unknown name is not known to be an error.
             diagnostics: list[Diagnostic] = [] if self.is_partial else self.diagnostics
-            tree = apply_overrides(tree, include.overrides, file.source, diagnostics)
+            overrides = without_left_out(include.overrides, left_out)
+            tree = apply_overrides(tree, overrides, file.source, diagnostics)
             diagnostics += check_schema(tree, SYSTEM)
         includer = self._stack[-1].file.path.parent
         merged = add_namespace(tree, include.placement, includer, file.path.parent)
-        return Part(merged, include.naming)
+        prefix = include.placement.prefix
+        prefixed = (
+            replace(item, name=f"{prefix}{item.name}") if item.section in PREFIXED else item
+            for item in left_out
+        )
+        return Part(merged, include.naming, tuple(prefixed))
 
     def _is_cycle(self, file: SystemFile) -> bool:
         """Return whether ``file`` is being merged already, and report the cycle."""
@@ -129,6 +161,23 @@ def _cycle(frames: list[_Frame]) -> Diagnostic:
     cycle = " -> ".join(map(shown, [*paths, paths[0]]))
     labels = tuple(Label(span, "through this") for span in spans[1:])
     return Diagnostic(CYCLE, f"this includes itself: {cycle}", spans[0], labels)
+
+
+def _missing(tree: Mapping, given: dict[str, Entry], span: Span) -> Iterator[Diagnostic]:
+    declared = {entry.name: entry for entry in entries(tree.get("arguments"))}
+    for name in missing_names(tree, given):
+        message = f"the file needs a value for its argument '{shown(name)}'"
+        label = Label(declared[name].key.span, "declared without default")
+        hint = f"add 'arguments: {{{shown(name)}: ...}}' to the include"
+        yield Diagnostic(MISSING_VARIABLE, message, span, (label,), hint)
+
+
+def _without_emptied(found: list[Diagnostic], written: Mapping) -> Iterator[Diagnostic]:
+    """Yield diagnostics, except of sections that are empty because of conditions."""
+    emptied = {str(entry.key.span) for entry in written if plain(entry.value)}
+    for item in found:
+        if item.rule is not EMPTY_COLLECTION or str(item.primary) not in emptied:
+            yield item
 
 
 def _line(diagnostic: Diagnostic) -> tuple[str, int]:

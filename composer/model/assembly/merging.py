@@ -8,7 +8,16 @@ from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.rules import DUPLICATE_NAME
-from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, plain
+from composer.language.tree import (
+    Entry,
+    LeftOut,
+    Mapping,
+    Scalar,
+    ScalarValue,
+    Sequence,
+    Tree,
+    plain,
+)
 from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.limits import INVALID_INCLUDE, UNKNOWN_OVERRIDE
 
@@ -115,10 +124,11 @@ def _unknown(section: Entry, names: list[str], source: SourceFile) -> Iterator[D
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A merged file, and the place that decides the names of its nodes."""
+    """A merged file, the place that decides the names of its nodes, and what it leaves out."""
 
     tree: Mapping
     span: Span
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def join_parts(own: Mapping, parts: Iterable[Part], diagnostics: list[Diagnostic]) -> Mapping:

@@ -19,6 +19,8 @@ from composer.model.assembly.references import add_prefix, with_prefix
 
 #: Keys that a file has for all nodes, and a node for itself.
 _NODE_DEFAULTS = ("lifecycle", "introspection")
+#: Sections whose entries get the prefix.
+PREFIXED = ("nodes", "chains")
 #: Keys of ``lifecycle`` that apply to the whole system, not to each node.
 _NOT_INHERITED = frozenset({"implied_dependencies"})
 
@@ -46,7 +48,7 @@ def add_namespace(tree: Mapping, placement: Placement, includer: Path, folder: P
         return Mapping(tuple(made), nodes.span) if isinstance(nodes, Mapping) else nodes
 
     tree = add_prefix(tree, prefix) if prefix else tree
-    for section in ("nodes", "chains"):
+    for section in PREFIXED:
         tree = changed_at(tree, (section,), prefixed)
     tree = changed_at(tree, ("nodes",), placed)
     if namespace is not None:

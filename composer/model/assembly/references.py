@@ -1,15 +1,15 @@
-"""References to nodes in a system: change all of them, or expand wildcards such as ``camera_*``."""
+"""References to nodes in a system: prefixes, wildcards such as ``camera_*``, absent nodes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field
 from functools import partial
 from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
-from composer.language.tree_values import changed_at, entries
+from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree, plain
+from composer.language.tree_values import changed_at, entries, items
 from composer.model.assembly.limits import IncludeLimits
 from composer.model.names import matches_wildcard
 
@@ -45,17 +45,35 @@ def with_prefix(name: Scalar, prefix: str) -> Scalar:
     return Scalar(f"{prefix}{name.value}", name.span, verbatim=False)
 
 
-def expand_wildcards(tree: Mapping, limits: IncludeLimits) -> Mapping:
+def expand_references(tree: Mapping, left_out: Iterable[LeftOut], limits: IncludeLimits) -> Mapping:
     """Return a system with the names of nodes in place of patterns. Raises Stopped.
 
-    Chains have no patterns: their ports have an order.
+    Nodes that are left out go out of lists and of patterns. At the end of a connection, one of them
+    stays if no other node is there: the connection would end nowhere. Chains have no patterns,
+    because their ports have an order.
     """
-    wildcards = _Wildcards(tuple(entry.name for entry in entries(tree.get("nodes"))), limits)
+    absent = tuple(item.name for item in left_out if item.section == "nodes")
+    wildcards = _Wildcards(
+        tuple(entry.name for entry in entries(tree.get("nodes"))), absent, limits
+    )
     for path in _NODES:
         tree = changed_at(tree, path, partial(_changed, change=wildcards.nodes))
     for path in _PORTS:
-        tree = changed_at(tree, path, partial(_changed, change=wildcards.ports))
+        tree = changed_at(tree, path, wildcards.end)
     return tree
+
+
+def without_left_out(overrides: Mapping, left_out: Iterable[LeftOut]) -> Mapping:
+    """Return the overrides of an include without entries that are left out of its file."""
+    names = {(item.section, item.name) for item in left_out}
+
+    def kept(section: Entry) -> Tree:
+        if not isinstance(section.value, Mapping):
+            return section.value
+        inner = tuple(item for item in section.value if (section.name, item.name) not in names)
+        return Mapping(inner, section.value.span)
+
+    return Mapping(tuple(Entry(item.key, kept(item)) for item in overrides), overrides.span)
 
 
 def _changed(tree: Tree, change: Change) -> Tree:
@@ -84,23 +102,33 @@ def _changed_items(tree: Sequence, change: Change) -> Iterator[Tree]:
 class _Wildcards:
     """Replaces patterns, in which ``*`` matches any text, with the names of nodes.
 
-    A pattern without matches stays: a rule reports the unknown node.
+    Nothing replaces a name or a pattern of nodes that are left out, ``absent``. A pattern without
+    matches stays: a rule reports the unknown node.
     """
 
     names: tuple[str, ...]
+    absent: tuple[str, ...]
     limits: IncludeLimits
     _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def nodes(self, reference: Scalar) -> tuple[Scalar, ...]:
         return self._matching(reference, str(reference.value), "")
 
-    def ports(self, reference: Scalar) -> tuple[Scalar, ...]:
+    def end(self, tree: Tree) -> Tree:
+        """Return the end of a connection; as it is if there are names and none stays."""
+        changed = _changed(tree, self._ports)
+        is_empty = isinstance(changed, Sequence) and not changed.items
+        has_name = any(WILDCARD not in str(plain(item)) for item in (items(tree) or (tree,)))
+        return tree if is_empty and has_name else changed
+
+    def _ports(self, reference: Scalar) -> tuple[Scalar, ...]:
         node, dot, port = str(reference.value).rpartition(".")
         return self._matching(reference, node, f"{dot}{port}")
 
     def _matching(self, reference: Scalar, pattern: str, port: str) -> tuple[Scalar, ...]:
         if WILDCARD not in pattern:
-            return (reference,)
+            is_absent = self.absent and pattern not in self.names and self._is_absent(pattern)
+            return () if is_absent else (reference,)
         span = reference.span
         if pattern not in self._found:
             self.limits.count("comparisons", len(self.names) * (1 + len(pattern) // 64), span)
@@ -109,4 +137,13 @@ class _Wildcards:
             )
         names = self._found[pattern]
         self.limits.count("matches", len(names), span)
+        if not names and self._is_absent(pattern):
+            return ()
         return tuple(Scalar(f"{name}{port}", span, False) for name in names) or (reference,)
+
+    def _is_absent(self, pattern: str) -> bool:
+        """Return whether a name or a pattern is one of a node that is left out."""
+        return any(
+            matches_wildcard(pattern, name) or matches_wildcard(name, pattern)
+            for name in self.absent
+        )

@@ -40,8 +40,8 @@ def resolve(
 ) -> tuple[System | None, list[Diagnostic]]:
     """Return the model of a file, with diagnostics of its expressions and its node types.
 
-    ``tree`` has its load-time variables expanded. ``folders`` are the folders of its files by file
-    name (by default, the folder of ``source.path``), where behaviors are searched first. A node
+    ``tree`` has its arguments expanded. ``folders`` are the folders of its files by file name (by
+    default, the folder of ``source.path``), where behaviors are searched first. A node
     type gives a system with one node; a file that is neither gives no system and a diagnostic.
     """
     home = folders.get(source.path, Path(source.path).parent)

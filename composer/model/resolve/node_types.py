@@ -9,13 +9,13 @@ from pathlib import Path
 from composer.base.diagnostics import (
     Diagnostic,
     Label,
-    error,
     has_errors,
     shown,
 )
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
-from composer.language.expand import expand, missing_variables
+from composer.language.expand import expand, missing_names
+from composer.language.rules import MISSING_VARIABLE
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import NODE
 from composer.language.tree import Entry, Mapping, Plain, Tree, plain
@@ -24,8 +24,6 @@ from composer.model.assembly import Inherited, inherit, read_node_type
 from composer.model.resolve.declaration import Declaration, declare
 from composer.model.resolve.qos import QosTable
 from composer.project.node_types import SourceFolders
-
-RULE = error("RC287", "missing-variable")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +83,7 @@ class NodeTypeLoader:
     def _instantiate(
         self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Entry]
     ) -> InstantiatedNodeType:
-        expanded, found = expand(tree, given)
+        expanded, found, _ = expand(tree, given)
         found = [*found, *self._schema_diagnostics(path, expanded, given)]
         folders = SourceFolders(path.parent, written.folders, self.folders.node_types)
         declaration = declare(expanded, folders, self.qos, found)
@@ -124,9 +122,9 @@ def _missing(tree: Mapping, given: dict[str, Entry], span: Span) -> Iterator[Dia
     declared = {entry.name: entry for entry in entries(tree.get("variables"))}
     owner = tree.get("node")
     name = shown(str(plain(owner))) if owner is not None else ""
-    for variable in missing_variables(tree, given):
+    for variable in missing_names(tree, given):
         yield Diagnostic(
-            RULE,
+            MISSING_VARIABLE,
             f"node type '{name}' needs a value for its variable '{shown(variable)}'",
             span,
             (Label(declared[variable].key.span, "declared without default"),),

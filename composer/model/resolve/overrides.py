@@ -1,16 +1,18 @@
-"""Overrides from the command line: ``--set``, ``--namespace``, ``--use-sim-time``."""
+"""What a command line sets: ``name=value``, ``--set``, ``--namespace``, ``--use-sim-time``."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field
 
 from composer.base.diagnostics import Diagnostic, error, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
 from composer.language.document import parse_document
-from composer.language.tree import Entry, Scalar, Tree
+from composer.language.tree import Entry, Scalar, Tree, plain
 from composer.model import USE_SIM_TIME
 
+ARGUMENTS = "argument"
 SET = "--set"
 NAMESPACE = "--namespace"
 USE_SIM_TIME_OPTION = "--use-sim-time"
@@ -28,11 +30,13 @@ class Override:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """All overrides of a command line, parsed."""
+    """All that a command line sets, parsed."""
 
+    arguments: Mapping[str, Entry] = field(default_factory=dict)
     parameters: tuple[Override, ...] = ()
     namespace: Located[str] | None = None
     use_sim_time: Entry | None = None
+    argument_words: tuple[str, ...] = ()
     by_node: dict[str, dict[str, Entry]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -44,11 +48,15 @@ class Overrides:
 
 @dataclass(frozen=True, slots=True)
 class OverrideOptions:
-    """Override options as given. Each of ``settings`` is ``node.parameter=value``."""
+    """Words of a command line.
+
+    ``arguments`` are ``name=value``, ``settings`` are ``node.parameter=value``.
+    """
 
     settings: tuple[str, ...] = ()
     namespace: str | None = None
     use_sim_time: bool = False
+    arguments: tuple[str, ...] = ()
 
 
 NO_OVERRIDES = OverrideOptions()
@@ -65,7 +73,25 @@ def read_overrides(options: OverrideOptions) -> tuple[Overrides, list[Diagnostic
     found = (_override(text, source, line, diagnostics) for line, text in enumerate(texts, start=1))
     parameters = tuple(item for item in found if item is not None)
     clock = _use_sim_time() if options.use_sim_time else None
-    return Overrides(parameters, _namespace(options.namespace), clock), diagnostics
+    arguments = _arguments(options.arguments)
+    namespace = _namespace(options.namespace)
+    return Overrides(arguments, parameters, namespace, clock, options.arguments), diagnostics
+
+
+def _arguments(words: tuple[str, ...]) -> dict[str, Entry]:
+    """Return the arguments by name; a value that is not YAML is a text."""
+    texts = [word.replace("\r", " ").replace("\n", " ") for word in words]
+    source = SourceFile(ARGUMENTS, "\n".join(texts))
+    given = {}
+    for line, text in enumerate(texts, start=1):
+        name, _, written = text.partition("=")
+        span = Span(source, line, len(name) + 2, max(len(written), 1))
+        problems: list[Diagnostic] = []
+        value = _value(text, len(name) + 1, source, line, problems) if written else None
+        if problems or value is None or plain(value) is None:
+            value = Scalar(written, span)
+        given[name] = Entry(Scalar(name, Span(source, line, 1, len(name))), value)
+    return given
 
 
 def _namespace(namespace: str | None) -> Located[str] | None:

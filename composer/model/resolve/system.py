@@ -119,6 +119,7 @@ def resolve_system(
         delivery=value_or(choice(tree.get("delivery"), Delivery), Delivery.AUTO),
         use_sim_time=any(flag(entry.value, default=False) for entry in clock),
         implied_dependencies=flag(lifecycle.get("implied_dependencies"), default=True),
+        arguments=overrides.argument_words,
         unknown=_unknown_nodes(nodes, overrides),
         parameter_files=frozenset(section.name.span.file for section in files.sections),
         unmatched_parameters=files.unmatched(nodes),

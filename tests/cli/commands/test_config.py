@@ -11,7 +11,7 @@ from tests.cli.compose import compose
 def test_includes_are_resolved(tmp_path: Path) -> None:
     done = compose("config", "systems/fleet.yaml")
     assert (done.code, done.err) == (0, "")
-    for gone in ("include", "for_each", "${", "variables: {start"):
+    for gone in ("include", "for_each", "${", "arguments: {start"):
         assert gone not in done.out
     assert "alpha_controller" in done.out
     resolved = tmp_path / "one.yaml"

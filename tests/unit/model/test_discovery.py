@@ -54,7 +54,7 @@ def test_a_discovery_is_expressed_by_variables_of_ros(
 
 def test_variables_of_the_file_are_inserted(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    discovery = 'variables: {at: 10.0.0.1, port: 5}\ndiscovery: {kind: server, address: "${at}"'
+    discovery = 'arguments: {at: 10.0.0.1, port: 5}\ndiscovery: {kind: server, address: "${at}"'
     path.write_text(f"system: robot\n{discovery}, port: '${{port}}'}}\n{NODES}", encoding="utf-8")
     system = load(path).system
     assert system is not None

@@ -101,7 +101,7 @@ HINTS: dict[str, tuple[str, str, list[str | None]]] = {
     ),
     "a variable of an include with for_each": (
         "system: demo\ninclude:\n  - {file: other.yaml, for_each: {bay: [north, south]}, "
-        "prefix: '${bay}_', variables: {zone: '${side}'}}\n",
+        "prefix: '${bay}_', arguments: {zone: '${side}'}}\n",
         "unknown-variable",
         ["'for_each' sets 'bay'"],
     ),

@@ -8,7 +8,7 @@ import pytest
 
 from composer.base.diagnostics import Diagnostic
 from composer.language.document.limits import MAX_DEPTH
-from composer.language.expand import expand, missing_variables
+from composer.language.expand import expand, missing_names
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
 from tests.unit.support.resolving import tree_of
 
@@ -20,11 +20,11 @@ def arguments(text: str) -> dict[str, Entry]:
 
 
 def expanded(text: str, given: str = "{}") -> tuple[Mapping, list[Diagnostic]]:
-    return expand(tree_of(text), arguments(given))
+    return expand(tree_of(text), arguments(given))[:2]
 
 
 def system(variables: str, value: str) -> str:
-    return f"system: s\nvariables: {variables}\nx: {value}"
+    return f"system: s\narguments: {variables}\nx: {value}"
 
 
 def at_x(tree: Mapping) -> Tree:
@@ -41,7 +41,7 @@ def at_x(tree: Mapping) -> Tree:
         ("{a: 1.5}", "'${a}'", 1.5),
         ("{a: null}", "${a}", None),
         ("{a: [1, {b: 2}]}", "['${a}', 3]", [[1, {"b": 2}], 3]),
-        ("{a: {b: 1}}", "{c: '${a}'}", {"c": {"b": 1}}),
+        ("{a: {default: {b: 1}}}", "{c: '${a}'}", {"c": {"b": 1}}),
         # inside a text: its text
         ("{a: 1, b: x}", "p/${a}/${b}", "p/1/x"),
         ("{a: 1.50, b: true, c: null}", "${a} ${b} ${c}", "1.5 true null"),
@@ -57,7 +57,7 @@ def at_x(tree: Mapping) -> Tree:
         # of each other, in any order
         ("{a: '${b}', b: '${c}', c: 1}", "${a}", 1),
         ("{a: '${b}-${c}', b: x, c: '${b}'}", "${a}", "x-x"),
-        ("{a: ['${b}', '${b}'], b: {c: 1}}", "${a}", [{"c": 1}, {"c": 1}]),
+        ("{a: ['${b}', '${b}'], b: {default: {c: 1}}}", "${a}", [{"c": 1}, {"c": 1}]),
         # names that are keys, too
         ("{a: b}", "{'${a}_x': '${a}', '$${a}': 1}", {"b_x": "b", "${a}": 1}),
     ],
@@ -90,16 +90,16 @@ def test_node_type(value: str, given: str, result: Plain) -> None:
     assert plain(at_x(tree)) == result
 
 
-def test_missing_variables() -> None:
+def test_missing_names() -> None:
     tree = tree_of(TYPE + "1")
-    assert missing_variables(tree, {}) == ("a",)
-    assert missing_variables(tree, arguments("{a: 1}")) == ()
-    assert missing_variables(tree, arguments("{b: 1}")) == ("a",)
+    assert missing_names(tree, {}) == ("a",)
+    assert missing_names(tree, arguments("{a: 1}")) == ()
+    assert missing_names(tree, arguments("{b: 1}")) == ("a",)
 
 
 def test_misspelt_argument_is_not_missing_too() -> None:
     tree = tree_of("node: t\nvariables: {message_type: {}}\nx: ${message_type}")
-    assert missing_variables(tree, arguments("{mesage_type: x}")) == ()
+    assert missing_names(tree, arguments("{mesage_type: x}")) == ()
 
 
 def test_value_keeps_the_place_where_it_was_written() -> None:
@@ -121,7 +121,7 @@ def test_text_keeps_its_own_place() -> None:
 
 def test_what_has_no_variables_stays_the_very_same() -> None:
     source = tree_of("system: s\nx: {y: [1, {z: text}]}")
-    tree, diagnostics = expand(source, {})
+    tree, diagnostics, _ = expand(source, {})
     assert diagnostics == []
     assert at_x(tree) is at_x(source)
 
@@ -131,11 +131,11 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
     [
         (
             system("{rate: 1}", "['${rate}', 'at ${rat}']"),
-            "unknown-variable", "f:3:20", "there is no variable 'rat'", "did you mean 'rate'?",
+            "unknown-variable", "f:3:20", "there is no argument 'rat'", "did you mean 'rate'?",
         ),
         (
             "system: s\nx: ${a}",
-            "unknown-variable", "f:2:4", "there is no variable 'a'", "declare it",
+            "unknown-variable", "f:2:4", "there is no argument 'a'", "declare it",
         ),
         (
             system("{a: 1}", "['${a}', '${}']"),
@@ -150,7 +150,7 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
             "malformed-variable", "f:3:14", "'${a' is not a variable", "",
         ),
         (
-            system("{a: {b: 1}}", "at ${a}"),
+            system("{a: {default: {b: 1}}}", "at ${a}"),
             "malformed-variable", "f:3:7", "'${a}' is a map", "",
         ),
         (
@@ -159,15 +159,15 @@ def test_what_has_no_variables_stays_the_very_same() -> None:
         ),
         (
             system("{a: '${a}'}", "1"),
-            "cycle", "f:2:13", "variable 'a' is defined by itself", "",
+            "cycle", "f:2:13", "argument 'a' is defined by itself", "",
         ),
         (
             system("{a: 'x${b}', b: ['${c}'], c: '${a}', d: '${a}'}", "${d}"),
-            "cycle", "f:2:13", "variable 'a' is defined by itself: a -> b -> c -> a", "",
+            "cycle", "f:2:13", "argument 'a' is defined by itself: a -> b -> c -> a", "",
         ),
         (
             system("{a: 1, b: 2}", "${b}"),
-            "unused-declaration", "f:2:13", "variable 'a' is never used", "'${a}'",
+            "unused-declaration", "f:2:13", "argument 'a' is never used", "'${a}'",
         ),
     ],
 )  # fmt: skip
@@ -205,9 +205,8 @@ def test_a_section_of_another_shape_has_no_diagnostics_here(section: str) -> Non
     assert plain(at_x(tree)) == "${a}"
 
 
-@pytest.mark.parametrize("entry", ["5", "[a]", "null", "{}"])
-def test_variable_of_another_shape_has_no_value(entry: str) -> None:
-    tree, diagnostics = expanded(f"node: t\nvariables: {{a: {entry}}}\nx: ${{a}}")
+def test_a_name_without_default_stays_as_written() -> None:
+    tree, diagnostics = expanded("node: t\nvariables: {a: {}}\nx: ${a}")
     assert diagnostics == []
     assert plain(at_x(tree)) == "${a}"
 
@@ -215,7 +214,7 @@ def test_variable_of_another_shape_has_no_value(entry: str) -> None:
 def doubling(value: str, last: str) -> str:
     """Return a system whose variables each hold the next one twice, 60 times over."""
     lines = [f"  v{number}: {value.replace('NEXT', f'v{number + 1}')}" for number in range(60)]
-    return "\n".join(["system: s", "variables:", *lines, f"  v60: {last}", "x: ${v0}"])
+    return "\n".join(["system: s", "arguments:", *lines, f"  v60: {last}", "x: ${v0}"])
 
 
 @pytest.mark.parametrize(
@@ -223,7 +222,7 @@ def doubling(value: str, last: str) -> str:
     [
         (doubling("'${NEXT}${NEXT}'", "laugh"), "too-large", "f:"),
         (doubling("['${NEXT}', '${NEXT}']", "laugh"), "too-large", "f:"),
-        (doubling("{a: '${NEXT}'}", "1"), "too-large", "f:"),
+        (doubling("{default: {a: '${NEXT}'}}", "1"), "too-large", "f:"),
         (
             system("{a: [1, 2, 3, 4, 5, 6, 7, 8]}", "[" + "'${a}', " * 30_000 + "]"),
             "too-large", "f:3:",
@@ -234,7 +233,7 @@ def doubling(value: str, last: str) -> str:
 def test_growth_is_bounded(text: str, rule: str, place: str) -> None:
     tree = tree_of(text)
     started = time.process_time()
-    result, diagnostics = expand(tree, {})
+    result, diagnostics, _ = expand(tree, {})
     assert time.process_time() - started < SECONDS_ALLOWED
     assert [item.rule.name for item in diagnostics] == [rule]
     assert str(diagnostics[0].primary).startswith(place)
@@ -256,12 +255,12 @@ MANY = 20_000
 @pytest.mark.parametrize(
     "text",
     [
-        "system: s\nvariables:\n"
+        "system: s\narguments:\n"
         + "".join(f"  v{number}: '${{v{number + 1}}}'\n" for number in range(MANY))
         + f"  v{MANY}: 1\nx: ${{v0}}",
-        "system: s\nvariables:\n"
+        "system: s\narguments:\n"
         + "".join(f"  v{number}: '${{v{(number + 1) % MANY}}}'\n" for number in range(MANY)),
-        "system: s\nvariables:\n"
+        "system: s\narguments:\n"
         + "".join(f"  variable_{number}: 1\n" for number in range(MANY))
         + "x:\n"
         + "".join(f"  - ${{variabel_{number}}}\n" for number in range(MANY)),
@@ -273,6 +272,6 @@ MANY = 20_000
 def test_linear(text: str) -> None:
     tree = tree_of(text)
     started = time.process_time()
-    _, diagnostics = expand(tree, {})
+    _, diagnostics, _ = expand(tree, {})
     assert time.process_time() - started < SECONDS_ALLOWED
     assert all(len(item.message) < 200 and len(item.related) < 10 for item in diagnostics)

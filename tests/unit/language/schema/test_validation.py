@@ -64,12 +64,12 @@ def profile(text: str) -> str:
         ),
         (
             "system: demo\nnode: {robot: {}}\nnodes: {a: {}}",
-            "unknown-key", "node", "'node' is not a key of a system", "valid here: chains",
+            "unknown-key", "node", "'node' is not a key of a system", "valid here: arguments",
         ),
         ("node: demo\nxyzzy: 1", "unknown-key", "xyzzy", "'xyzzy' is not a key of a node type", ""),
         (
-            "node: demo\nvariables: {a: 1}",
-            "wrong-type", "1", "expected a map for 'a', found the number 1", "",
+            "node: demo\nvariables: 1",
+            "wrong-type", "1", "expected a map for 'variables', found the number 1", "",
         ),
         # nodes
         (

@@ -13,7 +13,7 @@ from composer.model import System
 
 CAMERA = """\
 system: camera
-variables: {rate_hz: 10, topic: image}
+arguments: {rate_hz: 10, topic: image}
 qos_profiles: {frames: {extends: sensor_data, depth: 2}}
 executors: {vision: {kind: single_threaded}}
 lifecycle: {on_failure: restart, timeout_ms: 5000}
@@ -95,7 +95,7 @@ def test_wildcards_of_a_parameter_file_apply_to_its_nodes_only(tmp_path: Path) -
          ["/robot/left/driver", "/robot/left/screen/viewer"], "/robot/left/image"),
         ("{file: camera.yaml, prefix: left_}", "", ["/left_driver", "/screen/left_viewer"],
          "/image"),
-        ("{file: camera.yaml, namespace: left, variables: {topic: /image}}", "",
+        ("{file: camera.yaml, namespace: left, arguments: {topic: /image}}", "",
          ["/left/driver", "/left/screen/viewer"], "/image"),
     ],
 )  # fmt: skip
@@ -142,7 +142,7 @@ connections:
 
 
 def test_arguments_and_the_place_of_their_diagnostics(tmp_path: Path) -> None:
-    loading = included(tmp_path, "{file: camera.yaml, variables: {rate_hz: often, tpic: x}}")
+    loading = included(tmp_path, "{file: camera.yaml, arguments: {rate_hz: often, tpic: x}}")
     assert reported(loading.diagnostics) == [
         "whole.yaml:3:46 wrong-type",
         "whole.yaml:3:53 unknown-variable",

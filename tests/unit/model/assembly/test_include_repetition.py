@@ -9,7 +9,7 @@ import pytest
 from composer.loading import load
 
 MISSPELLED = {
-    "varaibles": "system: part\nvaraibles: {text: hello}\n"
+    "argumnets": "system: part\nargumnets: {text: hello}\n"
     + "nodes:\n  a: {log: x}\n".replace("{log: x}", "{on_activate: {log: '${text}'}}"),
     "nodse": "system: part\nnodse: {a: {on_activate: {log: hello}}}\n",
     "executers": "system: part\nexecuters: {fast: {kind: events}}\nnodes: {a: {executor: fast}}\n",

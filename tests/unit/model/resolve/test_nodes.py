@@ -211,7 +211,7 @@ def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
 
 def test_a_mistake_in_an_argument_is_reported_at_every_argument(tmp_path: Path) -> None:
     (tmp_path / "filter.yaml").write_text(
-        "node: filter\nvariables: {condition: {}, count: {default: 1}}\n"
+        "node: filter\nvariables: {condition: {}, count: {}}\n"
         "subscriptions: {in: {type: x/msg/X, when: '${condition}', required: '${count}'}}\n"
     )
     _, diagnostics = resolve_text(

@@ -1,0 +1,264 @@
+"""All combinations of arguments: what is left out, and diagnostics of what is not chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from composer.base.diagnostics import Diagnostic
+from composer.loading import load, load_files
+from composer.model.resolve import OverrideOptions
+
+ROBOT = """\
+system: robot
+arguments:
+  simulation: false
+  lidar: {choices: [velodyne, ouster], default: velodyne}
+nodes:
+  simulator: {if: simulation, publishers: {scan: {type: std_msgs/msg/String, qos: command}}}
+  velodyne:
+    if: "not simulation and lidar == 'velodyne'"
+    publishers: {scan: {type: std_msgs/msg/String, qos: command}}
+  ouster:
+    if: "not simulation and lidar == 'ouster'"
+    publishers: {scan: {type: std_msgs/msg/String, qos: command}}
+  mapping:
+    lifecycle: {depends_on: [simulator, velodyne, ouster]}
+    subscriptions: {scan: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+connections:
+  - {topic: scan, from: [simulator.scan, velodyne.scan, ouster.scan], to: mapping.scan}
+"""
+
+
+def written(folder: Path, text: str, **files: str) -> Path:
+    for name, content in files.items():
+        (folder / f"{name}.yaml").write_text(dedent(content), encoding="utf-8")
+    path = folder / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def diagnostics_in(folder: Path, text: str, **files: str) -> list[Diagnostic]:
+    [result] = load_files([written(folder, text, **files)])
+    return result.diagnostics
+
+
+def messages_in(folder: Path, text: str, **files: str) -> list[str]:
+    return [f"{item.rule.name}: {item.message}" for item in diagnostics_in(folder, text, **files)]
+
+
+def chosen(path: Path, *arguments: str) -> list[str]:
+    """Return the nodes of the system with these arguments."""
+    result = load(path, overrides=OverrideOptions(arguments=arguments))
+    assert result.system is not None
+    assert [item.message for item in result.diagnostics] == []
+    return [node.name.value for node in result.system.nodes]
+
+
+def test_arguments_choose_the_nodes(tmp_path: Path) -> None:
+    path = written(tmp_path, ROBOT)
+    assert chosen(path) == ["velodyne", "mapping"]
+    assert chosen(path, "lidar=ouster") == ["ouster", "mapping"]
+    assert chosen(path, "lidar=ouster", "simulation=True") == ["simulator", "mapping"]
+    assert diagnostics_in(tmp_path, ROBOT) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "messages"),
+    [
+        # in one value of one argument, in one combination, in all
+        ("simulation, publishers: {scan", "simulation, publishers: {scn", [
+            "unknown-port: node 'simulator' has no port 'scan' (with simulation=true)",
+        ]),
+        ("ouster'\"\n    publishers: {scan", "ouster'\"\n    publishers: {scn", [
+            "unknown-port: node 'ouster' has no port 'scan' (with simulation=false, lidar=ouster)",
+        ]),
+        ("mapping.scan}", "mapping.scn}", ["unknown-port: node 'mapping' has no port 'scn'"]),
+        # an end that is only there with some arguments
+        ("from: [simulator.scan, velodyne.scan, ouster.scan]", "from: simulator.scan", [
+            "unknown-node: 'simulator.scan' names node 'simulator', which its 'if' leaves"
+            " out",
+        ]),
+        ("simulator.scan, velodyne.scan, ouster.scan]", "simulator.scan, velodyne.scan]", [
+            "unknown-node: 'simulator.scan' names node 'simulator', which its 'if' leaves"
+            " out (with simulation=false, lidar=ouster)",
+            "unknown-node: 'velodyne.scan' names node 'velodyne', which its 'if' leaves"
+            " out (with simulation=false, lidar=ouster)",
+        ]),
+        # a name that no combination has
+        ("depends_on: [simulator,", "depends_on: [simulaton,", [
+            "unknown-node: node 'mapping' depends on 'simulaton', which is not a node of this"
+            " system",
+        ]),
+        # a use in one combination is a use
+        ("if: simulation,", "if: simulation, executor: fast,", [
+            "undeclared-name: node 'simulator' runs on 'fast', which is not an executor of this"
+            " system (with simulation=true)",
+        ]),
+        ("nodes:\n  simulator: {", "executors: {fast: {}}\nnodes:\n  simulator: {executor: fast, ",
+         []),
+        ("nodes:\n", "executors: {fast: {}}\nnodes:\n",
+         ["unused-declaration: no node runs on 'fast'"]),
+        ("nodes:\n", "executors: {fast: {if: simulation}}\nnodes:\n",
+         ["unused-declaration: no node runs on 'fast' (with simulation=true)"]),
+        ("nodes:\n  simulator: {", "executors: {fast: {unless: simulation}}\n"
+         "nodes:\n  simulator: {executor: fast, ", [
+            "unused-declaration: no node runs on 'fast'",
+            "undeclared-name: node 'simulator' runs on 'fast', which its 'unless' leaves"
+            " out (with simulation=true)",
+        ]),
+    ],
+)  # fmt: skip
+def test_mistakes_name_the_arguments_with_which_they_happen(
+    old: str, new: str, messages: list[str], tmp_path: Path
+) -> None:
+    assert old in ROBOT
+    assert messages_in(tmp_path, ROBOT.replace(old, new)) == messages
+
+
+PART = """\
+system: part
+arguments: {topic: {type: string}, extra: false}
+nodes:
+  camera: {publishers: {image: {type: std_msgs/msg/String, qos: command}}}
+  more: {if: extra, on_activate: {log: started}}
+"""
+WHOLE = """\
+system: robot
+arguments: {cameras: true}
+include:
+  - {file: part.yaml, if: cameras, prefix: front_, arguments: {topic: a},
+     overrides: {nodes: {more: {description: another}}}}
+nodes:
+  viewer:
+    lifecycle: {depends_on: [front_camera, front_more]}
+    subscriptions: {image: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
+connections:
+  - {topic: image, if: cameras, from: front_camera.image, to: viewer.image}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rules"),
+    [
+        ("arguments: {topic: {type: string}", "arguments: {topic: {type: string}", []),
+        # the connection is there without the include
+        ("image, if: cameras,", "image,", ["unknown-node"]),
+        (", arguments: {topic: a}", "", ["missing-variable"]),
+        ("front_more]", "front_mor]", ["unknown-node"]),
+    ],
+)
+def test_an_include_may_be_left_out(old: str, new: str, rules: list[str], tmp_path: Path) -> None:
+    text = WHOLE.replace(old, new)
+    part = PART.replace("system: part", 'system: part\nnamespace: "${topic}"')
+    found = diagnostics_in(tmp_path, text, part=part)
+    known = {"subscription-without-publisher"}  # without the camera
+    assert [item.rule.name for item in found if item.rule.name not in known] == rules
+
+
+def test_an_empty_loop_leaves_nothing(tmp_path: Path) -> None:
+    text = """\
+system: fleet
+arguments: {robots: 2}
+nodes:
+  robot_${i}:
+    for_each: {i: "${robots}"}
+    publishers: {state: {type: std_msgs/msg/String, qos: command}}
+  tower:
+    lifecycle: {depends_on: [robot_*]}
+    subscriptions: {state: {type: std_msgs/msg/String, qos: command, external: true, log: hello}}
+connections:
+  - {topic: state, from: robot_*.state, to: tower.state}
+"""
+    path = written(tmp_path, text)
+    assert chosen(path, "robots=0") == ["tower"]
+    assert chosen(path, "robots=1") == ["robot_0", "tower"]
+
+
+def test_an_argument_without_a_value_is_needed_to_run_only(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "system: s\narguments: {mode: {choices: [slow, fast]}, name: {type: string}}\n"
+        'nodes: {"n${name}": {if: mode == \'fast\', on_activate: {log: "${mode}"}}}\n',
+    )
+    assert load_files([path])[0].diagnostics == []
+    missing = [(item.rule.name, item.hint) for item in load(path).diagnostics]
+    assert missing == [
+        ("missing-variable", "add it to the command: mode=slow or mode=fast"),
+        ("missing-variable", "add it to the command: name=VALUE"),
+    ]
+    assert chosen(path, "mode=fast", "name=12") == ["n12"]
+
+
+def test_of_too_many_combinations_each_value_is_checked(tmp_path: Path) -> None:
+    names = [f"option_{number}" for number in range(7)]
+    text = "\n".join(
+        [
+            "system: s",
+            "arguments:",
+            *(f"  {name}: false" for name in names),
+            "nodes:",
+            *(f"  {name}: {{if: {name}, executor: fast}}" for name in names),
+            "  other: {on_activate: {log: started}}",
+        ]
+    )
+    first, *others = messages_in(tmp_path, text)
+    assert first.startswith("too-large: the arguments have 128 combinations, more than 64")
+    assert len(others) == len(names)
+    assert all(f"(with {name}=true)" in text for name, text in zip(names, others, strict=True))
+
+
+CONDITIONS = (
+    "", "if: a, ", "unless: a, ", "if: b == 'y', ", "if: a and b == 'x', ", "unless: b == 'z', "
+)  # fmt: skip
+ENDS = ("one.out", "[one.out, two.out]", '"*.out"', "two.out")
+
+
+@st.composite
+def systems(draw: st.DrawFn) -> str:
+    node = "{%spublishers: {out: {type: std_msgs/msg/%s, qos: command}}%s}"
+    nodes = [
+        node
+        % (
+            draw(st.sampled_from(CONDITIONS)),
+            draw(st.sampled_from(["String", "Bool"])),
+            draw(st.sampled_from(["", ", executor: fast", ", lifecycle: {depends_on: [one]}"])),
+        )
+        for _ in range(2)
+    ]
+    connection = (
+        f"{{{draw(st.sampled_from(CONDITIONS))}topic: t, from: {draw(st.sampled_from(ENDS))},"
+        " to: sink.in}"
+    )
+    return (
+        "system: robot\narguments: {a: false, b: {choices: [x, y, z], default: x}}\n"
+        f"executors: {{fast: {{{draw(st.sampled_from(CONDITIONS)).rstrip(', ')}}}}}\n"
+        f"nodes:\n  one: {nodes[0]}\n  two: {nodes[1]}\n"
+        "  sink: {subscriptions: {in: {type: std_msgs/msg/String, qos: command, log: x}}}\n"
+        f"connections:\n  - {connection}\n"
+    )
+
+
+def errors_of(diagnostics: list[Diagnostic]) -> Iterator[tuple[str, str]]:
+    for item in diagnostics:
+        if item.severity.value != "info":
+            yield item.rule.name, str(item.primary)
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(systems())
+def test_all_combinations_are_the_union_of_each(tmp_path: Path, text: str) -> None:
+    path = written(tmp_path, text)
+    [result] = load_files([path])
+    single = set()
+    for a, b in product(("true", "false"), "xyz"):
+        overrides = OverrideOptions(arguments=(f"a={a}", f"b={b}"))
+        single |= set(errors_of(load(path, overrides=overrides).diagnostics))
+    assert set(errors_of(result.diagnostics)) == single
+    assert len(list(errors_of(result.diagnostics))) == len(single)
