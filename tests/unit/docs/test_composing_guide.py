@@ -7,14 +7,21 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import load
+from composer.loading import load_files
 from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
 
 GUIDE = Path(__file__).parents[3] / "docs" / "guides" / "composing.md"
 BLOCKS = re.findall(r"```yaml\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
-HEADS = ("", "", "", "system: changed\nexecutors: {slow: {}}\n", "", "")
+HEADS = ("", "", "", "system: changed\nexecutors: {slow: {}}\n", "", "", "")
 PARAMETERS = "config/robot.yaml"
-SYSTEMS = ("fleet.yaml", "robot.yaml", "changed.yaml", "cameras.yaml", "nodes/slow_planner.yaml")
+SYSTEMS = (
+    "fleet.yaml",
+    "robot.yaml",
+    "changed.yaml",
+    "cameras.yaml",
+    "mapping.yaml",
+    "nodes/slow_planner.yaml",
+)
 NAMES = (*SYSTEMS[:2], PARAMETERS, *SYSTEMS[2:])
 
 
@@ -24,7 +31,8 @@ def test_the_file_is_valid(tmp_path: Path, name: str) -> None:
         (tmp_path / folder).mkdir()
     for other, head, block in zip(NAMES, HEADS, BLOCKS, strict=True):
         (tmp_path / other).write_text(head + block, encoding="utf-8")
-    assert [item.message for item in load(tmp_path / name).diagnostics] == []
+    [result] = load_files([tmp_path / name])
+    assert [item.message for item in result.diagnostics] == []
 
 
 def test_the_parameter_file_is_valid(tmp_path: Path) -> None:
