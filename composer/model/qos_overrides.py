@@ -13,7 +13,7 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
-from composer.model.ports import ChannelKind, Parameter, ParameterType, Port, PortKind, Qos
+from composer.model.ports import Parameter, ParameterType, Port, PortKind, Qos
 from composer.model.qos import Durability, History, Liveliness, Reliability
 
 PREFIX = "qos_overrides."
@@ -50,19 +50,24 @@ _POLICIES: Mapping[str, _Policy] = {
     "liveliness": _choice(Liveliness),
     "liveliness_lease_duration": _duration("liveliness_lease_duration"),
 }
+_OVERRIDABLE = {
+    PortKind.PUBLISHER: tuple(_POLICIES),
+    PortKind.SUBSCRIPTION: tuple(name for name in _POLICIES if name != "lifespan"),
+}
 
 
 def overridable_policies(kind: PortKind) -> tuple[str, ...]:
-    """Return the policies that rclpy allows to override for publishers or subscriptions."""
-    return tuple(name for name in _POLICIES if (kind, name) != (PortKind.SUBSCRIPTION, "lifespan"))
+    """Return the policies of a kind of ports that rclpy allows to override: topics only."""
+    return _OVERRIDABLE.get(kind, ())
 
 
 def override_names(ports: Iterable[Port]) -> Iterator[str]:
     """Yield the names of all parameters that override a policy of one of the ports."""
     for port in ports:
-        if port.kind.channel is ChannelKind.TOPIC:
-            for policy in overridable_policies(port.kind):
-                yield _name(port, policy)
+        policies = overridable_policies(port.kind)
+        prefix = _name(port, "") if policies else ""
+        for policy in policies:
+            yield prefix + policy
 
 
 def override_parameter(given: Parameter) -> Parameter:
@@ -88,7 +93,7 @@ def override_parameter(given: Parameter) -> Parameter:
 
 def with_overrides(port: Port, overrides: Mapping[str, Parameter]) -> Port:
     """Return the port with the policies that ``overrides``, by name, set to valid values."""
-    if not overrides or port.kind.channel is not ChannelKind.TOPIC:
+    if not overrides:
         return port
     values: dict[str, Located[object]] = {}
     for name in overridable_policies(port.kind):
@@ -104,7 +109,7 @@ def with_overrides(port: Port, overrides: Mapping[str, Parameter]) -> Port:
 
 
 def _name(port: Port, policy: str) -> str:
-    return f"{PREFIX}{port.full_name}.{port.kind}.{policy}"
+    return f"{PREFIX}{port.full_name}.{port.kind.value}.{policy}"
 
 
 def _is_valid(value: object, policy: _Policy) -> bool:

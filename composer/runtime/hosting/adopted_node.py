@@ -15,7 +15,6 @@ from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.lifecycle.publisher import LifecyclePublisher
-from rclpy.logging_service import LoggingService
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.service import Service
@@ -40,6 +39,7 @@ from composer.runtime.hosting.ports.topics import (
     HostedSubscription,
     PendingQosEvents,
 )
+from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.ros.messages import load_type_support
 
 #: Arguments of ``Node.__init__`` that have no effect on a hosted node or are taken over.
@@ -83,8 +83,9 @@ class AdoptedNode(Node):
             for parameter in self._parameter_overrides.values():
                 if not self.has_parameter(parameter.name):
                     self.declare_parameter(parameter.name, parameter.value)
-        if options.get("enable_logger_service"):
-            self._add_logger_service(lasting)
+        is_offered = instance.ports.node.introspection.logger_services
+        if options.get("enable_logger_service") and not is_offered:
+            self._add_logger_services(lasting)
 
     def _declare_parameter_common(self, parameter_list: Any, descriptors: Any = None) -> Any:
         results = super()._declare_parameter_common(parameter_list, descriptors)
@@ -92,11 +93,11 @@ class AdoptedNode(Node):
             self._composer_instance.declared[parameter.name] = parameter
         return results
 
-    def _add_logger_service(self, lasting: Any) -> None:
+    def _add_logger_services(self, lasting: Any) -> None:
         """Let other nodes change the level of the logger, in every state."""
         instance = self._composer_instance
         before = len(lasting._services)
-        LoggingService(lasting)
+        LoggerServices(lasting, instance.context.loop.clock, instance.context.log.warn)
         for service in lasting._services[before:]:
             instance.context.loop.add_service(
                 service, rclpy_callback(service, instance.context.loop.run_task)

@@ -9,7 +9,7 @@ from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 
 from composer.runtime.supervision.events import Logged
-from tests.ros.support.in_process import Peer, RunningSystem, running
+from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 SYSTEM = """
 system: logged
@@ -18,9 +18,12 @@ nodes:
   plain: {behavior: code:Plain, log_level: warn}
   hosted: {class: "code:Hosted"}
   served: {behavior: code:Plain, introspection: {logger_services: true}}
+  enabled: {class: "code:Enabled"}
+  both: {class: "code:Enabled", introspection: {logger_services: true}}
 """
 CODE = """
 from composer.behavior import Behavior
+from rclpy.node import Node
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 class Plain(Behavior):
@@ -36,12 +39,21 @@ class Hosted(LifecycleNode):
         self.get_logger().debug("configured")
         self.get_logger().get_child("child").debug("child configured")
         return TransitionCallbackReturn.SUCCESS
+
+class Enabled(Node):
+    def __init__(self):
+        super().__init__("enabled", enable_logger_service=True)
 """
 MANAGER = "/a/logged/manager"
 
 
 def logged(system: RunningSystem, logger: str) -> list[str]:
     return [item.message for item in system.reported(Logged) if item.logger == logger]
+
+
+def services(peer: Peer) -> set[str]:
+    found = dict(peer.node.get_service_names_and_types())
+    return {name for name in found if name.endswith("/set_logger_levels")}
 
 
 def set_levels(peer: Peer, node: str, **levels: int) -> list[tuple[bool, str]]:
@@ -64,11 +76,8 @@ def test_levels_follow_the_services(tmp_path: Path, peer: Peer) -> None:
         for node in (MANAGER, "/a/served"):
             found = levels(peer, node, *names)
             assert found == list(zip(names, (30, 20, 20, 0), strict=True))
-        services = dict(peer.node.get_service_names_and_types())
-        assert [name for name in services if name.endswith("/set_logger_levels")] == [
-            f"{MANAGER}/set_logger_levels",
-            "/a/served/set_logger_levels",
-        ]
+        nodes = (MANAGER, "/a/served", "/a/enabled", "/a/both")
+        wait_until(lambda: services(peer) == {f"{node}/set_logger_levels" for node in nodes})
         assert set_levels(peer, MANAGER, plain=10, hosted=10, served=25) == [
             (True, ""),
             (True, ""),
@@ -86,7 +95,7 @@ def test_levels_follow_the_services(tmp_path: Path, peer: Peer) -> None:
         assert levels(peer, MANAGER, *names[:3]) == [(names[0], 10), (names[1], 10), (names[2], 40)]
 
 
-@pytest.mark.parametrize("node", [MANAGER, "/a/served"])
+@pytest.mark.parametrize("node", [MANAGER, "/a/served", "/a/enabled", "/a/both"])
 def test_a_huge_request_is_refused(tmp_path: Path, peer: Peer, node: str) -> None:
     with running(SYSTEM, tmp_path, code=CODE) as system:
         assert levels(peer, node, *["x"] * 10_001) == []
