@@ -80,7 +80,10 @@ def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic
             subjects = (type_subject(port),)
             yield Diagnostic(rule, message, port.interface.span, (label,), subjects=subjects)
         elif len(same) == 1 and port.qos.known:
-            yield from _different_qos(port, same[0], what, context)
+            override = ("qos override", f"{item.node.name}.{port.name}")
+            for found in _different_qos(port, same[0], what, context):
+                # A class without QoS overrides does not have the profile of the model.
+                yield found if same[0].has_qos_overrides else replace(found, subjects=(override,))
 
 
 def _different_qos(

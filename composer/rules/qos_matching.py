@@ -176,7 +176,19 @@ def _incompatible(channel: Channel, conflicts: list[QosConflict]) -> Diagnostic:
     )
     hints = (f"offer {item.requested}, or request {item.offered}" for item in first.problems)
     labels = [label for conflict in conflicts for label in _labels(conflict)]
-    return Diagnostic(QOS_INCOMPATIBLE, message, first.place, tuple(labels), "; ".join(hints))
+    overrides = tuple(
+        ("qos override", port_name(end))
+        for end in (wrong, other)
+        if first.policy in end.port.qos.overridden
+    )
+    return Diagnostic(
+        QOS_INCOMPATIBLE,
+        message,
+        first.place,
+        tuple(labels),
+        "; ".join(hints),
+        relies_on=overrides,
+    )
 
 
 def _labels(conflict: QosConflict) -> Iterator[Label]:

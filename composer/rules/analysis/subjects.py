@@ -8,7 +8,7 @@ from that mistake. A thing has a kind and a name:
   ``renamed port``: what does not exist, and what may be meant instead
 - ``port``, ``type``: a port as connections name it ("planner.scan"), and its type, which other
   ports contradict; ``declared type``: by its place, which the class of the node contradicts
-- ``topic qos``: the QoS of a topic
+- ``topic qos``: the QoS of a topic; ``qos override``: of a port that a parameter overrides
 - ``name``: that of a topic, service or action, or of the port that has it
 - ``port name``, ``node name``, ``last part``: of ports that may be meant, in any node or namespace
 - ``namespace``, ``same node``, ``behavior``: of a node; ``section``: of a parameter file

@@ -186,15 +186,29 @@ class Talker(Node):
 """
 
 
+OPTS_IN = ", qos_overriding_options=QoSOverridingOptions.with_default_policies()"
+
+
 @pytest.mark.parametrize(
-    ("options", "expected"),
+    ("options", "given", "expected"),
     [
-        ("", ["class 'Talker' creates publisher 'words' with depth 10, not 3"]),
-        (", qos_overriding_options=QoSOverridingOptions.with_default_policies()", []),
+        ("", "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
+        (OPTS_IN, "depth: 3", None),
+        (
+            "",
+            "reliability: best_effort",
+            "class 'Talker' creates publisher 'words' with reliability reliable, not best_effort",
+        ),
+        (
+            OPTS_IN,
+            "reliability: best_effort",
+            "publisher 'talker.words' offers reliability best_effort on '/words', "
+            "but subscription 'listener.words' requests reliable",
+        ),
     ],
 )
 def test_a_class_decides_whether_parameters_override_its_qos(
-    options: str, expected: list[str], tmp_path: Path
+    options: str, given: str, expected: str | None, tmp_path: Path
 ) -> None:
     (tmp_path / "talker.py").write_text(CLASS.format(options=options))
     text = f"""\
@@ -202,9 +216,10 @@ system: words
 nodes:
   talker:
     class: "talker:Talker"
-    parameters: {{{PUBLISHER}.depth: 3, qos_overrides./other.publisher_id.depth: 2}}
-    publishers: {{words: {{type: std_msgs/msg/String, external: true, qos: command}}}}
+    parameters: {{{PUBLISHER}.{given}, qos_overrides./other.publisher_id.depth: 2}}
+    publishers: {{words: {{type: std_msgs/msg/String, qos: command}}}}
+  listener:
+    subscriptions: {{words: {{type: std_msgs/msg/String, qos: command, log: "{{message.data}}"}}}}
 """
-    found = diagnostics_in(text, tmp_path)
-    assert [item.message for item in found if item.rule.name == "class-port"] == expected
-    assert not [item for item in found if item.severity.value == "error"]
+    found = [item.message for item in diagnostics_in(text, tmp_path)]
+    assert found == ([] if expected is None else [expected])
