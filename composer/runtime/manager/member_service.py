@@ -13,7 +13,7 @@ from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.node_services import Nodes
-from composer.runtime.members.context import REPORTS_WITHIN_S
+from composer.runtime.members.lives import REPORTS_WITHIN_S
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import FINALIZED, ManagedNode, TransitionOutcome
 from composer.runtime.outside_nodes.remote_node import DONE_IN

@@ -5,9 +5,6 @@ are in its reports; requests for transitions go to the manager's service.
 
 The process with the instance lock runs the nodes, whatever has started it. One that was not started
 here is used as it is, and from then on only awaited: what has started it may start it again.
-
-Nothing that arrives on a topic decides: only signed reports count, see :mod:`.reports`. What the
-process is, is learnt from its instance lock, its end as a child, or the answer of its service.
 """
 
 from __future__ import annotations
@@ -27,21 +24,16 @@ from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.members.context import (
-    REPORTS_WITHIN_S,
     Member,
     MemberContext,
-    MemberLife,
-    NodeFigures,
     ProcessUnavailable,
 )
+from composer.runtime.members.lives import REPORTS_WITHIN_S, MemberLife, MemberLives, NodeFigures
 from composer.runtime.members.reports import MemberReports
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
-from composer.runtime.protocol.reports import (
-    SystemReport,
-    TimingReport,
-)
+from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import NAME, REQUEST, StepResult
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
@@ -49,7 +41,6 @@ STARTS_WITHIN_S = 30.0
 _POLL_S = 0.01
 #: How often to look whether another process holds the instance lock.
 _LOCK_POLL_S = 0.1
-_CHECK_PERIOD_S = 0.5
 _ENDS_WITHIN_S = 1.0
 _KILLED_WITHIN_S = 0.5
 _KEY_BYTES = 32
@@ -61,15 +52,13 @@ class MemberProcess:
     def __init__(self, process: Process, context: MemberContext) -> None:
         self._process = process
         self._context = context
+        self._clock = context.loop.clock
         self._name = context.full_name(process)
         self._members: dict[str, Member] = {}
-        self._figures: dict[str, NodeFigures] = {}
         #: When, by the clock of the loop, it last reported that a node has moved.
         self.moved_s = 0.0
-        self._life: MemberLife | None = None  # from the start, or the first report, to the end
-        self._may_start = bool(context.command)
+        self._lives = MemberLives(self._name, str(self), context, self._fail)
         self._starting: Future[None] | None = None
-        self._is_ending = False
         self._belongs_to_another = False
         self.requests = MemberRequests(
             context.manager,
@@ -82,19 +71,17 @@ class MemberProcess:
         #: The timings of its callbacks and chains, once it was asked for them.
         self.timings = TimingReport()
         self._reports = MemberReports(self._name, context, self._on_report, self._warn)
-        self._clock = context.loop.clock
-        self._checked_s = self._clock.monotonic()
-        self._timer = context.loop.call_every(_CHECK_PERIOD_S, self._check)
 
     def add(self, member: Member) -> None:
         """Add a node, in place of an earlier one of the same name."""
         self._members[member.full_name] = member
-        self._figures.setdefault(member.full_name, NodeFigures())
+        self._lives.figures.setdefault(member.full_name, NodeFigures())
 
     @property
     def pid(self) -> int | None:
         """Its process id, if it was started here."""
-        return None if self._life is None or self._life.child is None else self._life.child.pid
+        life = self._lives.current
+        return None if life is None or life.child is None else life.child.pid
 
     @property
     def is_left(self) -> bool:
@@ -104,7 +91,7 @@ class MemberProcess:
     @property
     def is_absent(self) -> bool:
         """Whether it does not run or report, and something else has to start it."""
-        return not self._may_start and (self._life is None or not self._life.is_up)
+        return not self._lives.may_start and self._lives.up is None
 
     @property
     def is_known(self) -> bool:
@@ -112,16 +99,16 @@ class MemberProcess:
 
         A node that still moves is to be waited for.
         """
-        life = self._life
+        life = self._lives.current
         if life is None or life.last is None:
             has_child = life is not None and life.child is not None
-            return has_child or (self._may_start and not is_held(self._name))
+            return has_child or (self._lives.may_start and not is_held(self._name))
         return all(node.state in PRIMARY_STATES for node in life.states.values())
 
     @property
     def is_running(self) -> bool:
         """Whether it certainly runs: it reports, or holds the instance lock on this computer."""
-        return (self._life is not None and self._life.is_up) or is_held(self._name)
+        return self._lives.up is not None or is_held(self._name)
 
     def leave(self) -> None:
         """Leave its nodes as they are, unless it was started here. Thread-safe."""
@@ -129,21 +116,21 @@ class MemberProcess:
 
     def keep_goals(self, goals: SystemGoals) -> None:
         """Let the process keep the goals of the system."""
-        if self._life is not None and self._life.is_up and not self.is_left:
+        if self._lives.up is not None and not self.is_left:
             self.requests.keep(goals)
 
     def ask_for_timings(self) -> None:
         """Ask for the timings of callbacks and chains."""
-        if self._life is not None and self._life.is_up:
+        if self._lives.up is not None:
             self.requests.ask_for_timings()
 
     def figures(self, node: str) -> NodeFigures:
         """Return the rates and counters of a node."""
-        return self._figures[node]
+        return self._lives.figures[node]
 
     def is_report_due(self, node: str) -> bool:
         """Return whether the last report may be older than the last response about a node."""
-        life = self._life
+        life = self._lives.current
         if life is None or life.last is None or life.lost:
             return False
         return life.last.number <= life.answered.get(node, -1)
@@ -164,7 +151,7 @@ class MemberProcess:
         """
         while self._starting is not None:
             await self._starting
-        if self._life is not None and self._life.is_up:
+        if self._lives.up is not None:
             return
         self._starting = Future()
         try:
@@ -178,7 +165,7 @@ class MemberProcess:
 
         Raises ProcessUnavailable if the process does not run; so does the future if it ends.
         """
-        life = self._life
+        life = self._lives.current
         if life is None or not life.is_up:
             how = "does not run" if life is None else life.lost or "has not reported yet"
             raise ProcessUnavailable(f"{self} {how}")
@@ -191,16 +178,16 @@ class MemberProcess:
 
         Raises ProcessUnavailable if it was not started here.
         """
-        life = self._life
+        life = self._lives.current
         if life is None or life.child is None:
             raise ProcessUnavailable(f"{reason}, and {self} was not started here")
         await self._kill_child(life, life.child)
 
     def end(self) -> None:
         """End the process if it was started here, without waiting for that."""
-        life = self._life
-        if life is not None and life.child is not None and not self._is_ending:
-            self._is_ending = True
+        life = self._lives.current
+        if life is not None and life.child is not None and not self._lives.is_ending:
+            self._lives.is_ending = True
             self._context.children.end(life.child, _ENDS_WITHIN_S, _KILLED_WITHIN_S)
 
     def end_if_done(self) -> None:
@@ -210,7 +197,7 @@ class MemberProcess:
 
     def close(self) -> None:
         """Stop to observe the process."""
-        self._timer.cancel()
+        self._lives.close()
         self.requests.close()
         self._reports.close()
 
@@ -221,7 +208,7 @@ class MemberProcess:
 
     async def _start(self) -> None:
         """Start the process, or wait for one that is started elsewhere."""
-        life = self._life
+        life = self._lives.current
         if life is not None and life.lost:
             if life.child is None:
                 raise ProcessUnavailable(f"{self} {life.lost}")
@@ -229,37 +216,41 @@ class MemberProcess:
         end_s = self._clock.monotonic() + STARTS_WITHIN_S
         refused_s = -REPORTS_WITHIN_S
         child: Child | None = None
-        while self._life is None or not self._life.is_up:
+        while self._lives.up is None:
             if child is not None and child.ended.done():
-                if self._may_start and child.ended.result() != ALREADY_RUNS:
+                if self._lives.may_start and child.ended.result() != ALREADY_RUNS:
                     raise ProcessUnavailable(f"{self} {child.how_ended}")
                 child, refused_s = None, self._clock.monotonic()  # the other one is about to report
-            may_start = self._may_start and self._clock.monotonic() - refused_s >= REPORTS_WITHIN_S
-            if self._life is None and may_start and not is_held(self._name):
+            may_start = (
+                self._lives.may_start and self._clock.monotonic() - refused_s >= REPORTS_WITHIN_S
+            )
+            if self._lives.current is None and may_start and not is_held(self._name):
                 child = await self._start_child()
             elif self._clock.monotonic() > end_s:
                 raise ProcessUnavailable(self._not_reported())
-            await sleep(self._context.loop, _LOCK_POLL_S if self._life is None else _POLL_S)
+            await sleep(
+                self._context.loop, _LOCK_POLL_S if self._lives.current is None else _POLL_S
+            )
 
     def _not_reported(self) -> str:
         """Return that the process has not reported in time, and as much of the reason as known."""
         reason = self._reports.missing
-        if self._life is None and is_held(self._name):
+        if self._lives.current is None and is_held(self._name):
             reason += ", and another process holds its instance lock"
         return f"{self} has not reported within {STARTS_WITHIN_S:g} s: {reason}"
 
     async def _start_child(self) -> Child:
         life = MemberLife(os.urandom(_KEY_BYTES).hex())
         command = self._context.command_of(self._process, life.report_key)
-        self._is_ending = False
+        self._lives.is_ending = False
         try:
             life.child = child = self._context.children.start(command, self._log)
             await child.started
         except (OSError, StartFailed) as error:
             raise ProcessUnavailable(f"{self} cannot be started: {error}") from error
-        self._life = life
+        self._lives.current = life
         child.ended.add_done_callback(
-            lambda _: self._context.loop.call_soon(partial(self._on_end, life, child))
+            lambda _: self._context.loop.call_soon(partial(self._lives.end, life, child))
         )
         return child
 
@@ -267,27 +258,16 @@ class MemberProcess:
         self._context.children.end(child, 0.0, 0.0)
         while not child.ended.done():
             await sleep(self._context.loop, _POLL_S)
-        self._on_end(life, child)
-
-    def _on_end(self, life: MemberLife, child: Child) -> None:
-        """Handle the end of a child."""
-        if self._life is not life:
-            return
-        self._life = None
-        if life.last is not None and child.ended.result() == ALREADY_RUNS:
-            self._may_start = False  # it has found another one, on another computer
-        for figures in self._figures.values():
-            figures.end_life()
-        self._fail(f"{self} {child.how_ended}", is_expected=self._is_ending)
+        self._lives.end(life, child)
 
     # --- reports
 
     def _on_report(self, text: str) -> None:
-        found = self._reports.read(text, self._life, self.requests.ask_for_report_key)
+        found = self._reports.read(text, self._lives.current, self.requests.ask_for_report_key)
         if found is None:
             return
         report, key = found
-        life = self._life_of(report, key)
+        life = self._lives.of_report(report, key)
         if life is not None and not report.is_starting:
             self._receive(report, life)
 
@@ -296,14 +276,10 @@ class MemberProcess:
         before = life.states
         if any(before.get(now.node, now).state != now.state for now in report.nodes):
             self.moved_s = self._clock.monotonic()
-        life.last, life.reported_s = report, self._clock.monotonic()
-        for node in report.nodes:
-            if node.node in self._figures:
-                is_child = life.child is not None
-                self._figures[node.node].take(node, report.host, is_started_here=is_child)
+        self._lives.take(report, life)
         if report.is_stopping:
-            if not self._is_ending:
-                self._lose(life, "is shutting down")
+            if not self._lives.is_ending:
+                self._lives.lose(life, "is shutting down")
             return
         life.lost = ""
         goals = self._context.goals.on_report(report.goals)
@@ -330,56 +306,7 @@ class MemberProcess:
     def _on_report_key(self, key: str) -> None:
         self._reports.on_key(key)
 
-    def _life_of(self, report: SystemReport, key: str) -> MemberLife | None:
-        """Return the life that a report belongs to; None if the report does not count."""
-        life = self._life
-        if life is None or key != life.report_key:
-            return self._next_life(report, key)
-        is_new = life.last is None or report.number > life.last.number
-        return life if is_new else None
-
-    def _next_life(self, report: SystemReport, key: str) -> MemberLife | None:
-        """Return the life of a process that was started elsewhere; None if it is not to be used."""
-        life = self._life
-        if report.is_child or report.is_stopping or (life is None and self._is_ending):
-            return None  # another child ends with its coordinator
-        if life is not None and life.last is not None:
-            if not life.lost and report.started_s < life.last.started_s:
-                return None  # it has been replaced, or is about to be refused
-            self._lose(life, "has ended")
-        return self._use(report, key)
-
-    def _use(self, report: SystemReport, key: str) -> MemberLife:
-        """Use a process that was started elsewhere, and start none from now on."""
-        for figures in self._figures.values():
-            figures.end_life()
-        self._life = life = MemberLife(key, holds_lock=is_held(self._name))
-        self._may_start = False
-        text = f"{self} was not started here; it is used: host {report.host}, process {report.pid}"
-        self._context.write_log(LogLevel.INFO, PROGRAM_LOGGER, text)
-        return life
-
-    def _check(self) -> None:
-        """Notice a process that does not report: it hangs, or is cut off."""
-        now_s = self._clock.monotonic()
-        late_s = now_s - self._checked_s - _CHECK_PERIOD_S  # this process did not run, not that one
-        self._checked_s = now_s
-        life = self._life
-        if life is None or not life.is_up or self._is_ending:
-            return
-        life.reported_s += max(0.0, late_s)
-        if life.holds_lock and not is_held(self._name):
-            self._lose(life, "has ended")
-        elif now_s - life.reported_s >= REPORTS_WITHIN_S:
-            self._lose(life, f"has not reported for {REPORTS_WITHIN_S:g} s")
-
-    def _lose(self, life: MemberLife, reason: str) -> None:
-        """Report the failure of all nodes of a process, which may return."""
-        if not life.lost:
-            life.lost = reason
-            self._fail(f"{self} {reason}")
-
-    def _fail(self, reason: str, *, is_expected: bool = False) -> None:
+    def _fail(self, reason: str, is_expected: bool) -> None:
         self.requests.fail(ProcessUnavailable(reason))
         if not is_expected:
             with self._context.together():

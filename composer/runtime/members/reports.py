@@ -12,7 +12,8 @@ from typing import Any
 
 from std_msgs.msg import String
 
-from composer.runtime.members.context import MemberContext, MemberLife
+from composer.runtime.members.context import MemberContext
+from composer.runtime.members.lives import MemberLife
 from composer.runtime.process.instance_lock import report_key
 from composer.runtime.protocol.codec import ProtocolError, decode
 from composer.runtime.protocol.reports import SystemReport, is_signed, split_signature

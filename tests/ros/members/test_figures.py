@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.members.context import NodeFigures
+from composer.runtime.members.lives import NodeFigures
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 

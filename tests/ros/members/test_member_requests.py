@@ -19,7 +19,7 @@ from composer.runtime.executors.sources import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
-from composer.runtime.members.context import MemberContext
+from composer.runtime.members.context import MemberContext, ProcessUnavailable
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
@@ -291,13 +291,15 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
         others.cancel()
 
 
-def silent_process(on: Bench, folder: Path, *command: str) -> MemberProcess:
+def silent_process(
+    on: Bench, folder: Path, *command: str, children: ChildProcesses | None = None
+) -> MemberProcess:
     text = "{system: robot, processes: {acting: {nodes: [arm]}}, nodes: {arm: {}, leg: {}}}"
     system = system_of(text, folder)
     context = MemberContext(
         loop=on.loop,
         manager=on.node,
-        children=ChildProcesses(),
+        children=children or ChildProcesses(),
         namespace="/robot",
         command=command,
         goals=KeptGoals(system),
@@ -324,6 +326,22 @@ def test_the_error_says_why_a_process_has_not_reported(
         expected = f"process 'acting' has not reported within 0 s: {reason}"
         assert str(start.exception()) == expected
         process.close()
+
+
+def test_a_process_that_has_not_reported_is_asked_for_nothing(tmp_path: Path) -> None:
+    """Another one, of another computer, would follow the request."""
+    with bench(ExecutorKind.EVENTS) as on:
+        children = ChildProcesses()
+        command = ("sh", "-c", "exec sleep 60", "--")
+        process = silent_process(on, tmp_path, *command, children=children)
+        start = on.loop.run_task(process.ensure())
+        wait_until(lambda: process.pid is not None, "the process")
+        with pytest.raises(ProcessUnavailable, match="has not reported yet"):
+            process.request("/arm", "shutdown")
+        process.end()
+        wait_until(start.done, "the error")
+        process.close()
+        children.close()
 
 
 MEANT = "11" * 12

@@ -1,0 +1,204 @@
+"""The lives of a process of the system, one after the other, and what is counted over all of them.
+
+Nothing that arrives on a topic decides: only signed reports count, see :mod:`.reports`. What the
+process is, is learnt from its instance lock, its end as a child, or the answer of its service.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from typing import Any
+
+from composer.base.fast_dataclass import dataclass
+from composer.model import LogLevel
+from composer.model.names import PROGRAM_LOGGER
+from composer.runtime.children.child_processes import Child
+from composer.runtime.members.context import MemberContext
+from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
+from composer.runtime.protocol.reports import NodeReport, SystemReport
+
+#: Processes report every second. One that has not reported for this time is lost.
+REPORTS_WITHIN_S = 5.0
+_CHECK_PERIOD_S = 0.5
+_COUNTS = ("errors", "overruns", "queue_drops", "calls", "skipped")
+_COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
+_FIGURES = ("sent_hz", "received_hz", "busy", "slowest", "host", "pid", *_COUNTS, *_COUNTS_BY_NAME)
+
+
+@dataclass(slots=True)
+class MemberLife:
+    """One life of the process, as a child or started elsewhere, and its last report.
+
+    Its reports are signed with ``report_key``. ``lost`` is why its nodes have failed, although
+    it may still run. ``holds_lock`` is whether it holds the instance lock on this computer.
+    ``answered`` are the numbers of the last reports before the responses to requests, by node.
+    """
+
+    report_key: str
+    child: Child | None = None
+    last: SystemReport | None = None
+    reported_s: float = 0.0
+    lost: str = ""
+    holds_lock: bool = False
+    answered: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def states(self) -> Mapping[str, NodeReport]:
+        """The nodes in the last report."""
+        return {} if self.last is None else {node.node: node for node in self.last.nodes}
+
+    @property
+    def is_up(self) -> bool:
+        """Whether it reports."""
+        return self.last is not None and not self.lost
+
+
+class NodeFigures:
+    """The rates and counters of a node over all lives of its process, which count from zero."""
+
+    def __init__(self) -> None:
+        self._reported: dict[str, Any] = {}
+        self._counts: Counter[str] = Counter()  # of the last report
+        self._earlier: Counter[str] = Counter()  # counted by earlier lives
+        self._known = False
+        self._before: Counter[str] = Counter()  # counted before this process was there
+
+    def take(self, node: NodeReport, host: str, *, is_started_here: bool) -> None:
+        """Receive what the process, on a host, reports of the node."""
+        self._reported = {name: getattr(node, name) for name in _FIGURES}
+        self._reported["host"] = node.host or host
+        self._counts = Counter({name: getattr(node, name) for name in _COUNTS})
+        for name in _COUNTS_BY_NAME:
+            self._counts[name] = sum(getattr(node, name).values())
+        if not self._known:
+            self._known = True
+            self._before = Counter() if is_started_here else self._counts
+
+    def end_life(self) -> None:
+        """Keep the counts of a process that has ended."""
+        self._earlier += self._counts
+        self._reported = {}
+        self._counts = Counter()
+
+    @property
+    def current(self) -> Mapping[str, Any]:
+        """The figures by the names of the fields of ``NodeReport``, of all lives so far."""
+        totals = {name: self._counts[name] + self._earlier[name] for name in _COUNTS}
+        return {**self._reported, **totals}
+
+    @property
+    def since_start(self) -> Mapping[str, int]:
+        """The counters since this process knows the node."""
+        return self._counts + self._earlier - self._before
+
+
+class MemberLives:
+    """The life that the process has now, and what ends it. Use it on the loop of ``context``."""
+
+    def __init__(
+        self,
+        name: str,
+        label: str,
+        context: MemberContext,
+        on_failure: Callable[[str, bool], None],
+    ) -> None:
+        """``name`` is the namespace of the manager of the process, ``label`` is for people.
+
+        ``on_failure(reason, is_expected)`` is called when a life ends or is lost.
+        """
+        self._name = name
+        self._label = label
+        self._context = context
+        self._on_failure = on_failure
+        self.current: MemberLife | None = None  # from the start, or the first report, to the end
+        #: The figures of each node of the process.
+        self.figures: dict[str, NodeFigures] = {}
+        self.may_start = bool(context.command)
+        self.is_ending = False
+        self._clock = context.loop.clock
+        self._checked_s = self._clock.monotonic()
+        self._timer = context.loop.call_every(_CHECK_PERIOD_S, self._check)
+
+    @property
+    def up(self) -> MemberLife | None:
+        """The current life, if it reports."""
+        return self.current if self.current is not None and self.current.is_up else None
+
+    def end(self, life: MemberLife, child: Child) -> None:
+        """Handle the end of a child."""
+        if self.current is not life:
+            return
+        self.current = None
+        if life.last is not None and child.ended.result() == ALREADY_RUNS:
+            self.may_start = False  # it has found another one, on another computer
+        self._end_counts()
+        self._on_failure(f"{self._label} {child.how_ended}", self.is_ending)
+
+    def lose(self, life: MemberLife, reason: str) -> None:
+        """Report the failure of all nodes of a process, which may return."""
+        if not life.lost:
+            life.lost = reason
+            self._on_failure(f"{self._label} {reason}", False)
+
+    def of_report(self, report: SystemReport, key: str) -> MemberLife | None:
+        """Return the life that a report belongs to; None if the report does not count."""
+        life = self.current
+        if life is None or key != life.report_key:
+            return self._next(report, key)
+        is_new = life.last is None or report.number > life.last.number
+        return life if is_new else None
+
+    def take(self, report: SystemReport, life: MemberLife) -> None:
+        """Keep a report of a life as its last one."""
+        life.last, life.reported_s = report, self._clock.monotonic()
+        for node in report.nodes:
+            if node.node in self.figures:
+                is_child = life.child is not None
+                self.figures[node.node].take(node, report.host, is_started_here=is_child)
+
+    def close(self) -> None:
+        """Stop to check whether the process reports."""
+        self._timer.cancel()
+
+    def _next(self, report: SystemReport, key: str) -> MemberLife | None:
+        """Return the life of a process that was started elsewhere; None if it is not to be used."""
+        life = self.current
+        if report.is_child or report.is_stopping or (life is None and self.is_ending):
+            return None  # another child ends with its coordinator
+        if life is not None and life.last is not None:
+            if not life.lost and report.started_s < life.last.started_s:
+                return None  # it has been replaced, or is about to be refused
+            self.lose(life, "has ended")
+        return self._use(report, key)
+
+    def _use(self, report: SystemReport, key: str) -> MemberLife:
+        """Use a process that was started elsewhere, and start none from now on."""
+        self._end_counts()
+        self.current = life = MemberLife(key, holds_lock=is_held(self._name))
+        self.may_start = False
+        text = (
+            f"{self._label} was not started here; it is used: host {report.host},"
+            f" process {report.pid}"
+        )
+        self._context.write_log(LogLevel.INFO, PROGRAM_LOGGER, text)
+        return life
+
+    def _end_counts(self) -> None:
+        for figures in self.figures.values():
+            figures.end_life()
+
+    def _check(self) -> None:
+        """Notice a process that does not report: it hangs, or is cut off."""
+        now_s = self._clock.monotonic()
+        late_s = now_s - self._checked_s - _CHECK_PERIOD_S  # this process did not run, not that one
+        self._checked_s = now_s
+        life = self.up
+        if life is None or self.is_ending:
+            return
+        life.reported_s += max(0.0, late_s)
+        if life.holds_lock and not is_held(self._name):
+            self.lose(life, "has ended")
+        elif now_s - life.reported_s >= REPORTS_WITHIN_S:
+            self.lose(life, f"has not reported for {REPORTS_WITHIN_S:g} s")
