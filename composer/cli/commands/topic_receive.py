@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
-from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -28,19 +27,24 @@ _REPORT_EVERY_S = 1.0
 _MAX_LENGTH = 128
 
 
-class Preset(StrEnum):
-    """The QoS presets of the language."""
-
-    SENSOR_DATA = "sensor_data"
-    COMMAND = "command"
-    STATE = "state"
-    SERVICES_DEFAULT = "services_default"
-    PARAMETERS = "parameters"
-    SYSTEM_DEFAULT = "system_default"
+def _preset(name: str | None) -> str | None:
+    """Return the value of --qos-profile. Raises typer.BadParameter."""
+    if name is not None and name not in PRESETS:
+        raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, PRESETS))}.")
+    return name
 
 
 Topic = Annotated[str, typer.Argument(metavar="TOPIC", autocompletion=complete_topic)]
-QosPreset = Annotated[Preset | None, typer.Option("--qos-profile", help="QoS preset.")]
+QosPreset = Annotated[
+    str | None,
+    typer.Option(
+        "--qos-profile",
+        metavar=f"<{'|'.join(PRESETS)}>",
+        callback=_preset,
+        help="QoS preset.",
+        autocompletion=lambda: list(PRESETS),
+    ),
+]
 QosDepth = Annotated[
     int | None, typer.Option("--qos-depth", min=1, metavar="N", help="Length of the queue.")
 ]
@@ -206,7 +210,7 @@ def _matches(expression: Expression | None, message: Any) -> bool:
 
 def with_policies(
     profile: QosProfile,
-    preset: Preset | None,
+    preset: str | None,
     depth: int | None,
     reliability: Reliability | None,
     durability: Durability | None,
@@ -214,7 +218,7 @@ def with_policies(
     """Return ``profile``, or the preset, with the policies that are given."""
     policies = {"depth": depth, "reliability": reliability, "durability": durability}
     given: dict[str, Any] = {name: value for name, value in policies.items() if value is not None}
-    return replace(profile if preset is None else PRESETS[preset.value], **given)
+    return replace(profile if preset is None else PRESETS[preset], **given)
 
 
 def hz(
