@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -116,11 +117,7 @@ def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:
         coordinator.wait_for("3 of 3 nodes active")
         moves = peer.listen(TransitionEvent, "/lab/detector/transition_event")
         assert peer.change("/lab/arm", "deactivate")
-        reports = peer.listen(String, f"{running_managers(peer)[0]}/state", STATE_QOS)
-        wait_until(
-            lambda: reports and (goals := kept_goals(reports)) and "/lab/arm" in goals.others,
-            "the goals",
-        )
+        wait_for_goals(peer, lambda goals: "/lab/arm" in goals.others)
         coordinator.stop(signal.SIGKILL)
     found = peer.listen(String, "/lab/found")
     wait_until(lambda: len(found) > 10, "messages without the coordinator")
@@ -128,9 +125,23 @@ def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:
         coordinator.wait_for("2 of 3 nodes active")
         assert not moves
         assert peer.call(Trigger, "/lab/robot/manager/pause").success
+        wait_for_goals(peer, lambda goals: goals.activity == "paused")
         coordinator.stop(signal.SIGKILL)
     forget(moves, "inactive")
     return moves
+
+
+def wait_for_goals(peer: Peer, known: Callable[[SystemGoals], bool]) -> None:
+    """Wait until all processes keep goals of the system: the next coordinator asks any of them."""
+    all_reports = [
+        peer.listen(String, f"{name}/state", STATE_QOS) for name in running_managers(peer)
+    ]
+    wait_until(
+        lambda: all(
+            reports and (goals := kept_goals(reports)) and known(goals) for reports in all_reports
+        ),
+        "the goals",
+    )
 
 
 def forget(moves: list[TransitionEvent], goal: str) -> None:
