@@ -1,5 +1,7 @@
 """Visits a launch file as ``ros2 launch`` does, but starts nothing, and reports its nodes.
 
+It is visited with several values of its arguments, see :mod:`composer.launch.variants`.
+
 Run as ``python -P -m composer.launch.visitor REPORT FILE [NAME:=VALUE]...``: launch files are
 Python, and their code runs. The report goes to the file REPORT as JSON.
 """
@@ -9,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,6 +20,7 @@ from typing import Any
 
 from launch import LaunchContext, LaunchDescription, LaunchService
 from launch.actions import (
+    DeclareLaunchArgument,
     EmitEvent,
     ExecuteLocal,
     ExecuteProcess,
@@ -27,6 +31,16 @@ from launch.actions import (
 )
 from launch.events import Shutdown as ShutdownEvent
 from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch.substitutions import (
+    AndSubstitution,
+    EqualsSubstitution,
+    LaunchConfiguration,
+    NotEqualsSubstitution,
+    NotSubstitution,
+    OrSubstitution,
+    PythonExpression,
+    TextSubstitution,
+)
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros.actions import (
@@ -39,6 +53,7 @@ from launch_ros.actions.load_composable_nodes import get_composable_node_load_re
 
 from composer.base.source import shown_path
 from composer.launch.parameter_values import parameter_values
+from composer.launch.variants import all_visits
 
 _UNKNOWN_NAME = "<node_name_unspecified>"
 #: The name that launch gives to the module of each launch file.
@@ -57,21 +72,25 @@ _SIGNAL_TIMEOUT_S = 5.0
 class Visitor:
     """Collects the nodes of a launch description, in the order in which they would start."""
 
-    def __init__(self, context: LaunchContext) -> None:
+    def __init__(self, context: LaunchContext, given: Mapping[str, str]) -> None:
         self._context = context
+        self._given = given
         self._environment = dict(context.environment)
         self._count = 0
         self.nodes: list[dict[str, Any]] = []
         self.left_out: list[str] = []
+        self.arguments: dict[str, dict[str, Any]] = {}
+        self.compared: dict[str, list[str]] = {}
 
     def visit(self, entity: Any, note: str = "") -> None:
         """Visit an entity and what it consists of. ``note`` says when it would be started."""
         self._count += 1
         if self._count > _MAXIMUM_ENTITIES:
             raise RuntimeError("the launch file includes itself without an end")
-        condition = getattr(entity, "condition", None)
-        if condition is not None and not condition.evaluate(self._context):
+        if not self._is_chosen(entity):
             return
+        if isinstance(entity, DeclareLaunchArgument):
+            self._declare(entity)
         if isinstance(entity, Node):
             self.nodes.append(self._node(entity, note))
             self._add_components(entity, self.nodes[-1], note)
@@ -89,6 +108,31 @@ class Visitor:
         if not described and not isinstance(entity, Node):
             for inner in entity.visit(self._context) or ():
                 self.visit(inner, note)
+
+    def _is_chosen(self, entity: Any) -> bool:
+        """Return whether the condition of an entity holds, and note what the condition compares."""
+        condition = getattr(entity, "condition", None)
+        if condition is None:
+            return True
+        for name, text in _compared(condition, self._context):
+            self.compared.setdefault(name, []).append(text)
+        return bool(condition.evaluate(self._context))
+
+    def _declare(self, argument: DeclareLaunchArgument) -> None:
+        """Add an argument, unless the file that includes this one sets it."""
+        given = self._context.launch_configurations.get(argument.name)
+        if given is not None and argument.name not in self._given:
+            return
+        default = argument.default_value
+        self.arguments.setdefault(
+            argument.name,
+            {
+                "name": argument.name,
+                "default": given or (None if default is None else self._text(default)),
+                "description": _described(argument),
+                "choices": list(argument.choices or ()),
+            },
+        )
 
     def _left_out(self, entity: Any) -> list[str]:
         """Describe what cannot be a node of a system; nothing for what can be visited."""
@@ -188,6 +232,55 @@ class Visitor:
         return _text_of(value, self._context)
 
 
+def _described(argument: DeclareLaunchArgument) -> str:
+    """Return the description of an argument, without what launch adds to it."""
+    text = argument.description.partition("One of: [")[0].strip()
+    return "" if text == "no description given" else text
+
+
+#: A comparison of an argument, as ``${name}``, with a constant, in an expression of Python.
+_COMPARISONS = (
+    re.compile(r"""\$\{(?P<name>\w+)\}['"\s]*[!=]=\s*(['"])(?P<text>[^'"$]*)\2"""),
+    re.compile(r"""(['"])(?P<text>[^'"$]*)\1\s*[!=]=['"\s]*\$\{(?P<name>\w+)\}"""),
+)
+
+
+def _compared(condition: Any, context: LaunchContext) -> Iterator[tuple[str, str]]:
+    """Yield the arguments that a condition compares with constants, and the constants."""
+    for kind in ("LaunchConfigurationEquals", "LaunchConfigurationNotEquals"):
+        name = getattr(condition, f"_{kind}__launch_configuration_name", None)
+        if name is not None:
+            yield str(name), _text_of(getattr(condition, f"_{kind}__expected_value"), context)
+    predicate = getattr(condition, "_predicate_expression", None)
+    inner = getattr(condition, "_IfCondition__predicate_expression", None)
+    inner = inner or getattr(condition, "_UnlessCondition__predicate_expression", None)
+    text = _as_code(predicate or inner or [])
+    for pattern in _COMPARISONS:
+        for match in pattern.finditer(text):
+            yield match["name"], match["text"]
+
+
+def _as_code(substitutions: Iterable[Any]) -> str:
+    """Return substitutions as text, with ``${name}`` for arguments."""
+    return "".join(map(_piece, substitutions))
+
+
+def _piece(substitution: Any) -> str:
+    match substitution:
+        case TextSubstitution():
+            return str(substitution.text)
+        case LaunchConfiguration():
+            return f"${{{_as_code(substitution.variable_name)}}}"
+        case PythonExpression():
+            return _as_code(substitution.expression)
+        case EqualsSubstitution() | NotEqualsSubstitution():
+            sides = map(_as_code, (substitution.left, substitution.right))
+            return " == ".join(text if "${" in text else f"'{text}'" for text in sides)
+        case AndSubstitution() | OrSubstitution():
+            return f"{_as_code(substitution.left)} and {_as_code(substitution.right)}"
+    return _as_code(substitution.value) if isinstance(substitution, NotSubstitution) else ""
+
+
 def _process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
     """Return the options that differ from the defaults, and whether they end the launch.
 
@@ -277,25 +370,45 @@ def _components(action: Any) -> Iterable[Any]:
 
 def main(report: Path, path: str, arguments: list[str]) -> None:
     """Visit a launch file, write the report, and end the process."""
-    context = LaunchContext(argv=arguments)
+    given = dict(text.split(":=", 1) for text in arguments)
+    environment = dict(os.environ)
+
+    def visit(values: Mapping[str, str]) -> dict[str, Any]:
+        os.environ.clear()  # the launch file may have set variables
+        os.environ.update(environment)
+        return _visited(path, values)
+
+    try:
+        found = all_visits(visit, given)
+    except Exception as error:
+        traceback.print_exc()
+        print(_cause(error), file=sys.stderr, flush=True)
+        os._exit(1)
+    report.write_text(json.dumps(found), encoding="utf-8")
+    os._exit(0)  # whatever the launch file has started
+
+
+def _visited(path: str, values: Mapping[str, str]) -> dict[str, Any]:
+    """Return what a launch file has with these arguments."""
+    context = LaunchContext(argv=[f"{name}:={value}" for name, value in values.items()])
     loop = asyncio.new_event_loop()
     asyncio.set_event_loop(loop)
     context._set_asyncio_loop(loop)
     context.extend_globals({"launch_service": LaunchService})
     include = IncludeLaunchDescription(
-        AnyLaunchDescriptionSource(path),
-        launch_arguments=[tuple(text.split(":=", 1)) for text in arguments],
+        AnyLaunchDescriptionSource(path), launch_arguments=list(values.items())
     )
-    visitor = Visitor(context)
+    visitor = Visitor(context, values)
     try:
         visitor.visit(LaunchDescription([include]))
-    except Exception as error:
-        traceback.print_exc()
-        print(_cause(error), file=sys.stderr, flush=True)
-        os._exit(1)
-    found = {"nodes": visitor.nodes, "left_out": visitor.left_out}
-    report.write_text(json.dumps(found), encoding="utf-8")
-    os._exit(0)  # whatever the launch file has started
+    finally:
+        loop.close()
+    return {
+        "nodes": visitor.nodes,
+        "left_out": visitor.left_out,
+        "arguments": list(visitor.arguments.values()),
+        "compared": visitor.compared,
+    }
 
 
 if __name__ == "__main__":

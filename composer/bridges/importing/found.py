@@ -65,7 +65,8 @@ class FoundNode:
 class FoundSystem:
     """Nodes that belong together. ``left_out`` says what could not be described, and why.
 
-    ``sections`` are parameters of further nodes, by their full names.
+    ``sections`` are parameters of further nodes, by their full names. ``arguments`` are the
+    declarations of arguments.
     """
 
     name: str
@@ -73,3 +74,4 @@ class FoundSystem:
     comments: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     sections: Mapping[str, Mapping[str, Plain]] = field(default_factory=dict)
+    arguments: Mapping[str, Plain] = field(default_factory=dict)

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from composer.base.characters import escape_lines
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
 from composer.bridges.importing.writing import free_name
+from composer.language.document.scalars import resolve_plain
+from composer.language.expressions import compile_expression
 from composer.language.tree import Plain
+from composer.launch.variants import (
+    Differs,
+    condition,
+    identifier,
+    mark,
+    marked_names,
+    unified,
+    with_references,
+)
 from composer.model import LogLevel
 from composer.model.names import join_node_name, parameter_name_problem, split_node_name
 from composer.model.resolve.parameters import rclpy_type
@@ -21,25 +35,114 @@ _MS = 1000.0
 
 
 def describe_launch_file(
-    name: str, path: str, arguments: Iterable[str], found: Mapping[str, Any]
+    name: str, path: str, given: Iterable[str], report: Mapping[str, Any]
 ) -> FoundSystem:
-    """Return the system that a launch file starts with these arguments."""
-    left_out = list(found["left_out"])
-    names = _names(found["nodes"], left_out)
+    """Return the system that a launch file starts, with the ``given`` arguments as defaults.
+
+    ``report`` are its visits, see :func:`composer.launch.variants.all_visits`.
+    """
+    left_out = [text for visit in report["visits"] for text in visit["left_out"]]
+    left_out += (
+        f"argument {argument}: the system has its value, and cannot change it"
+        for argument in report["resolved"]
+    )
+    items = [*_items(report)]
+    names_in_use = _names_in_use(report["arguments"], items)
+    arguments = [item for item in report["arguments"] if item["name"] in names_in_use]
+    left_out += (
+        f"argument {item['name']}: no node depends on it"
+        for item in report["arguments"]
+        if item not in arguments
+    )
+    names = _names(items, left_out)
     nodes = tuple(
-        _node(item, node_name, left_out)
-        for item, node_name in zip(found["nodes"], names, strict=True)
+        _node(item, node_name, left_out) for item, node_name in zip(items, names, strict=True)
     )
     nodes += tuple(_external_containers(nodes))
-    sections = _sections(found["nodes"], left_out)
-    command = " ".join(["compose import launch", path, *arguments])
+    sections = _sections(report["base"], left_out)
+    command = " ".join(["compose import launch", path, *given])
     return FoundSystem(
         name,
         nodes,
         (f"Imported by '{command}'.", *_PORTS),
-        tuple(dict.fromkeys(left_out)),
+        tuple(with_references(text) for text in dict.fromkeys(left_out)),
         sections,
+        {identifier(item["name"]): _argument(item, items) for item in arguments},
     )
+
+
+def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the nodes of all visits, each with its condition; one for all visits if possible.
+
+    ``present`` are the visits that have it, ``samples`` its parameters without references.
+    """
+    visits = report["visits"]
+    values = [visit["values"] for visit in visits]
+    by_name: dict[tuple[str, ...], dict[int, dict[str, Any]]] = {}
+    for number, visit in enumerate(visits):
+        counts: Counter[tuple[str, ...]] = Counter()
+        for position, item in enumerate(visit["nodes"]):
+            name = tuple(str(item[key]) for key in ("namespace", "name", "package", "executable"))
+            counts[name] += 1
+            samples = report["base"][position]["parameters"] if number == 0 else {}
+            by_name.setdefault((*name, str(counts[name])), {})[number] = item
+            item["samples"] = samples
+    for present in by_name.values():
+        samples = {
+            name: value for item in present.values() for name, value in item.pop("samples").items()
+        }
+        try:
+            groups = [(unified(list(present.values()), [values[n] for n in present]), [*present])]
+        except Differs:
+            groups = _equal(present)
+        for item, numbers in groups:
+            yield {
+                **item,
+                "present": frozenset(numbers),
+                "condition": condition(values, numbers),
+                "samples": samples,
+            }
+
+
+def _equal(present: Mapping[int, dict[str, Any]]) -> list[tuple[dict[str, Any], list[int]]]:
+    """Return the different descriptions of a node, each with its visits."""
+    groups: dict[str, tuple[dict[str, Any], list[int]]] = {}
+    for number, item in present.items():
+        groups.setdefault(json.dumps(item, sort_keys=True), (item, []))[1].append(number)
+    return list(groups.values())
+
+
+def _names_in_use(
+    arguments: Iterable[Mapping[str, Any]], items: Iterable[Mapping[str, Any]]
+) -> set[str]:
+    """Return the names of the arguments in the descriptions and conditions of nodes."""
+    used: set[str] = set()
+    for item in items:
+        used |= marked_names({**item, "present": None, "samples": None})
+        for text in item["condition"].values():
+            used.update(path.root for path in compile_expression(text).paths)
+    return {item["name"] for item in arguments if identifier(item["name"]) in used}
+
+
+def _argument(argument: Mapping[str, Any], items: Iterable[Mapping[str, Any]]) -> Plain:
+    """Return the declaration of an argument: its default alone if there is nothing else."""
+    reference, default = mark(argument["name"]), argument["default"]
+    typed = resolve_plain(default) if default else default
+    is_text = not isinstance(typed, bool) and not any(
+        item["parameters"].get(name) == reference
+        for item in items
+        for name, value in item["samples"].items()
+        if not isinstance(value, str)
+    )
+    if default.lower() in ("true", "false"):
+        is_text, typed = False, default.lower() == "true"
+    value = default if is_text else typed
+    declared: dict[str, Plain] = {"default": value}
+    if argument["choices"]:
+        declared["choices"] = argument["choices"]
+    if argument["description"]:
+        declared["description"] = escape_lines(argument["description"])
+    return value if len(declared) == 1 else declared
 
 
 def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
@@ -48,8 +151,10 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
     if item["note"]:
         comments += (f"Started {item['note']} by the launch file.",)
     component = item.get("component")
-    keys: dict[str, Plain]
-    keys = {"executable": _executable(item)} if component is None else {"component": component}
+    implementation: dict[str, Plain] = {"component": component}
+    if component is None:
+        implementation = {"executable": _executable(item)}
+    keys: dict[str, Plain] = {**item["condition"], **implementation}
     if item["name"] is None and component is not None:
         comments += (f"The launch file does not name it: {component['plugin']} does.",)
     elif item["name"] is None:
@@ -68,7 +173,7 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
         name=name,
         namespace=item["namespace"],
         keys=keys,
-        parameters=tuple(_declared(item["parameters"], full_name, left_out)),
+        parameters=tuple(_declared(item, full_name, left_out)),
         remappings=item["remappings"],
         comments=comments,
         container=join_node_name(*item["container"]) if component is not None else "",
@@ -88,17 +193,19 @@ def _external_containers(nodes: Iterable[FoundNode]) -> Iterable[FoundNode]:
 def _names(items: Iterable[Mapping[str, Any]], left_out: list[str]) -> list[str]:
     """Return a name for each node: its own, or a free one if it has none or another has it."""
     taken = {item["name"] for item in items}
-    full_names: set[str] = set()
+    present: dict[str, frozenset[int]] = {}
     names = []
     for item in items:
         name = item["name"]
+        full_name = join_node_name(item["namespace"], name or "")
         if name is None:
             name = free_name(_identifier(Path(item["executable"]).name), taken)
-        elif join_node_name(item["namespace"], name) in full_names:
+        elif present.get(full_name, frozenset()) & item["present"]:
             name = free_name(name, taken)
             left_out.append(f"the name '{item['name']}' of a second node: it is '{name}' here")
         taken.add(name)
-        full_names.add(join_node_name(item["namespace"], name))
+        full_name = join_node_name(item["namespace"], name)
+        present[full_name] = present.get(full_name, frozenset()) | item["present"]
         names.append(name)
     return names
 
@@ -165,10 +272,10 @@ def _milliseconds(seconds: float) -> Plain:
 
 
 def _declared(
-    values: Mapping[str, Plain], full_name: str, left_out: list[str]
+    item: Mapping[str, Any], full_name: str, left_out: list[str]
 ) -> Iterable[FoundParameter]:
-    for name, value in values.items():
-        kind = rclpy_type(value)
+    for name, value in item["parameters"].items():
+        kind = rclpy_type(item["samples"].get(name, value))
         if kind is None or (parameter_name_problem(name) and "/" not in name):
             left_out.append(f"parameter {name} of {full_name}: its type is not known")
         else:

@@ -17,6 +17,7 @@ from composer.language.document.limits import MAX_ENTRIES
 from composer.language.document.writer import write_document
 from composer.language.rules import TOO_LARGE
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
+from composer.launch.variants import with_references
 from composer.model import ChannelKind, PortKind
 from composer.model.qos import PRESETS, QosProfile
 
@@ -47,6 +48,8 @@ def write_system(found: FoundSystem, parameter_file: str | None = None) -> str:
         written = replace(node, keys={**node.keys, **container})
         nodes[key] = _node(key, written, ("nodes", key), comments)
     content: dict[str, Plain] = {"system": found.name}
+    if found.arguments:
+        content["arguments"] = dict(found.arguments)
     if parameter_file is not None:
         content["parameter_files"] = [parameter_file]
     return write_document(_map({**content, "nodes": nodes}), comments)
@@ -198,8 +201,8 @@ def _tree(value: Plain, text: Callable[[str], str]) -> Tree:
 
 
 def _literal(text: str) -> str:
-    """Return a text in which nothing looks like a variable."""
-    return text.replace("${", "$${")
+    """Return a text in which only what a launch file takes from its arguments is a variable."""
+    return with_references(text.replace("${", "$${"))
 
 
 def readable(found: FoundSystem) -> FoundSystem:

@@ -211,9 +211,9 @@ def import_launch(
 
     The file is evaluated with these arguments in a process of its own, like 'ros2 launch' does, but
     nothing is started: nodes become executables with their names, namespaces, parameters,
-    remappings, environment and restarts. Includes, groups and conditions are resolved. Components,
-    processes that are not nodes, event handlers, and options that systems do not have are listed
-    and left out.
+    remappings, environment and restarts. Launch arguments and conditions are kept where possible,
+    includes and groups are resolved. Components, processes that are not nodes, event handlers, and
+    options that systems do not have are listed and left out.
 
     Parameters of nodes that the launch file does not name are for nodes inside the programs. With
     --output, they are written to a parameter file next to the system.

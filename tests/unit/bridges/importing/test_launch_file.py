@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +36,14 @@ def node(name: str | None = "base", **changes: Any) -> dict[str, Any]:
     return found | changes | {"process": process}
 
 
+def report(*nodes: dict[str, Any], left_out: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the report of one visit."""
+    visit = {"values": {}, "nodes": [dict(item) for item in nodes], "left_out": left_out}
+    return {"arguments": [], "visits": [visit], "base": list(nodes), "resolved": []}
+
+
 def described(*nodes: dict[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    found = describe_launch_file("s", "f.launch.py", (), {"nodes": nodes, "left_out": []})
+    found = describe_launch_file("s", "f.launch.py", (), report(*nodes))
     return yaml.safe_load(write_system(found))["nodes"], found.left_out
 
 
@@ -115,11 +122,11 @@ def test_components_name_their_containers() -> None:
 def test_what_is_written_is_valid_and_has_the_parameters_of_inner_nodes(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(PARAMETERS)
     sources = [(str(tmp_path / "robot.yaml"), True), ("speed:=2", False)]
-    report = [
+    items = [
         node("base", **parameter_values(sources, "/base")),
         node(None, **parameter_values(sources, "/<node_name_unspecified>")),
     ]
-    found = describe_launch_file("s", "f.launch.py", (), {"nodes": report, "left_out": []})
+    found = describe_launch_file("s", "f.launch.py", (), report(*items))
     (tmp_path / "s.yaml").write_text(write_system(found, "s_parameters.yaml"))
     (tmp_path / "s_parameters.yaml").write_text(write_parameters(found))
     result = load(tmp_path / "s.yaml")
@@ -154,7 +161,7 @@ def test_the_nodes_of_a_launch_file_are_executables() -> None:
         lifecycle=True,
         note="after 3 s",
     )
-    found = describe_launch_file("s", "r.launch.py", ["a:=b"], {"nodes": [item], "left_out": ["x"]})
+    found = describe_launch_file("s", "r.launch.py", ["a:=b"], report(item, left_out=["x"]))
     assert (
         write_system(found)
         == """\
@@ -185,12 +192,12 @@ nodes:
 
 
 def test_sections_are_for_names_that_the_launch_file_does_not_give() -> None:
-    report = [
+    items = [
         node("base", sections={"/wheel": {"a": 1, "map": "m"}, "/arm": {"b": 2}}),
         node("arm", sections={"/base": {"c": 3}, "/wheel": {"a": 1}}),
         node(None, executable="wheel", sections={"/wheel": {"a": 1}, "/base": {"c": 3}}),
     ]
-    found = describe_launch_file("s", "f.launch.py", (), {"nodes": report, "left_out": []})
+    found = describe_launch_file("s", "f.launch.py", (), report(*items))
     assert [item.name for item in found.nodes] == ["base", "arm", "wheel"]
     assert found.sections == {"/wheel": {"a": 1}}
     assert found.left_out == ("parameters of /wheel in some programs only: map",)

@@ -1,0 +1,223 @@
+"""Visits a launch file with several values of its arguments, to learn what depends on them.
+
+A launch file is a program: what its conditions and substitutions do is observed, not interpreted.
+An argument that is true or false, has choices, or is compared with constants takes all of these
+values. Any other argument takes a mark, which is then in all that the argument becomes a part of.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import product
+from math import prod
+from typing import Any
+
+from composer.language.document.scalars import NumberRefused, resolve_plain
+
+MAX_VISITS = 64
+_MARK = "COMPOSE_ARGUMENT_{}_END"
+_MARKED = re.compile(r"COMPOSE_ARGUMENT_(\w+?)_END")
+_OPPOSITES = {"true": "false", "false": "true", "True": "False", "False": "True"}
+
+#: The report of a visit: ``nodes``, ``left_out``, ``arguments``, and ``compared`` constants.
+Visit = dict[str, Any]
+
+
+def identifier(name: str) -> str:
+    """Return the name of a launch argument as a system has it."""
+    return re.sub(r"\W", "_", name, flags=re.ASCII)
+
+
+def mark(name: str) -> str:
+    """Return a text that stands for the value of an argument."""
+    return _MARK.format(identifier(name))
+
+
+def marked_names(tree: Any) -> set[str]:
+    """Return the arguments that a report refers to, as a system has them."""
+    return set(_MARKED.findall(json.dumps(tree)))
+
+
+def with_references(text: str) -> str:
+    """Return a text with ``${name}`` in place of marks."""
+    return _MARKED.sub(r"${\1}", text)
+
+
+def all_visits(visit: Callable[[Mapping[str, str]], Visit], given: Mapping[str, str]) -> Visit:
+    """Return the visits with the values of the arguments that matter.
+
+    ``values`` of each visit are those of arguments with several values. ``resolved`` are arguments
+    that keep their values, because the launch file needs them before its nodes are known.
+    """
+    base = visit(given)
+    values = _alternatives(base)
+    for name, texts in tuple(values.items()):
+        for other in texts[1:]:  # a branch may compare other arguments
+            found = _attempted(visit, {**given, name: other})
+            for key, more in ({} if found is None else _alternatives(found, base)).items():
+                values[key] = list(dict.fromkeys([*values.get(key, ()), *more]))
+    declared = {item["name"]: item for item in base["arguments"]}
+    resolved = [name for name in declared if declared[name]["default"] is None]
+    while prod(map(len, values.values())) > MAX_VISITS:
+        resolved.append(values.popitem()[0])
+    marks = {}
+    for name, item in declared.items():
+        if name not in values and name not in resolved:
+            found = _attempted(visit, {**given, name: mark(name)})
+            if found is not None and _is_kept(base, found, name, item["default"]):
+                marks[name] = mark(name)
+            else:
+                resolved.append(name)
+    visits = []
+    for chosen in product(*values.values()):
+        combination = dict(zip(values, chosen, strict=True))
+        found = _attempted(visit, {**given, **marks, **combination})
+        if found is None:  # the arguments depend on each other
+            resolved = list(declared)
+            visits, values, marks = [{"values": {}, **base}], {}, {}
+            break
+        visits.append({"values": combination, **found})
+    return {
+        "arguments": [
+            {**item, "values": values.get(item["name"], [])}
+            for item in declared.values()
+            if item["name"] in {*values, *marks}
+        ],
+        "visits": visits,
+        "base": base["nodes"],
+        "resolved": [name for name in resolved if declared[name]["default"]],
+    }
+
+
+def _attempted(
+    visit: Callable[[Mapping[str, str]], Visit], values: Mapping[str, str]
+) -> Visit | None:
+    try:
+        return visit(values)
+    except Exception:  # whatever the code of the launch file raises for a value
+        return None
+
+
+def _alternatives(visit: Visit, base: Visit | None = None) -> dict[str, list[str]]:
+    """Return the values of each argument that is known to have several, its own first."""
+    found = {}
+    for item in (base or visit)["arguments"]:
+        default = item["default"]
+        if default is None:
+            continue
+        others = [*item["choices"], *visit["compared"].get(item["name"], ())]
+        others += [_OPPOSITES[default]] if default in _OPPOSITES else []
+        values = list(dict.fromkeys([default, *others]))
+        if len(values) > 1:
+            found[item["name"]] = values
+    return found
+
+
+def _is_kept(base: Visit, found: Visit, name: str, default: str) -> bool:
+    """Return whether a mark is where the value was, and nothing else has changed."""
+    try:
+        return _without_mark(found["nodes"], base["nodes"], name, default)
+    except NumberRefused:
+        return False
+
+
+def _without_mark(found: Any, base: Any, name: str, default: str) -> bool:
+    if isinstance(found, dict) and isinstance(base, dict):
+        filled = {key.replace(mark(name), default): value for key, value in found.items()}
+        return filled.keys() == base.keys() and all(
+            _without_mark(value, base[key], name, default) for key, value in filled.items()
+        )
+    if isinstance(found, list) and isinstance(base, list):
+        pairs = zip(found, base, strict=False)
+        return len(found) == len(base) and all(
+            _without_mark(one, other, name, default) for one, other in pairs
+        )
+    if found == mark(name) and default:
+        return bool(base in (default, resolve_plain(default)))
+    return bool((found.replace(mark(name), default) if isinstance(found, str) else found) == base)
+
+
+class Differs(Exception):
+    """Several descriptions of a node cannot be one description with references."""
+
+
+def unified(trees: Sequence[Any], values: Sequence[Mapping[str, str]]) -> Any:
+    """Return one tree for several, with marks where they have the values of an argument.
+
+    Raises Differs.
+    """
+    first = trees[0]
+    if all(tree == first and type(tree) is type(first) for tree in trees):
+        return first
+    if all(isinstance(tree, dict) and tree.keys() == first.keys() for tree in trees):
+        return {key: unified([tree[key] for tree in trees], values) for key in first}
+    if all(isinstance(tree, list) and len(tree) == len(first) for tree in trees):
+        return [unified(items, values) for items in zip(*trees, strict=True)]
+    for name in values[0]:
+        texts = [item[name] for item in values]
+        if all(_is_value(tree, text) for tree, text in zip(trees, texts, strict=True)):
+            return mark(name)
+        if all(isinstance(tree, str) for tree in trees) and all(texts):
+            marked = {
+                tree.replace(text, mark(name)) for tree, text in zip(trees, texts, strict=True)
+            }
+            if len(marked) == 1:
+                return marked.pop()
+    raise Differs
+
+
+def _is_value(value: Any, text: str) -> bool:
+    if isinstance(value, bool):
+        return text.lower() == str(value).lower()
+    return bool(value == text)
+
+
+def condition(visits: Sequence[Mapping[str, str]], present: Iterable[int]) -> dict[str, str]:
+    """Return the condition of what is present in these visits; empty for all of them.
+
+    The first visit has the defaults.
+    """
+    numbers = frozenset(present)
+    names = [*visits[0]]
+    for name in tuple(names):  # those that decide nothing
+        fewer = [other for other in names if other != name]
+        if _are_enough(fewer, visits, numbers):
+            names = fewer
+    if not names:
+        return {}
+    groups = {tuple(item[name] for name in names): False for item in visits}
+    for number in numbers:
+        groups[tuple(visits[number][name] for name in names)] = True
+    there = [group for group, is_there in groups.items() if is_there]
+    absent = [group for group, is_there in groups.items() if not is_there]
+    is_default = 0 in numbers
+    if len(there) < len(absent) or (len(there) == len(absent) and not is_default):
+        return {"if": " or ".join(_terms(names, there))}
+    return {"unless": " or ".join(_terms(names, absent))}
+
+
+def _are_enough(
+    names: Sequence[str], visits: Sequence[Mapping[str, str]], present: frozenset[int]
+) -> bool:
+    """Return whether these arguments alone decide what is present."""
+    found: dict[tuple[str, ...], bool] = {}
+    return all(
+        found.setdefault(tuple(item[name] for name in names), number in present)
+        == (number in present)
+        for number, item in enumerate(visits)
+    )
+
+
+def _terms(names: Sequence[str], groups: Iterable[Sequence[str]]) -> Iterator[str]:
+    for group in groups:
+        yield " and ".join(_term(*pair) for pair in zip(names, group, strict=True))
+
+
+def _term(name: str, value: str) -> str:
+    name = identifier(name)
+    if value in _OPPOSITES:
+        return name if value.lower() == "true" else f"not {name}"
+    quote = '"' if "'" in value else "'"
+    return f"{name} == {quote}{value}{quote}"

@@ -1,0 +1,215 @@
+"""Arguments and conditions of launch files: what ``compose import launch`` keeps of them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from composer.bridges.importing.launch_file import describe_launch_file
+from composer.bridges.importing.writing import write_system
+from composer.launch.variants import all_visits, condition
+from composer.loading import load, load_files
+from composer.model.resolve import OverrideOptions
+from tests.unit.bridges.importing.test_launch_file import node
+
+Nodes = Callable[[Mapping[str, str]], list[dict[str, Any]]]
+
+
+def argument(name: str, default: str | None, *choices: str) -> dict[str, Any]:
+    return {"name": name, "default": default, "description": "", "choices": list(choices)}
+
+
+def visited(
+    nodes: Nodes, *arguments: dict[str, Any], **compared: list[str]
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the system and what is left out of a launch file that has ``nodes(values)``."""
+    defaults = {item["name"]: item["default"] or "" for item in arguments}
+
+    def visit(values: Mapping[str, str]) -> dict[str, Any]:
+        declared = [
+            {**item, "default": values.get(item["name"], item["default"])} for item in arguments
+        ]
+        return {
+            "nodes": nodes({**defaults, **values}),
+            "left_out": [],
+            "arguments": declared,
+            "compared": compared,
+        }
+
+    found = describe_launch_file("s", "f.launch.py", (), all_visits(visit, {}))
+    return yaml.safe_load(write_system(found)), found.left_out
+
+
+def conditions(item: Mapping[str, Any]) -> dict[str, str]:
+    return {key: item[key] for key in ("if", "unless") if key in item}
+
+
+def test_a_condition_is_kept() -> None:
+    system, _ = visited(
+        lambda values: [node("sim" if values["sim"] == "true" else "driver"), node("nav")],
+        argument("sim", "false"),
+    )
+    assert system["arguments"] == {"sim": False}
+    assert {name: conditions(item) for name, item in system["nodes"].items()} == {
+        "driver": {"unless": "sim"},
+        "nav": {},
+        "sim": {"if": "sim"},
+    }
+
+
+def test_values_become_references() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        sim = values["sim"] == "true"
+        parameters = {
+            "use_sim_time": sim,
+            "rate": 5.0 if values["rate"] == "5.0" else values["rate"],
+        }
+        remappings = {"scan": f"/{values['robot']}/scan"}
+        return [
+            node(
+                "nav", parameters=parameters, remappings=remappings, namespace=f"/{values['robot']}"
+            )
+        ]
+
+    system, left_out = visited(
+        nodes, argument("sim", "false"), argument("rate", "5.0"), argument("robot", "r1")
+    )
+    assert left_out == ()
+    assert system["arguments"] == {"sim": False, "rate": 5.0, "robot": "r1"}
+    assert system["nodes"]["nav"] == {
+        "namespace": "/${robot}",
+        "executable": {"package": "p", "name": "program"},
+        "parameters": {
+            "use_sim_time": {"type": "bool", "default": "${sim}"},
+            "rate": {"type": "double", "default": "${rate}"},
+        },
+        "remappings": {"scan": "/${robot}/scan"},
+    }
+
+
+def test_what_differs_in_another_way_has_a_condition_for_each() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        return [node("nav", arguments=["-x"] if values["fast"] == "True" else ["-y", "-z"])]
+
+    system, _ = visited(nodes, argument("fast", "False"))
+    first, second = system["nodes"].values()
+    assert (first["executable"]["arguments"], conditions(first)) == (
+        ["-y", "-z"],
+        {"unless": "fast"},
+    )
+    assert (second["executable"]["arguments"], conditions(second)) == (["-x"], {"if": "fast"})
+    assert {first.get("name", "nav"), second["name"]} == {"nav"}
+
+
+def test_what_cannot_be_kept_is_listed() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        return [node(f"robot_{number}") for number in range(int(values["robots"]))]
+
+    system, left_out = visited(nodes, argument("robots", "2"), argument("unused", "x"))
+    assert sorted(system["nodes"]) == ["robot_0", "robot_1"]
+    assert left_out == (
+        "argument robots: the system has its value, and cannot change it",
+        "argument unused: no node depends on it",
+    )
+
+
+def test_constants_that_are_compared_and_choices_are_tried(tmp_path: Path) -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        burger = [node("small")] if values["model.name"] == "burger" else [node("large")]
+        return [*burger, node(values["lidar"]), node("nav")]
+
+    arguments = (argument("model.name", "waffle"), argument("lidar", "sick", "sick", "ouster"))
+    system, left_out = visited(nodes, *arguments, **{"model.name": ["burger"]})
+    assert left_out == ()
+    assert system["arguments"] == {
+        "model_name": "waffle",
+        "lidar": {"default": "sick", "choices": ["sick", "ouster"]},
+    }
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
+
+    def started(*given: str) -> set[str]:
+        result = load(tmp_path / "s.yaml", overrides=OverrideOptions(arguments=given))
+        assert result.system is not None
+        return {item.name.value for item in result.system.nodes}
+
+    assert started() == {"large", "sick", "nav"}
+    assert started("model_name=burger", "lidar=ouster") == {"small", "ouster", "nav"}
+    assert started("model_name=other") == {"large", "sick", "nav"}
+
+
+A, B = ({"a": a, "b": b} for a, b in (("false", "x"), ("false", "y")))
+C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
+
+
+@pytest.mark.parametrize(
+    ("present", "expected"),
+    [
+        ([0, 1, 2, 3], {}),
+        ([0, 1], {"unless": "a"}),
+        ([2, 3], {"if": "a"}),
+        ([1, 3], {"if": "b == 'y'"}),
+        ([1], {"if": "not a and b == 'y'"}),
+        ([0, 1, 2], {"unless": "a and b == 'y'"}),
+        ([0, 3], {"unless": "not a and b == 'y' or a and b == 'x'"}),
+    ],
+)
+def test_the_condition_is_short(present: list[int], expected: dict[str, str]) -> None:
+    assert condition([A, B, C, D], present) == expected
+
+
+LAUNCH = """\
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    sim, model = LaunchConfiguration("sim"), LaunchConfiguration("model")
+    is_burger = PythonExpression(["'", model, "' == 'burger'"])
+    return LaunchDescription([
+        DeclareLaunchArgument("sim", default_value="false", description="Simulate."),
+        DeclareLaunchArgument("lidar", default_value="sick", choices=["sick", "ouster"]),
+        DeclareLaunchArgument("model", default_value="waffle"),
+        DeclareLaunchArgument("map", default_value="/a.yaml"),
+        Node(package="p", executable="sim", name="sim", condition=IfCondition(sim)),
+        Node(package="p", executable="base", name="base", condition=UnlessCondition(sim)),
+        Node(package="p", executable="o", name="lidar",
+             condition=LaunchConfigurationEquals("lidar", "ouster")),
+        Node(package="p", executable="b", name="arm", condition=IfCondition(is_burger)),
+        Node(package="p", executable="m", name="map", parameters=[
+            {"use_sim_time": sim, "yaml": LaunchConfiguration("map")}]),
+    ])
+"""
+
+
+@pytest.mark.skipif(find_spec("launch_ros") is None, reason="needs launch_ros")
+def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
+    (tmp_path / "robot.launch.py").write_text(LAUNCH)
+    command = [sys.executable, "-m", "composer", "import", "launch", "robot.launch.py"]
+    subprocess.run([*command, "-o", "robot.yaml"], cwd=tmp_path, check=True, timeout=60)
+    system = yaml.safe_load((tmp_path / "robot.yaml").read_text())
+    assert system["arguments"] == {
+        "sim": {"default": False, "description": "Simulate."},
+        "lidar": {"default": "sick", "choices": ["sick", "ouster"]},
+        "model": "waffle",
+        "map": "/a.yaml",
+    }
+    assert {name: conditions(item) for name, item in system["nodes"].items()} == {
+        "sim": {"if": "sim"},
+        "base": {"unless": "sim"},
+        "lidar": {"if": "lidar == 'ouster'"},
+        "arm": {"if": "model == 'burger'"},
+        "map": {},
+    }
+    values = {name: item["default"] for name, item in system["nodes"]["map"]["parameters"].items()}
+    assert values == {"use_sim_time": "${sim}", "yaml": "${map}"}
+    [result] = load_files([tmp_path / "robot.yaml"])
+    assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
