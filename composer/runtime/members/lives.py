@@ -104,7 +104,7 @@ class MemberLives:
         context: MemberContext,
         on_failure: Callable[[str, bool], None],
     ) -> None:
-        """``name`` is the namespace of the manager of the process, ``label`` is for people.
+        """``name`` is the namespace of the manager of the process, ``label`` the name in messages.
 
         ``on_failure(reason, is_expected)`` is called when a life ends or is lost.
         """

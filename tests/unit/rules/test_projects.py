@@ -80,7 +80,7 @@ def test_a_port_in_the_wrong_section_is_reported_where_it_is_used(tmp_path: Path
 
 PART = """\
 system: part
-variables: {unit: a}
+arguments: {unit: a}
 nodes:
   driver:
     publishers: {odom: {type: std_msgs/msg/String, qos: command, required: false}}
@@ -91,7 +91,7 @@ FLEET = """\
 system: fleet
 include:
   - {file: part.yaml, for_each: {unit: [a, b]}, prefix: "${unit}_", namespace: "${unit}",
-     variables: {unit: "${unit}"}}
+     arguments: {unit: "${unit}"}}
 nodes:
   monitor:
     subscriptions:

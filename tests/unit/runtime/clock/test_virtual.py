@@ -105,7 +105,7 @@ def test_a_wake_up_before_the_wait_ends_it() -> None:
     assert clock.monotonic() == 1.0
 
 
-def test_other_threads_can_wake_a_system_that_waits_for_ever() -> None:
+def test_other_threads_can_wake_a_system_that_waits_forever() -> None:
     clock = VirtualClock()
     wakeup = Wakeup(clock)
     ended = threading.Event()
