@@ -15,6 +15,7 @@ import pytest
 from std_msgs.msg import String
 
 from composer.runtime.supervision.events import NodeFailed
+from tests.ros.support.commands import output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 pytest.importorskip("composition_interfaces", reason="make test builds it")
@@ -66,6 +67,7 @@ def test_up_and_down_in_order_with_names_and_parameters(tmp_path: Path, peer: Pe
         assert said[0].data == "good morning"
         wait_until(lambda: "talker 30 use_intra_process_comms=True" in system.log(), "its request")
         assert system.node("camera").figures == system.node("container").figures
+        assert "# Loaded by /robot/container" in output_of("import", "live", "--node", "camera")
 
         peer.change("/robot/camera", "deactivate")
         wait_until(lambda: system.node("camera").state == "inactive", "the state of the node")
