@@ -212,6 +212,7 @@ class Visitor:
                 {
                     "name": request.node_name or None,
                     "namespace": request.node_namespace or "/",
+                    "package": request.package_name,
                     "executable": request.plugin_name.rpartition("::")[2],
                     "component": component | ({"extra_arguments": extra} if extra else {}),
                     "container": (container["namespace"], container["name"]),

@@ -199,6 +199,8 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
     remappings: {image: /image}
   # The launch file does not name it: demo::Imu does.
   Imu: {component: {package: demo, plugin: "demo::Imu"}, container: other}
+  sim: {if: sim, executable: {package: demo, name: sim}}
+  lidar: {if: sim, component: {package: demo, plugin: "demo::Lidar"}, container: box}
   # The launch file loads components into it, and does not start it.
   other: {external: true}
 """
@@ -210,7 +212,7 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
         in (tmp_path / "robot_parameters.yaml").read_text()
     )
     assert compose("validate", written).returncode == 0
-    assert "\n  sim: {executable: " in output_of("import", "launch", file, "sim:=true")
+    assert "arguments: {sim: true}\n" in output_of("import", "launch", file, "sim:=true")
 
 
 @pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch_ros is not installed")
