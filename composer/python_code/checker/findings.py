@@ -1,7 +1,7 @@
-"""What the type checker says, in our words: as problems with a family and a hint.
+"""What the type checker finds, as problems: in its own words, with a family and our hint.
 
-The patterns fit the messages of the pinned version of the checker. A message that fits none is
-passed on in its own words.
+Only what the checker cannot know has words of ours: imports, a missing ``await`` or ``self``,
+values that may be None, and the message types of ports. The patterns fit the pinned version.
 """
 
 from __future__ import annotations
@@ -57,24 +57,11 @@ _ARGUMENT = (
     r"Argument `(?P<given>.+?)` is not assignable to parameter `(?P<name>\w+)` "
     r"with type `(?P<expected>.+?)` in function `(?P<function>[\w.<>]+)`"
 )
-_KEYWORD = (
-    r"(?:Unexpected keyword argument `(?P<name>\w+)`|Expected 0 positional arguments, got \d+) "
-    r"in function `(?P<function>[\w.]+)`"
-)
 _ASSIGNMENT = (
     r"`(?P<given>.+?)` is not assignable to (?:attribute `\w+` with type |declared return type )?"
     r"`(?P<expected>.+?)`"
 )
 MISSING_RETURN = "missing an explicit `return`"
-#: The types that rclpy and the composer expect from functions, with what these return.
-_RESULTS = {
-    "Response": ("the response", "response"),
-    "Result": ("the result", "result"),
-    "TransitionCallbackReturn": (
-        "a TransitionCallbackReturn",
-        "TransitionCallbackReturn.SUCCESS",
-    ),
-}
 _NAME = r"Could not find name `(\w+)`"
 _FUNCTION = r"in function `([\w.]+)`"
 _CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
@@ -82,7 +69,7 @@ _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
 _OF_MESSAGE = r"(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)"
 _LITERAL = r"Literal\[(.+?)\]"
-_MODULE = r"\b(?:composer\.(?:typed|behavior)|_ros|builtins|\w+\.(?:msg|srv|action))\."
+_MODULE = r"\b(?:composer\.(?:typed|behavior)|_ros|builtins)\."
 #: The methods that send a message, with the beginning of the sentence about its type.
 _SENDING = {
     "composer.behavior.Publisher.publish": "the port publishes",
@@ -125,13 +112,13 @@ class Reader:
     def _made(self, family: Family, message: str, hint: str | None = None) -> Problem:
         return Problem(family, message, self.span, hint)
 
-    def _in_its_words(self) -> Problem:
+    def _in_its_words(self, family: Family | None = None, hint: str | None = None) -> Problem:
         function = re.search(_FUNCTION, self.finding.message)
         if function is not None:
             self._is_about_call(function[1])
         text = _plain(self.finding.message.partition("\n")[0]).replace("`", "'")
-        family = _FAMILIES.get(self.finding.kind, Family.TYPE)
-        return self._made(family, text[:1].lower() + text[1:])
+        family = family or _FAMILIES.get(self.finding.kind, Family.TYPE)
+        return self._made(family, text[:1].lower() + text[1:], hint)
 
     def _is_about_call(self, called: str) -> None:
         self.about.append(f"line {self.span.line} {called}")
@@ -186,8 +173,8 @@ class Reader:
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
         if owner is not None:
-            self._is_about_call(owner.name)
-            return self._made(owner.family, owner.lacks(name), owner.hint(name))
+            self._is_about_call(named)
+            return self._in_its_words(owner.family, owner.hint(name))
         is_stored = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
         if is_stored and not is_own:
             return None  # most objects take any attribute
@@ -195,7 +182,7 @@ class Reader:
             self.about.append(f"type {named}")
         names = self._members(named) if is_own else set[str]()
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
-        return self._made(Family.ATTRIBUTE, f"'{named}' has no attribute '{name}'", hint)
+        return self._in_its_words(hint=hint)
 
     def _members(self, class_name: str) -> set[str]:
         api = () if self._is_class else self.owners.attributes
@@ -228,7 +215,7 @@ class Reader:
         names = dir(sys.modules[module]) if is_loaded else ()
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
         family = Family.IMPORT if found["imported"] else Family.ATTRIBUTE
-        return self._made(family, f"module '{module}' has no '{name}'", hint)
+        return self._in_its_words(family, hint)
 
     def _argument(self) -> Problem | None:
         found = re.search(_ARGUMENT, self.finding.message)
@@ -240,32 +227,16 @@ class Reader:
         node = self.code.expression_at(self.span)
         if isinstance(node, ast.Call) and found["name"] in _CALLBACKS:
             name = dotted(node.func)
-            message = f"'{name}' is called here, not passed"
-            return self._made(Family.SIGNATURE, message, f"write '{name}' without '()'")
-        self._is_about_call(function)
-        message_class = re.fullmatch(_OF_MESSAGE, function)
-        if message_class is not None:
-            package, folder, interface, method = message_class.groups()
-            name = found["name"] if method == "__init__" else method
-            return self._value(f"{package}/{folder}/{interface}", name, given)
+            return self._in_its_words(Family.SIGNATURE, f"write '{name}' without '()'")
+        hint = _part_hint(expected, given)
         if function in _SENDING:
             self.about.append(f"type {given}")
-            types = [self.owners.shown(text, self.code.module) for text in (expected, given)]
-            message = f"{_SENDING[function]} {types[0]}, not {types[1]}"
-            return self._made(Family.MESSAGE_TYPE, message, _part_hint(expected, given))
-        shown = f"argument '{found['name']}' of '{function.rpartition('.')[2]}' must be"
-        message = f"{shown} {_plain(expected)}, not {_plain(given)}"
-        return self._made(Family.ARGUMENTS, message, _part_hint(expected, given))
-
-    def _value(self, interface: str, name: str, given: str) -> Problem:
-        """Return the problem of a value that does not fit a field."""
-        type_ = self.owners.field_type(interface, name) or "something else"
-        value = _plain(given)
-        hint = _part_hint(type_, given)
-        if type_.startswith("float") and value.lstrip("-").isdigit():
-            hint = f"write {value}.0"
-        message = f"field '{name}' of {interface} must be {type_}, not {value}"
-        return self._made(Family.VALUE, message, hint)
+            message = f"{_SENDING[function]} {_plain(expected)}, not {_plain(given)}"
+            return self._made(Family.MESSAGE_TYPE, message, hint)
+        if expected.startswith("Float") and _plain(given).lstrip("-").isdigit():
+            hint = f"write {_plain(given)}.0"
+        is_field = re.fullmatch(_OF_MESSAGE, function) is not None
+        return self._in_its_words(Family.VALUE if is_field else Family.ARGUMENTS, hint)
 
     def _assignment(self) -> Problem | None:
         found = re.search(_ASSIGNMENT, self.finding.message)
@@ -275,23 +246,18 @@ class Reader:
         if not isinstance(target, ast.Attribute):  # a variable may change its kind
             is_annotated = isinstance(statement, ast.AnnAssign)
             return self._in_its_words() if is_annotated and not self._is_class else None
-        if dotted(target) in self.owners.attributes and not self._is_class:
-            message = f"'{dotted(target)}' is set by the composer and must not be changed"
-            return self._made(Family.TYPE, message)
-        return None
+        is_ours = dotted(target) in self.owners.attributes and not self._is_class
+        return self._in_its_words() if is_ours else None
 
     def _keyword(self) -> Problem:
-        found = re.search(_KEYWORD, self.finding.message)
-        called = None if found is None else re.fullmatch(_OF_MESSAGE, found["function"])
-        if found is None or called is None or called[4] != "__init__":
+        called = re.search(
+            rf"Unexpected keyword argument `(\w+)` in function `{_OF_MESSAGE}`",
+            self.finding.message,
+        )
+        owner = self.owners.message("/".join(called.group(2, 3, 4))) if called else None
+        if called is None or owner is None:
             return self._in_its_words()
-        self._is_about_call(found["function"])
-        name = "/".join(called.groups()[:3])
-        owner = self.owners.message(name)
-        if found["name"] is None or owner is None:
-            hint = f"write '{called[3]}(field=...)'"
-            return self._made(Family.ARGUMENTS, f"{name} takes its fields by name", hint)
-        return self._made(Family.FIELD, owner.lacks(found["name"]), owner.hint(found["name"]))
+        return self._in_its_words(owner.family, owner.hint(called[1]))
 
     def _name(self) -> Problem | None:
         found = re.search(_NAME, self.finding.message)
@@ -310,7 +276,7 @@ class Reader:
             names = self.code.names | {*module.imports, *module.classes}
             alike = [x for x in names - {name} if x[:1].lower() == name[:1].lower()]
             hint = _did_you_mean(name, alike) or "import it, or define it"
-        return self._made(Family.NAME, f"name '{name}' is not defined", hint)
+        return self._in_its_words(hint=hint)
 
     def _missing_self(self) -> Problem | None:
         """Return the problem of a method without arguments, or without the 'self' that it uses."""
@@ -336,27 +302,15 @@ class Reader:
             return None if found is not None else self._in_its_words()
         if _may_be_none(found["given"], found["expected"]):
             return self._none()
-        shown = [self.owners.shown(found[x], self.code.module) for x in ("expected", "given")]
-        expected, given = map(_plain, shown)
-        hint = _part_hint(found["expected"], found["given"])
-        value = _RESULTS.get(_last_word(expected), ("", ""))[1]
-        if hint is None and value:
-            hint = f"write 'return {value}'"
-        return self._made(Family.RETURN, f"this must return {expected}, not {given}", hint)
+        return self._in_its_words(hint=_part_hint(found["expected"], found["given"]))
 
     def _missing_return(self, function: Function) -> Problem | None:
-        expected = _plain(self.finding.message.split("`")[1])
-        part = _last_word(expected)
         is_open = function.returns is None or is_none(function.returns)
-        if part == "Result" and not self._is_class and is_open:
+        expected = self.finding.message.split("`")[1]
+        if expected.endswith("Result") and not self._is_class and is_open:
             return None  # the composer sends an empty result
-        what, value = _RESULTS.get(part, (expected, ""))
-        if function.name.startswith("accept_"):
-            what, value = "the decision", "True"
-        message = f"'{function.name}' must return {what}, but may end without a 'return'"
-        span = name_span(function, "def", self.span.file)
-        hint = f"end it with 'return {value}'" if value else None
-        return Problem(Family.RETURN, message, span, hint)
+        self.span = name_span(function, "def", self.span.file)
+        return self._in_its_words()
 
     def _none(self) -> Problem | None:
         """Return the problem of a value that may be None, unless the class checks it elsewhere."""
@@ -407,11 +361,6 @@ def _plain(text: str) -> str:
     literals = re.sub(_LITERAL, lambda found: found[1].replace("'", '"'), text)
     text = re.sub(_MODULE, "", literals).replace("ReturnType", "Return")
     return text.replace("Float | Scalar", "float").replace("Values[", "list[")
-
-
-def _last_word(type_: str) -> str:
-    """Return ``Response`` for ``std_srvs/srv/Trigger_Response``."""
-    return re.split(r"\W|_", type_)[-1]
 
 
 def _may_be_none(given: str, expected: str) -> bool:

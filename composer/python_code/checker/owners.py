@@ -25,17 +25,12 @@ _PARTS = {"msg": (), "srv": ("Request", "Response"), "action": ("Goal", "Result"
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """What an attribute belongs to: how messages name it, and the attributes that it has."""
+    """What an attribute belongs to: its family, and the attributes that it has."""
 
     family: Family
-    name: str
-    what: str  # of its attributes: "publisher", "field", ...
     members: tuple[str, ...]
     elsewhere: Mapping[str, str] = field(default_factory=dict)  # of the node: name to attribute
-
-    def lacks(self, name: str) -> str:
-        """Return the message about an attribute that it does not have."""
-        return f"{self.name} has no {self.what} '{name}'"
+    is_api: bool = False  # has too many attributes for a hint to list
 
     def hint(self, name: str) -> str | None:
         """Return the attribute that was meant by a wrong one."""
@@ -44,9 +39,7 @@ class Owner:
             return f"did you mean '{other}'?"
         if name in self.elsewhere:
             return f"'{name}' is in '{self.elsewhere[name]}'"
-        if self.what == "attribute":  # there are many
-            return suggestion(name, self.members, limit=0)
-        return suggestion(name, self.members)
+        return suggestion(name, self.members, limit=0 if self.is_api else 8)
 
 
 class Owners:
@@ -72,30 +65,16 @@ class Owners:
         if not with_api or name not in API_CLASSES:
             return None
         names = tuple(item for item in dir(getattr(behavior, name)) if not item.startswith("_"))
-        return Owner(Family.PORT, f"{name} of composer.behavior", "attribute", names)
+        return Owner(Family.PORT, names, is_api=True)
 
     def message(self, name: str) -> Owner | None:
         """Return a message, or a part of a service or action, by its full name."""
         definition = self._definition(name)
         if definition is None:
             folder = name.split("/")[1]
-            return Owner(Family.FIELD, name, "part", _PARTS[folder]) if _PARTS[folder] else None
+            return Owner(Family.FIELD, _PARTS[folder]) if _PARTS[folder] else None
         constants = (constant.name for constant in definition.constants)
-        return Owner(Family.FIELD, name, "field", (*definition.field_names, *constants))
-
-    def field_type(self, interface: str, name: str) -> str | None:
-        """Return the type of a field as definitions write it, None if it is not known."""
-        definition = self._definition(interface)
-        found = definition.field(name) if definition is not None else None
-        return str(found.type) if found is not None else None
-
-    def shown(self, type_: str, module: Module) -> str:
-        """Return how messages name a type: an interface by its full name."""
-        plain = type_.removeprefix("type[").removesuffix("]").rpartition(".")[2]
-        full = self._full_name(plain, module)
-        if full is None:
-            return type_
-        return f"the class {full}" if type_.startswith("type[") else full
+        return Owner(Family.FIELD, (*definition.field_names, *constants))
 
     @cached_property
     def attributes(self) -> frozenset[str]:
@@ -127,9 +106,9 @@ class Owners:
         for base, node in self._behaviors.items():
             for attribute, kind in PORT_ATTRIBUTES.items():
                 names = (port.name.value for port in node.ports_of(kind))
-                groups[member_class_name(base, attribute)] = _group(node, kind.value, names)
+                groups[member_class_name(base, attribute)] = _group(node, names)
             names = (parameter.name.value for parameter in node.parameters)
-            groups[member_class_name(base, "parameters")] = _group(node, "parameter", names)
+            groups[member_class_name(base, "parameters")] = _group(node, names)
         return groups
 
     @cached_property
@@ -145,7 +124,7 @@ class Owners:
         return found
 
 
-def _group(node: Node, what: str, names: Iterable[str]) -> Owner:
+def _group(node: Node, names: Iterable[str]) -> Owner:
     members = tuple(name for name in names if name.isidentifier())
     elsewhere = {
         port.name.value: attribute
@@ -153,4 +132,4 @@ def _group(node: Node, what: str, names: Iterable[str]) -> Owner:
         for port in node.ports_of(kind)
     }
     elsewhere |= {item.name.value: "parameters" for item in node.parameters}
-    return Owner(Family.PORT, f"node '{node.name}'", what, members, elsewhere)
+    return Owner(Family.PORT, members, elsewhere)

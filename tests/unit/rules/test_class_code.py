@@ -30,24 +30,20 @@ def test_functions_may_have_attributes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("returned", "method", "hint"),
+    ("returned", "method"),
     [
-        ("return response", "on_reset", "end it with 'return response'"),
-        ("return Fibonacci.Result(sequence=[1])", "on_goal", "end it with 'return result'"),
-        (
-            "return TransitionCallbackReturn.SUCCESS",
-            "on_activate",
-            "end it with 'return TransitionCallbackReturn.SUCCESS'",
-        ),
+        ("return response", "on_reset"),
+        ("return Fibonacci.Result(sequence=[1])", "on_goal"),
+        ("return TransitionCallbackReturn.SUCCESS", "on_activate"),
     ],
 )
-def test_a_callback_returns_a_result(returned: str, method: str, hint: str, tmp_path: Path) -> None:
+def test_a_callback_returns_a_result(returned: str, method: str, tmp_path: Path) -> None:
     code = CLASS.code_with()
     codes = [
         code.replace(returned, text) for text in ("pass", "if self.count:\n            " + returned)
     ]
     for [item] in diagnostics_of(CLASS.system, codes, tmp_path):
-        assert (item.rule.name, quoted(item), item.hint) == ("missing-return", method, hint)
+        assert (item.rule.name, quoted(item)) == ("missing-return", method)
 
 
 def test_a_transition_gets_the_state(tmp_path: Path) -> None:
