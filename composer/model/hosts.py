@@ -14,7 +14,7 @@ from composer.model.discovery import interface_problem, peer_problem
 
 #: See rcl's domain_id.c; above 101 the ports of a participant may meet the ephemeral ones of Linux.
 HIGHEST_DOMAIN_ID = 232
-#: RFC 1123, as docker compose accepts it for names.
+#: RFC 1123, as Kubernetes and docker compose accept it for names.
 _DNS_LABEL = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 _USER = re.compile(r"\w[\w.+-]*")
 

@@ -7,10 +7,12 @@ import subprocess
 from pathlib import Path, PurePosixPath
 
 import pytest
+import yaml
 
 from composer.bridges.export.container_image import Contents, containerfile
 from composer.bridges.export.deployment import Service
 from composer.bridges.export.docker_compose import compose_file
+from composer.bridges.export.kubernetes import manifests
 from composer.bridges.export.sros2 import policy
 from composer.bridges.export.systemd import Installation, units
 from composer.client.hosts.remote_command import python_words
@@ -46,6 +48,7 @@ def exported(name: str) -> dict[str, str]:
     services = units(system, path, installation, user=name == "shutdown")
     texts = {
         "compose.yaml": compose_file(system, contents, image, build, ENVIRONMENT),
+        "kubernetes.yaml": manifests(system, contents, image, ENVIRONMENT),
         "Containerfile": containerfile(contents, wheel),
         "policy.xml": policy(system),
     }
@@ -75,6 +78,13 @@ def files(name: str, pattern: str = "*") -> list[Path]:
 def test_docker_compose_accepts_the_file(name: str) -> None:
     text = (EXPECTED / name / "compose.yaml").read_text()
     require_module("compose_spec").PyCompose.from_yaml(text).validate()
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_kubernetes_accepts_the_manifests(name: str) -> None:
+    validator = require_module("kubernetes_validate")
+    for manifest in yaml.safe_load_all((EXPECTED / name / "kubernetes.yaml").read_text()):
+        validator.validate(manifest, validator.latest_version(), strict=True)
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

@@ -17,9 +17,9 @@ from importlib.metadata import Distribution, distribution
 from pathlib import Path, PurePosixPath
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import read_regular
 from composer.base.resources import data_folder
 from composer.bridges.templates import filled
+from composer.project.copied_files import pattern_of
 
 CONTAINERFILE = PurePosixPath("Containerfile")
 #: Where BuildKit and podman look for it first.
@@ -41,36 +41,9 @@ RUN apt-get update && apt-get install -y --no-install-recommends g++ \\
 _UNKNOWN = """\
 # Not in the image, unless requirements.txt adds them: {packages}
 """
-#: What is not in the image unless the project's .dockerignore includes it, as patterns of git.
 _IGNORED = """\
 # Written by 'compose export': files of the project that are not copied into the image.
-.git
-.venv
-venv
-__pycache__
-node_modules
-/build
-/install
-/log
-/logs
-.env
-.env.*
-!.env.example
-!.env.sample
-!.env.template
-.netrc
-id_rsa
-id_dsa
-id_ecdsa
-id_ed25519
-*.jks
-*.key
-*.p12
-*.pem
-*.pfx
-*.ppk
 """
-_MAX_PATTERN_BYTES = 1_000_000
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 #: Besides the package, in a checkout; in an installation, they are in the package.
@@ -86,8 +59,8 @@ class Contents:
     Python (3.12).
     ``has_requirements`` is whether the project has a requirements.txt. ``interfaces`` are interface
     packages to be compiled, ``unknown_interfaces`` those of which there are no definitions here.
-    ``root`` is the folder of the project, and ``private_files`` are paths below it: files that are
-    not in the image, whatever the patterns of the project say.
+    ``ignored`` are the patterns for docker of files that are not in it, first those that hold for
+    files made later, then those of files that exist.
     """
 
     system: str
@@ -96,8 +69,7 @@ class Contents:
     has_requirements: bool = False
     interfaces: tuple[str, ...] = ()
     unknown_interfaces: tuple[str, ...] = ()
-    root: Path = Path()
-    private_files: tuple[str, ...] = ()
+    ignored: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     @property
     def run(self) -> list[str]:
@@ -133,30 +105,13 @@ def containerfile(contents: Contents, wheel: PurePosixPath) -> str:
 
 
 def ignored_files(contents: Contents, wheel: PurePosixPath) -> str:
-    """Return the patterns of files that are not copied into the image; the last one decides.
-
-    Docker reads one file of patterns: that of the project, and its .gitignore, are among them.
-    """
-    usual = _IGNORED.splitlines() + _lines(contents.root / ".gitignore")
-    lines = [_from_git(line) for line in usual] + _lines(contents.root / ".dockerignore")
-    lines += [f"!/{wheel}", *(f"/{path}" for path in contents.private_files)]
-    return "".join(f"{line}\n" for line in lines)
-
-
-def _lines(path: Path) -> list[str]:
-    """Return the patterns of a file; none if it is not there."""
-    try:
-        data = read_regular(path, _MAX_PATTERN_BYTES)
-    except OSError:
-        return []
-    return data.decode(errors="replace").removeprefix("\ufeff").splitlines()
-
-
-def _from_git(line: str) -> str:
-    """Return a pattern of git for docker, whose patterns all begin at the root."""
-    inverted, pattern = ("!", line[1:]) if line.startswith("!") else ("", line)
-    is_anywhere = pattern.strip() and "/" not in pattern.strip()[:-1] and pattern[0] != "#"
-    return f"{inverted}**/{pattern}" if is_anywhere else line
+    """Return the patterns of files that are not copied into the image."""
+    general, files = contents.ignored
+    folders = {pattern_of(str(path)) for path in wheel.parents}  # may be ignored by git
+    first = [line for line in files if line in folders]
+    last = [line for line in files if line not in folders]
+    lines = (*general, *first, f"!{pattern_of(str(wheel))}", *last)
+    return _IGNORED + "".join(f"{line}\n" for line in lines)
 
 
 def wheel(distribution_name: str) -> tuple[str, bytes]:

@@ -11,10 +11,13 @@ from collections.abc import Iterable, Mapping
 from composer.base.fast_dataclass import dataclass
 from composer.model import (
     DEFAULT_EXECUTOR,
+    DiscoveryKind,
+    ImplementationKind,
     OnFailure,
     Process,
     System,
 )
+from composer.model.discovery import is_loopback
 from composer.model.hosts import ENCLAVE_VARIABLE, own_enclave
 from composer.model.names import join
 
@@ -143,6 +146,20 @@ def is_restarted(system: System) -> bool:
     ``on_failure: shutdown`` of the system means that a failure ends it.
     """
     return system.supervision.policy is not OnFailure.SHUTDOWN
+
+
+def has_outside_nodes(system: System) -> bool:
+    """Return whether nodes take part that no process of the system runs, as far as is known."""
+    discovery = system.discovery
+    if discovery is not None and discovery.kind.value is not DiscoveryKind.MULTICAST:
+        hosts = [host for host, _ in discovery.servers]
+        if not all(map(is_loopback, [*hosts, *(peer.value for peer in discovery.peers)])):
+            return True
+    return any(
+        node.implementation is ImplementationKind.EXTERNAL
+        or any(port.external for port in node.ports)
+        for node in system.nodes
+    )
 
 
 def ros_variables(environment: Mapping[str, str], service: Service) -> dict[str, str]:

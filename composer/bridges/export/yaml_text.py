@@ -56,7 +56,7 @@ def _comment(match: re.Match[str]) -> str:
 
 
 def without_variables(value: Any) -> Any:
-    """Return a value in which docker compose replaces no variables."""
+    """Return a value in which docker compose and Kubernetes replace no variables."""
     match value:
         case str():
             return value.replace("$", "$$")

@@ -1,4 +1,4 @@
-"""``compose export docker-compose``: a system in containers."""
+"""``compose export docker-compose`` and ``kubernetes``: a system in container images."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import CommandError
+from composer.cli.support.hosts import files_to_copy, write_staying
 from composer.cli.support.new_files import write_and_say
 from composer.cli.support.options import examples
 from composer.cli.support.system_arguments import (
@@ -18,7 +19,7 @@ from composer.cli.support.system_arguments import (
     SystemName,
     runnable_system,
 )
-from composer.cli.support.terminal import write_raw
+from composer.cli.support.terminal import lines, write, write_raw
 
 if TYPE_CHECKING:
     from composer.bridges.export.container_image import Contents
@@ -43,6 +44,12 @@ NewFolder = Annotated[
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+ListFiles = Annotated[
+    bool,
+    typer.Option(
+        "--list", help="List the files of the project that the image holds, and write nothing."
+    ),
+]
 Image = Annotated[
     str | None,
     typer.Option(
@@ -64,6 +71,13 @@ def add_image_commands(app: typer.Typer) -> None:
             "compose export docker-compose robot --image registry.local/robot:1 -o deploy --force",
         ),
     )(export_docker_compose)
+    app.command(
+        "kubernetes",
+        epilog=examples(
+            "compose export kubernetes systems/robot.yaml --image registry.local/robot:1 -o deploy",
+            "compose export kubernetes systems/robot.yaml | kubectl apply -f -",
+        ),
+    )(export_kubernetes)
 
 
 def export_docker_compose(
@@ -73,6 +87,7 @@ def export_docker_compose(
     image: Image = None,
     output: NewFolder = None,
     force: Force = False,
+    list_files: ListFiles = False,
 ) -> None:
     """Write a file for docker compose, and a Containerfile.
 
@@ -83,6 +98,9 @@ def export_docker_compose(
     from composer.bridges.export.docker_compose import compose_file
 
     declared, path, result = exported_system(system, arguments)
+    if list_files:
+        _list_files(declared, result)
+        return
     contents, name = _image(declared, result, path, image)
     build: dict[str, str] = {}
     if output is not None:
@@ -91,6 +109,31 @@ def export_docker_compose(
         build["dockerfile"] = os.path.relpath(folder / "Containerfile", root)
     text = compose_file(declared, contents, name, build, os.environ)
     _write_image_and(output, {"compose.yaml": text}, contents, result, replace=force)
+
+
+def export_kubernetes(
+    system: SystemName,
+    arguments: Arguments = None,
+    *,
+    image: Image = None,
+    output: NewFolder = None,
+    force: Force = False,
+    list_files: ListFiles = False,
+) -> None:
+    """Write manifests for Kubernetes, and a Containerfile.
+
+    A pod has the processes of one computer as containers, with probes, the limits that the system
+    declares, and the variables of ROS that are set now. On stdout, there are only the manifests.
+    """
+    from composer.bridges.export.kubernetes import manifests
+
+    declared, path, result = exported_system(system, arguments)
+    if list_files:
+        _list_files(declared, result)
+        return
+    contents, name = _image(declared, result, path, image)
+    text = manifests(declared, contents, name, os.environ)
+    _write_image_and(output, {"kubernetes.yaml": text}, contents, result, replace=force)
 
 
 def exported_system(
@@ -112,11 +155,11 @@ def _image(
     from composer.bridges.export.container_image import Contents
     from composer.bridges.export.deployment import services
     from composer.interfaces.sources import Bundle, find_packages
-    from composer.model.hosts import key_file
     from composer.model.interface_packages import NOT_IN_WHEELS, used_packages
+    from composer.project.copied_files import docker_patterns
 
     root = result.project.root
-    keys = [key_file(host.identity_file, root) for host in system.hosts if host.identity_file]
+    files = files_to_copy(system, root)
     used = sorted(used_packages(system))
     own = find_packages(result.project.interface_folders).folders
     built = [name for name in used if name in NOT_IN_WHEELS and name not in own]
@@ -129,12 +172,16 @@ def _image(
         unknown_interfaces=tuple(
             name for name in used if name not in own and name not in Bundle().packages()
         ),
-        root=root,
-        private_files=tuple(
-            path.relative_to(root).as_posix() for path in keys if path.is_relative_to(root)
-        ),
+        ignored=(tuple(docker_patterns(root)), files.docker_patterns),
     )
     return contents, name or f"{services(system)[0].label}:latest"
+
+
+def _list_files(system: System, result: LoadResult) -> None:
+    """Write the files of the project that are copied into an image, and those that are not."""
+    files = files_to_copy(system, result.project.root)
+    write(lines(files.copied))
+    write_staying(files)
 
 
 def _write_image_and(
@@ -147,7 +194,7 @@ def _write_image_and(
 ) -> None:
     """Write a file and what builds its image to a folder, or only the text of the file to stdout.
 
-    Raises CommandError.
+    Two formats may share the image. Raises CommandError.
     """
     from importlib.metadata import PackageNotFoundError
 

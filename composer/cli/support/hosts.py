@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
@@ -12,21 +13,39 @@ import typer
 
 from composer.cli.support.errors import CONFIG, FAILED, CommandError
 from composer.cli.support.system_arguments import runnable_system
-from composer.cli.support.terminal import say
+from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.hosts.deployment import RemoteProcess
     from composer.loading.reported import LoadResult
     from composer.model import Host, LogLevel, System
+    from composer.project.copied_files import CopiedFiles
 
 
-def require_hosts(command: str) -> None:
-    """Raise CommandError if the package of the extra ``hosts`` is not installed."""
+def require_hosts(command: str, *programs: str) -> None:
+    """Raise CommandError if the package of the extra ``hosts``, or a program, is not installed."""
     if find_spec("asyncssh") is None:
         raise CommandError(
             f"'{command}' needs asyncssh, which this Python does not have",
             hint='pip install "ros2-composer[hosts]"',
         )
+    for program in programs:
+        if shutil.which(program) is None:
+            raise CommandError(f"'{command}' needs {program}, which is not installed")
+
+
+def files_to_copy(system: System, root: Path) -> CopiedFiles:
+    """Return which files of the project are copied, to hosts and into images."""
+    from composer.model.hosts import key_file
+    from composer.project.copied_files import copied_files
+
+    names = [host.identity_file for host in system.hosts if host.identity_file is not None]
+    return copied_files(root, [key_file(name, root) for name in names])
+
+
+def write_staying(files: CopiedFiles) -> None:
+    """Write the files of the project that are not copied, but those that each computer makes."""
+    write(lines(f"not copied: {text}" for text in files.reasons))
 
 
 def load_for_hosts(

@@ -1,1 +1,1 @@
-"""Processes of a system on other computers: compared, started and ended by ssh."""
+"""Processes of a system on other computers: compared, started and ended by ssh; files copied."""

@@ -32,7 +32,7 @@ class Kind(Enum):
 
     VERSION = "install the same versions on all computers"
     INTERFACE = "build it there from the same definitions: compose interface build"
-    FILE = "copy the project there, with rsync or git"
+    FILE = "copy the project with 'compose hosts sync'"
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,7 +183,7 @@ def failure_of(host: Host, status: int | None, output: str) -> HostError:
     tried += "" if host.python else " or 'python3'"
     known = {
         NO_WORKSPACE: HostError(
-            host, f"there is no workspace '{folder}'", "copy the project there, with rsync or git"
+            host, f"there is no workspace '{folder}'", "copy the project with 'compose hosts sync'"
         ),
         NO_SETUP: HostError(host, f"a script of 'setup' is not there: {', '.join(host.setup)}"),
         NO_PYTHON: HostError(host, f"there is no Python {tried}", _INSTALL),

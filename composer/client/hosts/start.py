@@ -1,9 +1,9 @@
-"""What commands do with hosts, as one call each: compare, start and end."""
+"""What commands do with hosts, as one call each: compare, start and end, copy."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AsyncExitStack
 from pathlib import Path
 
@@ -12,7 +12,8 @@ from composer.client.hosts.check import HostsDiffer, compare_all, connect_all
 from composer.client.hosts.connection import HostError
 from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess
 from composer.client.hosts.inventory import Question, take_inventory
-from composer.model import BehaviorReference, Executable, Process, System
+from composer.client.hosts.sync import SyncOptions, copy_project, prepare_workspace
+from composer.model import BehaviorReference, Executable, Host, Process, System
 from composer.project import SETTINGS_FILE, Project
 from composer.python_code.lookup import find_behavior
 from composer.runtime.process.computer import is_this_computer
@@ -123,3 +124,29 @@ def run_on_hosts(
                 raise HostsDiffer([(str(error), error.hint)]) from error
 
     return asyncio.run(run())
+
+
+def sync_hosts(
+    hosts: Sequence[Host], options: SyncOptions, report: Callable[[Host, Sequence[str]], None]
+) -> None:
+    """Copy the project to all hosts, one after the other; nothing if one of them is not ready.
+
+    Raises HostsDiffer.
+    """
+
+    async def run() -> None:
+        async with AsyncExitStack() as stack:
+            connections = await connect_all(hosts, options.root, stack)
+            try:
+                targets = [
+                    await prepare_workspace(
+                        host, connections[host.name.value], dry_run=options.dry_run
+                    )
+                    for host in hosts
+                ]
+                for host, target in zip(hosts, targets, strict=True):
+                    report(host, await asyncio.to_thread(copy_project, host, target, options))
+            except HostError as error:
+                raise HostsDiffer([(str(error), error.hint)]) from error
+
+    asyncio.run(run())

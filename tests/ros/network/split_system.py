@@ -74,11 +74,6 @@ class SplitSystem:
         """Run a command on the first computer."""
         return self.console.run(*COMPOSE, *words, timeout_s=PATIENCE_S)
 
-    def copy(self) -> None:
-        """Copy the project to the workspaces of the other computers."""
-        for computer in self.others:
-            computer.check("cp", "-rT", str(self.path.parent), WORKSPACE)
-
     def up(self, *options: str) -> UpOnHosts:
         """Start ``compose hosts run`` there."""
         return UpOnHosts(self, *options)

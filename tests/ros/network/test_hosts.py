@@ -40,7 +40,8 @@ def split(
             keys.trust(*computers[1:])
         system = SplitSystem(folder / "project", computers, keys)
         if trusted:
-            system.copy()
+            done = system.compose("hosts", "sync", str(system.path))
+            assert done.returncode == 0, done.stderr
         yield system, keys
 
 
@@ -56,13 +57,32 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
         assert "compare the fingerprint: ssh -o" in refused.stderr
         keys.trust(robot)
 
-        system.copy()
+        robot.check("mkdir", WORKSPACE)
+        robot.check("touch", f"{WORKSPACE}/precious")
+        refused = system.compose("hosts", "sync", path, "--delete")
+        assert refused.returncode == 1
+        assert "holds other files, which were not copied by 'compose hosts sync'" in refused.stderr
+        assert robot.check("ls", "-A", WORKSPACE) == "precious\n"
+        robot.check("rm", f"{WORKSPACE}/precious")
+
+        system.path.with_name("build").mkdir()
+        system.path.with_name("build").joinpath("made").touch()
+        listed = system.compose("hosts", "sync", path, "--dry-run")
+        assert "robot: copy detector.py\n" in listed.stdout
+        assert "robot: 3 files would be copied\n" in listed.stdout
+        assert robot.check("ls", "-A", WORKSPACE) == ""
+        assert system.compose("hosts", "sync", path).stdout == "robot: 3 files copied\n"
+
+        robot.check("touch", f"{WORKSPACE}/old.py", f"{WORKSPACE}/.venv")
         robot.check("sh", "-c", f"echo >> {WORKSPACE}/detector.py")
         refused = system.compose("hosts", "run", path)
         assert refused.returncode == 1
         assert "robot (root@10.77.0.2): detector.py differs" in refused.stderr
-        assert "copy the project there, with rsync or git" in refused.stderr
-        system.copy()
+        assert "copy the project with 'compose hosts sync'" in refused.stderr
+        done = system.compose("hosts", "sync", path, "--delete")
+        assert done.stdout == "robot: 1 file copied, 1 file deleted\n"
+        names = ".compose-sync\n.venv\ncomposer.yaml\ndetector.py\nrobot.yaml\n"
+        assert robot.check("ls", "-A", WORKSPACE) == names
 
         with system.up() as up:
             up.wait_for("3 of 3 nodes active")
@@ -105,7 +125,7 @@ def test_a_host_whose_every_command_is_hostile(tmp_path: Path) -> None:
         for is_endless in (False, True):
             if is_endless:
                 program.with_name("endless").touch()
-            for command in (("hosts", "run"), ("doctor", "--hosts")):
+            for command in (("hosts", "run"), ("hosts", "sync"), ("doctor", "--hosts")):
                 done = system.compose(*command, str(system.path))
                 output = done.stdout + done.stderr
                 assert done.returncode == 1, output
@@ -135,7 +155,7 @@ def test_the_doctor_checks_discovery_from_each_computer(tmp_path: Path) -> None:
     with split(tmp_path, "robot") as (system, _):
         server = f"discovery: {{kind: server, address: {system.console.address}, start: true}}\n"
         system.path.write_text(system.path.read_text() + server)
-        system.copy()
+        assert system.compose("hosts", "sync", str(system.path)).returncode == 0
         done = system.compose("doctor", str(system.path), "--hosts")
         assert done.returncode == 0, done.stdout + done.stderr
         through = f"through the discovery server {system.console.address}:11811"
@@ -144,7 +164,7 @@ def test_the_doctor_checks_discovery_from_each_computer(tmp_path: Path) -> None:
         assert "robot: " not in local
 
         system.path.write_text(system.path.read_text().replace("start: true", "start: false"))
-        system.copy()
+        assert system.compose("hosts", "sync", str(system.path)).returncode == 0
         done = system.compose("doctor", str(system.path), "--hosts")
         assert done.returncode == 1
         assert "robot: discovery server 10.77.0.1:11811 does not run: nothing" in done.stdout

@@ -1,7 +1,8 @@
-"""Files for docker compose, and the image with the project."""
+"""Files for docker compose and Kubernetes, as their own parsers and schemas read them."""
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -54,19 +55,25 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def environments() -> list[dict[str, str]]:
-    """Return the variables of the three processes: docker compose makes ``$`` of ``$$``."""
+    """Return the variables of the three processes for docker compose, and then for Kubernetes.
+
+    Both make ``$`` of ``$$``, and replace other variables.
+    """
     services = yaml.safe_load(export("docker-compose"))["services"].values()
+    (deployment,) = yaml.safe_load_all(export("kubernetes"))
+    containers = deployment["spec"]["template"]["spec"]["containers"]
     listed = [service["environment"].items() for service in services]
+    listed += [[(item["name"], item["value"]) for item in each["env"]] for each in containers]
     return [{name: value.replace("$$", "$") for name, value in items} for items in listed]
 
 
 def test_each_process_has_its_variables(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ros = {"ROS_DOMAIN_ID": "7"}
-    assert environments() == [ros, ros | VALUES, ros]
+    assert environments() == [ros, ros | VALUES, ros] * 2
     enclave = "ROS_SECURITY_ENCLAVE_OVERRIDE"
     monkeypatch.setenv(enclave, "/my_robot")
     enclaves = ["/my_robot", "/my_robot/front_camera", "/my_robot/arm"]
-    assert [found[enclave] for found in environments()] == enclaves
+    assert [found[enclave] for found in environments()] == enclaves * 2
 
 
 def add(project: Path, text: str) -> None:
@@ -122,19 +129,38 @@ def test_the_image_has_the_interfaces_that_ros_on_pypi_lacks(project: Path) -> N
 
 def test_the_image_has_no_secrets(project: Path) -> None:
     add(project, "hosts: {jetson: {identity_file: keys/robot}, arm: {identity_file: ~/.ssh/id}}\n")
-    (project / ".gitignore").write_text("/deploy\nrecords\n# a comment\n!kept\n")
-    (project / ".dockerignore").write_text("*.bag\n!public.pem\n")
+    (project / ".gitignore").write_text("/deploy\n")
+    (project / ".env").write_text("PASSWORD=x\n")
     export("docker-compose", "-o", "deploy")
     export("docker-compose", "-o", "deploy", "--force")  # the folder exists now
     ignored = (project / "deploy" / "Containerfile.dockerignore").read_text().splitlines()
-    assert {"/build", "**/.git", "**/.env", "**/*.pem", "!**/.env.example"} <= {*ignored}
-    *_, wheel, key = ignored
-    assert ignored[-8:-2] == [
-        *("/deploy", "**/records", "# a comment", "!**/kept", "*.bag", "!public.pem")
-    ]
+    folder, wheel, *files = ignored[-4:]
+    assert folder == "/deploy"
     assert wheel.startswith("!/deploy/ros2_composer-")
-    assert key == "/keys/robot"
+    assert files == ["/.env", "/keys/robot"]
     assert not [line for line in ignored if ".ssh" in line]
+    done = compose("export", "kubernetes", "robot", "--list")
+    assert done.out.splitlines() == [
+        ".gitignore",
+        "systems/robot.yaml",
+        "not copied: .env (a secret, by its name)",
+        "not copied: deploy (ignored by .gitignore)",
+        "not copied: keys/robot (the private key of a host)",
+    ]
+
+
+def test_two_formats_share_the_image(project: Path) -> None:
+    export("docker-compose", "-o", "deploy")
+    done = compose("export", "kubernetes", "robot", "-o", "deploy")
+    assert done.code == 0, done.err
+    assert "deploy/Containerfile is up to date" in done.err
+    assert sorted(path.name for path in (project / "deploy").iterdir()) == [
+        "Containerfile",
+        "Containerfile.dockerignore",
+        "compose.yaml",
+        "kubernetes.yaml",
+        f"ros2_composer-{version('ros2-composer')}-py3-none-any.whl",
+    ]
 
 
 def test_the_commands_of_the_guide_work(project: Path) -> None:
@@ -142,7 +168,7 @@ def test_the_commands_of_the_guide_work(project: Path) -> None:
     lines = [line.removeprefix("$ compose ") for line in guide.read_text().splitlines()]
     commands = [line.split() for line in lines if line.startswith("export ")]
     assert [words[1] for words in commands] == [
-        *("launch", "systemd", "systemd", "docker-compose", "sros2")
+        *("launch", "systemd", "systemd", "docker-compose", "kubernetes", "sros2")
     ]
     commands.pop(1)  # the unit of a system with one process: this one has several
     for words in commands:
@@ -159,6 +185,7 @@ def test_labels_are_unique_and_short(project: Path) -> None:
     nodes = ", ".join(f"{name}: {{on_activate: {{log: hello}}}}" for name in "xyz")
     text = f"system: r\nprocesses: {{{processes}}}\nnodes: {{{nodes}}}\n"
     (project / "systems" / "robot.yaml").write_text(text)
-    names = list(yaml.safe_load(export("docker-compose"))["services"])
+    (deployment,) = yaml.safe_load_all(export("kubernetes"))
+    names = [item["name"] for item in deployment["spec"]["template"]["spec"]["containers"]]
     assert names[1:] == [names[1], f"{names[1]}-2", "r-c-d"]
     assert max(map(len, names)) <= 63

@@ -45,7 +45,7 @@ def test_no_value_becomes_a_line_of_its_own(tmp_path: Path) -> None:
     assert f'Environment="PYTHONPATH={expected}\\\\"\n' in text
 
 
-@pytest.mark.parametrize("form", ["launch", "systemd", "docker-compose"])
+@pytest.mark.parametrize("form", ["launch", "systemd", "docker-compose", "kubernetes"])
 def test_paths_with_control_characters_are_not_exported(tmp_path: Path, form: str) -> None:
     folder = tmp_path / "a\nRUN x"
     folder.mkdir()

@@ -86,6 +86,37 @@ def test_paths_for_a_shell() -> None:
     assert quoted_path("$HOME") == "'$HOME'"
 
 
+def test_rsync_has_the_options_of_the_host(tmp_path: Path) -> None:
+    sync = pytest.importorskip("composer.client.hosts.sync", reason="asyncssh is not installed")
+    there = host(
+        "~/robot",
+        user=located("pilot"),
+        address=located("fe80::1"),
+        port=2222,
+        identity_file="keys/my %h key",
+        known_hosts="~/.ssh/robots",
+    )
+    options = sync.SyncOptions(tmp_path, delete=True)
+    command = sync.rsync_command(there, "/home/pilot/robot", options)
+    assert command[-2:] == [f"{tmp_path}/", "pilot@[fe80::1]:/home/pilot/robot/"]
+    assert "--delete" in command
+    assert "--dry-run" not in command
+    (shell,) = (word for word in command if word.startswith("--rsh="))
+    assert "-a -x -p 2222" in shell
+    assert "StrictHostKeyChecking=yes" in shell
+    assert f"'IdentityFile=\"{tmp_path}/keys/my %%h key\"'" in shell
+
+
+def test_the_workspace_is_not_taken_from_other_output() -> None:
+    """Files may be deleted there."""
+    sync = pytest.importorskip("composer.client.hosts.sync", reason="asyncssh is not installed")
+    assert sync.folder_in("/opt/ros/jazzy\n\ncompose-workspace:/home/pilot/my robot\n") == (
+        "/home/pilot/my robot"
+    )
+    assert sync.folder_in("/opt/ros/jazzy\n") is None
+    assert sync.folder_in("compose-workspace:robot\n") is None
+
+
 @pytest.mark.parametrize(
     ("code", "output", "reason"),
     [

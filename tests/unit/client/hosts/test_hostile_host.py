@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import stat
+import time
 from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -16,7 +19,9 @@ from composer.model import Host, LogLevel, Process
 
 asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 from composer.client.hosts import connection as host_connection  # noqa: E402
+from composer.client.hosts import sync  # noqa: E402
 from composer.client.hosts.check import HostsDiffer, compare_all, connect_all  # noqa: E402
+from composer.client.hosts.connection import HostError  # noqa: E402
 from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess  # noqa: E402
 from composer.client.hosts.inventory import Inventory, Question  # noqa: E402
 
@@ -153,3 +158,32 @@ def test_lines_of_a_process(tmp_path: Path) -> None:
     assert any(message.startswith("[planner] ") for _, _, message in logged)
     assert 0 < len(logged) < MOST_LINES
     assert max(map(len, written)) < LONGEST_LINE
+
+
+#: In place of rsync: its messages are those of the host.
+RSYNC = """#!/bin/sh
+printf '\\033[2Jevil\\r[FATAL] [compose] forged\\n' >&2
+[ -e "$(dirname "$0")/endless" ] && exec yes >&2
+exit 12
+"""
+
+
+@pytest.mark.parametrize("is_endless", [True, False])
+def test_messages_of_rsync(
+    is_endless: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sync, "MOST_OUTPUT", 1_000_000)
+    program = tmp_path / "rsync"
+    program.write_text(RSYNC)
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    if is_endless:
+        (tmp_path / "endless").touch()
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    options = sync.SyncOptions(tmp_path, excluded=("a",) * 1000)
+    started_s = time.monotonic()
+    with pytest.raises(HostError) as refusal:
+        sync.copy_project(host(tmp_path, 22), "/robot", options)
+    assert time.monotonic() - started_s < 30.0
+    expected = "sends more than 1 MB" if is_endless else "rsync failed: \\x1b[2Jevil"
+    assert expected in str(refusal.value)
+    assert str(refusal.value).isprintable()

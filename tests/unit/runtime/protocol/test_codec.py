@@ -44,10 +44,11 @@ PLAIN = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
     max_leaves=5,
 )
+MAPPING = st.dictionaries(st.text(), PLAIN, max_size=3)
 st.register_type_strategy(float, NUMBERS)
 REPORT = SystemReport("robot", "running", (NodeReport("/arm", "active"),), "vm", "7")
 #: Of every dataclass that is sent. A change needs another version of the protocol.
-VERSION_OF_FIELDS = (1, "61fa0211b879")
+VERSION_OF_FIELDS = (1, "f076253fbabf")
 
 
 def values(kind: Any) -> st.SearchStrategy[Any]:
@@ -59,6 +60,12 @@ def values(kind: Any) -> st.SearchStrategy[Any]:
     if kind is requests.ParametersAnswer:
         described = st.tuples(st.from_type(requests.ParameterDescription), PLAIN)
         plain = {"nodes": st.dictionaries(st.text(), st.lists(described, max_size=2).map(tuple))}
+    if kind is requests.CallNodes:
+        plain = {"calls": st.lists(values(requests.NodeCall), max_size=2).map(tuple)}
+    if kind is requests.NodeCall:
+        plain = {"request": MAPPING}
+    if kind is requests.NodeResponses:
+        plain = {"responses": st.lists(st.none() | MAPPING, max_size=2).map(tuple)}
     return st.builds(kind, **plain)
 
 

@@ -1,0 +1,136 @@
+"""Which files of a project are copied: by what rsync and the rules of docker make of the list."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from composer.project.copied_files import copied_files, docker_patterns
+
+PRIVATE_KEY = "Bag Attributes\n-----BEGIN ENCRYPTED PRIVATE KEY-----\nMII\n"
+
+
+def write(root: Path, files: dict[str, str], mode: int = 0o644) -> None:
+    for name, text in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        path.chmod(mode)
+
+
+def staying(root: Path, *private: Path) -> set[str]:
+    return {path for path, _ in copied_files(root, private).staying}
+
+
+def test_what_git_and_docker_ignore_stays(tmp_path: Path) -> None:
+    project = tmp_path / "repository" / "robot"
+    ignores = {
+        "../.gitignore": "*.bag\n/robot/maps/\n",
+        ".gitignore": "*.log\n!keep.log\n/data/\n",
+        "sub/.gitignore": "!kept.bag\n/local\n",
+        ".dockerignore": "# of docker\nbig*\n**/*.tmp\nonly/\n!only/this\n",
+    }
+    stay = {"a.log", "data", "maps", "sub/b.bag", "sub/local", "big.bin", "sub/x.tmp", "only/that"}
+    copied = {"keep.log", "sub/kept.bag", "sub/data/a", "local", "sub/big.bin", "only/this"}
+    write(project, {".git/config": "", "build/x": "", "pkg/__pycache__/x": "", "sub/build/x": ""})
+    (project / ".git").rename(project.parent / ".git")
+    write(project, dict.fromkeys(stay - {"data", "maps"} | copied, "x"))
+    write(project, {"data/a": "x", "maps/a": "x", **ignores})
+    found = copied_files(project)
+    assert {text.partition(" (")[0] for text in found.reasons} == stay
+    assert set(found.copied) == copied | (ignores.keys() - {"../.gitignore"}) | {"sub/build/x"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "mode", "stays"),
+    [
+        (".env", "A=1", 0o644, True),
+        ("sub/.env.local", "A=1", 0o644, True),
+        (".env.example", "A=1", 0o644, False),
+        ("sub/id_ed25519", "x", 0o644, True),
+        ("sub/notes.txt", PRIVATE_KEY, 0o644, True),
+        ("keystore/key.pem", "-----BEGIN PRIVATE KEY-----\n", 0o644, True),
+        ("cert.pem", "-----BEGIN CERTIFICATE-----\n", 0o644, False),
+        ("putty", "PuTTY-User-Key-File-3: ssh-ed25519\n", 0o644, True),
+        ("deploy.key", "binary", 0o600, True),
+        ("deploy.key", "binary", 0o644, False),
+        ("api_token", "x", 0o400, True),
+        ("key\n", "x", 0o600, False),
+        ("key_teleop.py", "x", 0o600, False),
+        ("robot.yaml", "system: r\n", 0o600, False),
+        ("docs.md", "a line `-----BEGIN PRIVATE KEY-----`", 0o644, False),
+    ],
+)
+def test_secrets_stay(tmp_path: Path, name: str, text: str, mode: int, stays: bool) -> None:
+    write(tmp_path, {name: text}, mode)
+    assert staying(tmp_path) == ({name} if stays else set())
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["keys/id", "./keys/../keys/id", "~/robot/keys/id", "{root}/keys/id", "link/id", "..id"],
+)
+def test_private_keys_of_hosts_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    root = tmp_path / "robot"
+    write(root, {"keys/id": "SECRET", "..id": "SECRET", "robot.yaml": "x"})
+    (root / "link").symlink_to("keys")
+    os.link(root / "keys" / "id", root / "copy")
+    (tmp_path / "project").symlink_to(root)
+    key = Path(written.format(root=tmp_path / "project")).expanduser()
+    expected = {"..id"} if written == "..id" else {"keys/id", "copy"}
+    assert staying(tmp_path / "project", root / key, tmp_path / ".ssh" / "id") == expected
+    assert staying(root, root / "later") == {"later"}
+
+
+def test_rsync_copies_exactly_what_is_listed(tmp_path: Path) -> None:
+    if shutil.which("rsync") is None:
+        pytest.skip("rsync is not installed")
+    root, there = tmp_path / "robot", tmp_path / "there"
+    odd = [
+        "a b ",
+        "!x",
+        "#x",
+        "- x",
+        "a*b",
+        "[x]",
+        "q?",
+        "back\\slash",
+        "new\nline",
+        "ü",
+        "-x",
+        "ab",
+    ]
+    write(root, {f"sub/{name}": "x" for name in odd} | {f"{name}x": "x" for name in odd})
+    keys = [root / "sub" / name for name in odd[:-1]]
+    write(root, dict.fromkeys([".env", ".env.example", "sub/.env.local", "build/x"], "x"))
+    files = copied_files(root, keys)
+    patterns = "".join(f"{pattern}\0" for pattern in files.rsync_patterns)
+    write(there, {".venv/x": "", "sub/.env": "", "old": ""})
+    command = ["rsync", "-r", "--delete", "--from0", "--exclude-from=-", f"{root}/", str(there)]
+    subprocess.run(command, check=True, input=patterns, text=True, timeout=30)
+    copied = {str(path.relative_to(there)) for path in there.rglob("*") if path.is_file()}
+    assert set(files.copied) == {"sub/ab", ".env.example"} | {f"{name}x" for name in odd}
+    assert copied == {*files.copied, ".venv/x", "sub/.env"}  # what only the other computer has
+    assert not [pattern for pattern in files.rsync_patterns if not pattern.isprintable()]
+
+
+def test_files_that_cannot_be_read_are_skipped(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / ".gitignore")
+    os.mkfifo(tmp_path / "deploy.key")
+    (tmp_path / "loop").symlink_to("loop")
+    write(tmp_path, {"a": "x"})
+    assert copied_files(tmp_path).copied == ("a", "loop")
+
+
+def test_docker_reads_the_patterns_of_the_project_first(tmp_path: Path) -> None:
+    write(tmp_path, {".dockerignore": "# mine\nmaps\n!.env\n"})
+    patterns = list(docker_patterns(tmp_path))
+    assert patterns[:2] == ["maps", "!.env"]
+    assert {"**/.env", "!**/.env.example", "/build", "**/.git"} <= set(patterns[2:])
