@@ -59,9 +59,12 @@ class Loop(Scheduler):
         super().__init__(name, on_exception, kind, threads, clock)
         self._group_of: dict[object, SourceGroup] = {}  # by the entity that was added
         self._nodes: dict[Node, _ImplicitEntities] = {}
-        self._executor = NodeExecutor(self, lambda: None)
         # rcl has one callback per entity, so two threads must not add it to two groups.
         self._changing = threading.RLock()
+
+    @property
+    def _executor(self) -> NodeExecutor:
+        return NodeExecutor(self, lambda: None)
 
     def add_node(self, node: Node) -> None:
         """Serve the entities that rclpy creates for a node: parameter and logger services.

@@ -28,13 +28,16 @@ _MAX_FINAL_ROUNDS = 64  # of calls that other calls cause at shutdown
 
 
 class Scheduler(TurnTaking):
-    """Runs calls, timers, tasks and groups of sources. It runs once: start, then stop."""
+    """Runs calls, timers, tasks and groups of sources. It runs once: start, then stop.
+
+    A loop must have fewer than 30 attributes. Otherwise CPython gives each instance a dictionary of
+    its own, and each call gets slower.
+    """
 
     def __init__(
         self, name: str, on_exception: Report, kind: ExecutorKind, threads: int, clock: Clock
     ) -> None:
         super().__init__(name, on_exception, kind, threads, clock)
-        self._monotonic = clock.monotonic
         self._poller = poller_for(clock)
         self._timers = TimerQueue(clock)
         self._calls: deque[Callable[[], object]] = deque()
@@ -98,7 +101,7 @@ class Scheduler(TurnTaking):
     def _run_turn(self, turn: Turn) -> None:  # noqa: C901  a function for each part is slower
         """Serve calls, timers and groups until another thread has the turn or the loop stops."""
         timers, calls, poller = self._timers, self._calls, self._poller
-        monotonic = self._monotonic
+        monotonic = self.clock.monotonic
         groups, ready = self._groups, self._ready
         while self._turn is turn and not self._stopping:
             now_s = monotonic()
@@ -147,7 +150,7 @@ class Scheduler(TurnTaking):
                 return
 
     def _run_calls(self, turn: Turn) -> None:
-        calls, timers, monotonic = self._calls, self._timers, self._monotonic
+        calls, timers, monotonic = self._calls, self._timers, self.clock.monotonic
         until_s = monotonic() + _ROUND_S
         while True:  # including calls that calls add
             self._running = callback = calls.popleft()
@@ -163,7 +166,7 @@ class Scheduler(TurnTaking):
 
     def _serve_round(self, turn: Turn) -> None:  # noqa: C901  a function for each part is slower
         # Inlined from here to the handler: after a sleep, each further function is a cache miss.
-        ready, timers, monotonic = self._ready, self._timers, self._monotonic
+        ready, timers, monotonic = self._ready, self._timers, self.clock.monotonic
         until_s = monotonic() + _ROUND_S
         while True:
             self._running = group = ready.popleft()
