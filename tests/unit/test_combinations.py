@@ -181,6 +181,18 @@ connections:
     assert chosen(path, "robots=1") == ["robot_0", "tower"]
 
 
+def test_an_include_may_have_no_copy(tmp_path: Path) -> None:
+    text = """\
+system: fleet
+arguments: {robots: 1}
+include: [{file: part.yaml, for_each: {i: "${robots}"}, prefix: "robot_${i}_"}]
+nodes: {tower: {lifecycle: {depends_on: [robot_*_arm]}, on_activate: {log: started}}}
+"""
+    path = written(tmp_path, text, part="system: part\nnodes: {arm: {on_activate: {log: started}}}")
+    assert chosen(path, "robots=0") == ["tower"]
+    assert chosen(path) == ["robot_0_arm", "tower"]
+
+
 def test_an_argument_without_a_value_is_needed_to_run_only(tmp_path: Path) -> None:
     path = written(
         tmp_path,

@@ -91,7 +91,12 @@ def _items(
     substitution.grow(1, section)
     made = []
     for item in section.items:
-        for copy, body in _copies(item, substitution):
+        copies = _copies(item, substitution)
+        prefix = item.get("prefix") if isinstance(item, Mapping) else None
+        if not copies and isinstance(prefix, Scalar):  # the names of the nodes of an include
+            named = _without_copies("nodes", Entry(prefix, item))
+            left_out.append(replace(named, name=f"{named.name}*"))
+        for copy, body in copies:
             failed = failed_condition(body, copy)
             if failed is None:
                 made.append(copy.add(without_conditions(body), _DEPTH).tree)
