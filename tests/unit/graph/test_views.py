@@ -41,6 +41,18 @@ TALK = """
 """
 
 
+def test_namespaces_are_frames_and_one_that_holds_one_other_is_none() -> None:
+    text = """
+        system: nested
+        nodes:
+          one: {namespace: a/b/c}
+          two: {namespace: a/b/d}
+          three: {namespace: x/y/z}
+    """
+    clusters = {cluster.key: cluster.parent for cluster in drawn(text).clusters}
+    assert clusters == {"/a/b": "", "/a/b/c": "/a/b", "/a/b/d": "/a/b", "/x/y/z": ""}
+
+
 def test_a_timer_with_a_condition_promises_no_rate() -> None:
     text = TALK.replace("publish: {chatter", "when: count > 3, publish: {chatter")
     lines = arrows(drawn(text))

@@ -54,6 +54,22 @@ def sarif_log(diagnostics: list[Diagnostic]) -> dict[str, Any]:
     return log
 
 
+def test_sarif_has_the_places() -> None:
+    found = example()
+    for shown, result in zip(found, sarif_log(found)["runs"][0]["results"], strict=True):
+        spans = [shown.primary, *(label.span for label in shown.related)]
+        places = [*result["locations"], *result.get("relatedLocations", ())]
+        assert [place["physicalLocation"]["region"] for place in places] == [
+            {
+                "startLine": span.line,
+                "startColumn": span.column,
+                "endColumn": span.column + span.length,
+            }
+            for span in spans
+        ]
+        assert [place.get("id") for place in places] == [None, *range(1, len(places))]
+
+
 def test_sarif_has_the_level_and_the_hint() -> None:
     results = sarif_log(example())["runs"][0]["results"]
     assert [result["level"] for result in results] == ["error", "error", "note"]
