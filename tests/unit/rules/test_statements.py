@@ -60,12 +60,7 @@ def test_a_service_without_a_response(annotation: str, tmp_path: Path) -> None:
     wrong = right.replace("return response", "pass")
     [correct, [found]] = diagnostics_of(BEHAVIOR.system, [right, wrong], tmp_path)
     assert correct == []
-    message = "'on_reset' must return the response, but may end without a 'return'"
-    assert (found.message, found.hint, quoted(found)) == (
-        message,
-        "end it with 'return response'",
-        "on_reset",
-    )
+    assert (found.rule.name, quoted(found)) == ("missing-return", "on_reset")
 
 
 def test_a_comment_in_python_ignores_a_warning(tmp_path: Path) -> None:
