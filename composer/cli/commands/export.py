@@ -17,7 +17,7 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
 from composer.cli.support.results import as_json
-from composer.cli.support.system_arguments import Arguments, SystemName
+from composer.cli.support.system_arguments import Arguments, SystemName, declared_arguments
 from composer.cli.support.terminal import write
 
 if TYPE_CHECKING:
@@ -54,13 +54,15 @@ def export_launch(
 ) -> None:
     """Write a launch file that runs a system.
 
-    It has launch arguments for the namespace, simulated time and the log level, and ends with the
-    system. To run a system from a launch file of your own, use its action ComposeSystem.
+    It has the arguments of the system as launch arguments, and others for the namespace, simulated
+    time and the log level. It ends with the system. To run a system from a launch file of your own,
+    use its action ComposeSystem.
     """
     from composer.bridges.export.launch_file import launch_file
 
     declared, path, _ = exported_system(system, arguments)
-    write_output(launch_file(declared, path, output), output, replace=force)
+    text = launch_file(declared, declared_arguments(path), path, output)
+    write_output(text, output, replace=force)
 
 
 @export_app.command(
