@@ -59,7 +59,7 @@ def warnings(text: str) -> list[int]:
 def test_invalid_names_and_messages_are_skipped(hostile: Peer) -> None:
     started = {command: start(*command.split()) for command in COMMANDS}
     for command, part in COMMANDS.items():
-        expected = [1, int(command.startswith("ps"))]
+        expected = [1, int(command.startswith(("lifecycle", "graph", "ps")))]  # they read reports
         output, text = started[command].communicate(timeout=PATIENCE_S)
         assert started[command].returncode == 0, (command, text)
         if part not in output or warnings(text) != expected:  # a busy machine needs more time

@@ -70,7 +70,9 @@ def failed_node(on: Bench, process: Any, folder: Path, listener: Any) -> MemberN
     """Return a node that has failed, and that its process has not taken down yet."""
     model = next(n for n in system_of(TEXT, folder, detector=DETECTOR).nodes if n.process)
     nothing: Any = None
-    context = OutsideContext(on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO)
+    context = OutsideContext(
+        on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO, nodes={}
+    )
     node = MemberNode(model, process, context)
     report(on, node, "active")
     return node
