@@ -50,7 +50,9 @@ WORDS = [
 ]
 ENDS = "from to server clients"
 #: Maps whose values have keys of the user.
-FREE = frozenset({"variables", "state", "publish", "call", "respond", "set", "feedback", "result"})
+FREE = frozenset(
+    {"arguments", "variables", "state", "publish", "call", "respond", "set", "feedback", "result"}
+)
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +170,7 @@ def at(cursor: Cursor, entry: Entry) -> Cursor:
 
 
 def described_entries(tree: Tree) -> Iterator[Entry]:
-    """Yield the entries of a file, except those with names of variables and message fields."""
+    """Yield the entries of a file, except those whose names the user chooses."""
     if isinstance(tree, Sequence):
         for item in tree.items:
             yield from described_entries(item)

@@ -245,9 +245,8 @@ def shows_all_callbacks(text: str) -> bool:
     callbacks = json.loads(text)["callbacks"]
     rates = {callback["name"]: callback["calls_hz"] for callback in callbacks}
     # The timer 'step' is in another process.
-    return {callback["node"] for callback in callbacks} == set(NODES) and rates.get(
-        "step", 0.0
-    ) > 5.0
+    step_hz = rates.get("step") or 0.0  # None until it is known
+    return {callback["node"] for callback in callbacks} == set(NODES) and step_hz > 5.0
 
 
 def lists_all_callbacks(text: str) -> bool:
