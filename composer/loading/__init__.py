@@ -23,33 +23,29 @@ from composer.base.diagnostics import (
     shown,
 )
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import SourceFile, Span
+from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
-from composer.language.document import parse_bytes, read_document
-from composer.language.document.limits import MAX_ENTRIES
-from composer.language.expand import expand, missing_names
+from composer.language.document import parse_bytes
+from composer.language.expand import missing_names
 from composer.language.expand.arguments import read_declarations
-from composer.language.rules import MISSING_VARIABLE, TOO_LARGE
-from composer.language.schema import check_schema, kind_of, kinds
-from composer.language.schema.kinds import check_kind
-from composer.language.tree import Entry, LeftOut, Mapping, plain
-from composer.language.tree import Sequence as ListTree
+from composer.language.rules import MISSING_VARIABLE
+from composer.language.schema import kind_of, kinds
+from composer.language.tree import Entry, plain
 from composer.language.tree_values import word
 from composer.loading.combinations import (
+    MAX_VALUES,
     Checked,
     argument_combinations,
     chosen_values,
     joined_diagnostics,
     places_of,
 )
+from composer.loading.merging import Definitions, Document, Merged, merge, read, real_folder
 from composer.loading.reported import Identity, LoadResult, identity, may_be_included
 from composer.model import System
-from composer.model.assembly import NodeTypeFile, assemble, inherit
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.model.resolve.parameter_files import PARAMETER_SUBSTITUTION
-from composer.project import SETTINGS_FILE, Project
-from composer.project.node_types import NodeTypes, interface_folders
 from composer.project.settings import apply_rule_settings, check_rule_settings
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.analysis.subjects import joined, without_consequences
@@ -87,8 +83,8 @@ def load(
     files of one project: reading the interfaces takes most time.
     """
     parsed, diagnostics = read_overrides(overrides)
-    definitions = _Definitions.of(_real_folder(path), interfaces)
-    document = _read(path, shown)
+    definitions = Definitions.of(real_folder(path), interfaces)
+    document = read(path, shown)
     resolved = _resolve(document, definitions, parsed, diagnostics)
     [variant] = resolved.variants
     if not has_errors(variant.diagnostics):  # else a declaration may be wrong
@@ -125,13 +121,13 @@ def load_models(paths: Iterable[Path]) -> list[LoadResult]:
 def _resolve_files(paths: Iterable[Path], *, all_combinations: bool = False) -> list[_Resolved]:
     """Turn files into their models. Files of one project share its interfaces."""
     shared: dict[tuple[Path, ...], Interfaces] = {}
-    by_folder: dict[Path, _Definitions] = {}
+    by_folder: dict[Path, Definitions] = {}
     resolved = []
     for path in paths:
-        folder = _real_folder(path)
+        folder = real_folder(path)
         if folder not in by_folder:
-            by_folder[folder] = _Definitions.with_shared_interfaces(folder, shared)
-        document = _read(path)
+            by_folder[folder] = Definitions.with_shared_interfaces(folder, shared)
+        document = read(path)
         resolved.append(_resolve(document, by_folder[folder], all_combinations=all_combinations))
     return resolved
 
@@ -144,84 +140,35 @@ def load_bytes(
 
     All combinations of arguments that it allows are checked.
     """
-    document = _Document(*parse_bytes(content, shown))
-    definitions = _Definitions.of(_real_folder(folder / shown), interfaces)
+    document = Document(*parse_bytes(content, shown))
+    definitions = Definitions.of(real_folder(folder / shown), interfaces)
     return _check([_resolve(document, definitions, all_combinations=True)])[0]
-
-
-@dataclass(frozen=True, slots=True)
-class _Document:
-    """A file as a located tree."""
-
-    tree: Mapping | None
-    source: SourceFile
-    diagnostics: list[Diagnostic]
-
-
-@dataclass(frozen=True, slots=True)
-class _Definitions:
-    """The node types and interfaces that files in ``folder`` may refer to."""
-
-    folder: Path
-    project: Project
-    node_types: NodeTypes
-    interfaces: Interfaces
-
-    @classmethod
-    def of(cls, folder: Path, interfaces: Interfaces | None) -> _Definitions:
-        project = Project.at(folder)
-        if interfaces is None:
-            interfaces = Interfaces.load(interface_folders(project))
-        return cls(folder, project, NodeTypes.of(project), interfaces)
-
-    @classmethod
-    def with_shared_interfaces(
-        cls, folder: Path, shared: dict[tuple[Path, ...], Interfaces]
-    ) -> _Definitions:
-        """Return the definitions, with interfaces that other folders of the project share."""
-        project = Project.at(folder)
-        folders = interface_folders(project)
-        if folders not in shared:
-            shared[folders] = Interfaces.load(folders)
-        return cls(folder, project, NodeTypes.of(project), shared[folders])
-
-
-@dataclass(frozen=True, slots=True)
-class _Merged:
-    """A file merged with what it includes or extends.
-
-    ``tree`` is what ``compose config`` shows, ``expanded`` has values in place of variables.
-    ``folders`` and ``included`` are the folders of all files and the places that include them, by
-    file name. ``is_partial`` is true if nodes may be missing. ``left_out`` are entries that
-    conditions leave out.
-    """
-
-    tree: Mapping | None = None
-    expanded: Mapping | None = None
-    diagnostics: list[Diagnostic] = field(default_factory=list)
-    folders: Map[str, Path] = field(default_factory=dict)
-    included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
-    is_partial: bool = False
-    left_out: tuple[LeftOut, ...] = ()
 
 
 @dataclass(slots=True)
 class _Variant:
     """A file with one combination of its arguments. ``context`` is None if there is no model.
 
-    ``equal`` is a variant with the same tree: only that one is checked.
+    ``equal`` is a variant with the same tree: only that one is checked. ``values`` are the values
+    of the arguments, if there are several combinations.
     """
 
-    values: Map[str, str]
-    merged: _Merged
+    merged: Merged
     diagnostics: list[Diagnostic]
     context: Context | None = None
     equal: _Variant | None = None
+    values: Map[str, str] = field(default_factory=dict)
 
     @property
     def system(self) -> System | None:
         """The model."""
         return None if self.context is None else self.context.system
+
+    @property
+    def places(self) -> frozenset[str]:
+        """The places of all keys and values."""
+        tree = self.merged.expanded
+        return frozenset() if tree is None else frozenset(places_of(tree))
 
 
 @dataclass(slots=True)
@@ -232,13 +179,13 @@ class _Resolved:
     """
 
     source: SourceFile
-    definitions: _Definitions
+    definitions: Definitions
     variants: list[_Variant]
 
 
 def _resolve(
-    document: _Document,
-    definitions: _Definitions,
+    document: Document,
+    definitions: Definitions,
     overrides: Overrides | None = None,
     override_diagnostics: Iterable[Diagnostic] = (),
     *,
@@ -246,32 +193,47 @@ def _resolve(
 ) -> _Resolved:
     """Turn a file into its models: one, or one for each combination of its arguments."""
     given = overrides or Overrides()
-    chosen: list[dict[str, Entry]] = [dict(given.arguments)]
     diagnostics = [*document.diagnostics, *override_diagnostics]
-    is_system = document.tree is not None and kind_of(document.tree) == kinds.SYSTEM
-    if all_combinations and is_system and document.tree is not None:
-        chosen, problems = argument_combinations(document.tree, given.arguments)
-        diagnostics += problems
+    tree = document.tree
+    if tree is None or not all_combinations or kind_of(tree) != kinds.SYSTEM:
+        variant = _variant(document, definitions, given.arguments, diagnostics)
+        _resolve_model(variant, document.source, definitions, given)
+        return _Resolved(document.source, definitions, [variant])
+    combinations = argument_combinations(tree, given.arguments)
     variants: list[_Variant] = []
     by_tree: dict[str, _Variant] = {}
-    for arguments in chosen:
-        # Kind, includes or inheritance, arguments, copies and conditions, schema.
-        merged = _merge(document, definitions, arguments)
-        values = chosen_values(document.tree, arguments) if document.tree and is_system else {}
-        variant = _Variant(values, merged, [*diagnostics, *merged.diagnostics])
+    values = 0
+    for arguments in combinations.chosen:
+        variant = _variant(document, definitions, arguments, diagnostics)
         variants.append(variant)
-        if len(chosen) > 1:
-            text = repr(merged.expanded and plain(merged.expanded))
+        if combinations.count > 1:
+            variant.values = chosen_values(tree, arguments)
+            text = repr(variant.merged.expanded and plain(variant.merged.expanded))
             equal = by_tree.setdefault(text, variant)
             if equal is not variant:
                 variant.equal = equal
-                continue
-        _resolve_model(variant, document.source, definitions, given)
+        if variant.equal is None:
+            _resolve_model(variant, document.source, definitions, given)
+        values += variant.merged.values
+        if values > MAX_VALUES:
+            break
+    variants[0].diagnostics += combinations.unchecked(len(variants))
     return _Resolved(document.source, definitions, variants)
 
 
+def _variant(
+    document: Document,
+    definitions: Definitions,
+    arguments: Map[str, Entry],
+    diagnostics: Iterable[Diagnostic],
+) -> _Variant:
+    # Kind, includes or inheritance, arguments, copies and conditions, schema.
+    merged = merge(document, definitions, arguments)
+    return _Variant(merged, [*diagnostics, *merged.diagnostics])
+
+
 def _resolve_model(
-    variant: _Variant, source: SourceFile, definitions: _Definitions, overrides: Overrides
+    variant: _Variant, source: SourceFile, definitions: Definitions, overrides: Overrides
 ) -> None:
     """Add the model to a variant."""
     merged = variant.merged
@@ -301,7 +263,7 @@ def _resolve_model(
         )
 
 
-def _missing_arguments(document: _Document, given: Map[str, Entry]) -> Iterator[Diagnostic]:
+def _missing_arguments(document: Document, given: Map[str, Entry]) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each argument of a system without a value."""
     tree = document.tree
     if tree is None or kind_of(tree) != kinds.SYSTEM:
@@ -352,16 +314,14 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
             variant.diagnostics = joined(deduplicate(remaining, context.system.nodes))
             kept.update(map(identity, variant.diagnostics))
     follow_ups -= kept
-    diagnostics = joined_diagnostics(
-        [
-            Checked(
-                item.values,
-                (item.equal or item).diagnostics,
-                _places(item, is_needed=len(file.variants) > 1),
-            )
-            for item in file.variants
-        ]
-    )
+    diagnostics = first.diagnostics
+    if len(file.variants) > 1:
+        diagnostics = joined_diagnostics(
+            [
+                Checked(item.values, (item.equal or item).diagnostics, item.places)
+                for item in file.variants
+            ]
+        )
 
     # Selection: comments in the files and settings of the project silence diagnostics.
     included = {
@@ -394,86 +354,6 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
         frozenset(follow_ups),
         tuple(item.system for item in file.variants[1:] if item.system is not None),
     )
-
-
-def _places(variant: _Variant, *, is_needed: bool) -> frozenset[str]:
-    tree = variant.merged.expanded if is_needed else None
-    return frozenset() if tree is None else frozenset(places_of(tree))
-
-
-def _merge(document: _Document, definitions: _Definitions, arguments: Map[str, Entry]) -> _Merged:
-    tree = document.tree
-    if not tree:
-        return _Merged()
-    match kind_of(tree):
-        case kinds.SYSTEM if (surplus := _surplus_entry(tree)) is not None:
-            return _Merged(diagnostics=[surplus])
-        case kinds.SYSTEM:
-            return _merge_system(tree, document.source, definitions, arguments)
-        case kinds.NODE:
-            return _merge_node_type(tree, document.source, definitions)
-        case _:
-            problem = check_kind(tree, document.source)
-            return _Merged(diagnostics=[] if problem is None else [problem])
-
-
-def _merge_system(
-    tree: Mapping, source: SourceFile, definitions: _Definitions, arguments: Map[str, Entry]
-) -> _Merged:
-    # Each file is expanded and checked against the schema before it is merged.
-    assembly = assemble(tree, source, definitions.folder, definitions.project, arguments)
-    surplus = None if assembly.tree is None else _surplus_entry(assembly.tree)
-    if surplus is not None:
-        return _Merged(diagnostics=[*assembly.diagnostics, surplus])
-    return _Merged(
-        assembly.tree,
-        assembly.tree,
-        assembly.diagnostics,
-        assembly.folders,
-        assembly.included,
-        assembly.is_partial,
-        assembly.left_out,
-    )
-
-
-def _surplus_entry(tree: Mapping) -> Diagnostic | None:
-    """Return the diagnostic for a section with too many entries."""
-    for section in tree:
-        match section.value:
-            case Mapping(entries=entries) if len(entries) > MAX_ENTRIES:
-                span = entries[MAX_ENTRIES].key.span
-            case ListTree(items=items) if len(items) > MAX_ENTRIES:
-                span = items[MAX_ENTRIES].span
-            case _:
-                continue
-        message = f"'{shown(section.name)}' has more than {MAX_ENTRIES:,} entries"
-        return Diagnostic(TOO_LARGE, message, span)
-    return None
-
-
-def _merge_node_type(tree: Mapping, source: SourceFile, definitions: _Definitions) -> _Merged:
-    file = NodeTypeFile(definitions.folder / Path(source.path).name, source, tree)
-    inherited = inherit(file)
-    if inherited.tree is None:
-        return _Merged(diagnostics=inherited.diagnostics)
-    expanded, found, _ = expand(inherited.tree, {})
-    diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
-    return _Merged(inherited.tree, expanded, diagnostics, inherited.folders)
-
-
-def _read(path: Path, shown: str | None = None) -> _Document:
-    tree, source, diagnostics = read_document(path, shown)
-    if path.name == SETTINGS_FILE:  # its diagnostics are those of the project
-        tree, diagnostics = None, []
-    return _Document(tree, source, diagnostics)
-
-
-def _real_folder(path: Path) -> Path:
-    """Return the folder of a file; of a symbolic link, the folder of its target."""
-    try:
-        return path.resolve().parent
-    except (OSError, RuntimeError, ValueError):  # reported when the file is read
-        return Path.cwd()
 
 
 def gives_same_model(result: LoadResult, text: str) -> bool:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import combinations, islice, product
 from math import prod
 
 from composer.base.diagnostics import Diagnostic, Severity, shown
 from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.language.expand.arguments import Declared, read_declarations
 from composer.language.rules import TOO_LARGE, UNUSED_DECLARATION
 from composer.language.schema.kinds import SYSTEM
@@ -25,6 +26,8 @@ from composer.rules.connections import PUBLISHER_WITHOUT_SUBSCRIPTION
 from composer.rules.parameters import UNMATCHED_PARAMETERS
 
 MAX_COMBINATIONS = 64
+#: Keys and values to read for all combinations together: of a large system, fewer are checked.
+MAX_VALUES = 200_000
 _MAX_NAMED = 3  # arguments in one message
 #: Rules about a missing use. A use in any combination is a use.
 _RULES_ABOUT_USES = frozenset(
@@ -35,41 +38,57 @@ _RULES_ABOUT_USES = frozenset(
 Arguments = Mapping[str, Entry]
 
 
-def argument_combinations(
-    tree: MapTree, given: Arguments
-) -> tuple[list[dict[str, Entry]], list[Diagnostic]]:
-    """Return the combinations of arguments to check, with those that are ``given`` in each.
+@dataclass(frozen=True, slots=True)
+class Combinations:
+    """The combinations of arguments to check, those with the fewest changes of defaults first.
 
-    Of too many combinations, each value is in one of those returned, and a diagnostic says so.
+    ``count`` is the number of all combinations that the system allows, ``values`` the number of
+    other values than the defaults, and ``span`` the first argument that has several.
+    """
+
+    chosen: Sequence[Mapping[str, Entry]]
+    count: int
+    values: int
+    span: Span | None
+
+    def unchecked(self, checked: int) -> Iterator[Diagnostic]:
+        """Yield what is not checked, if only the first ones were ``checked``."""
+        if checked == self.count or self.span is None:
+            return
+        message = f"the arguments have {self.count:,} combinations"
+        if self.count > MAX_COMBINATIONS and checked > self.values:
+            message += (
+                f", more than {MAX_COMBINATIONS}: each value is only checked with the defaults of"
+                " the others"
+            )
+        else:
+            message += f", too many for a system of this size: only {checked} of them are checked"
+        yield Diagnostic(replace(TOO_LARGE, severity=Severity.INFO), message, self.span)
+
+
+def argument_combinations(tree: MapTree, given: Arguments) -> Combinations:
+    """Return the combinations of arguments, with those that are ``given`` in each.
+
+    Of too many combinations, those in which one argument does not have its default are chosen.
     """
     declared = read_declarations(tree, SYSTEM) or {}
-    open_names = [
-        name for name, item in declared.items() if item.alternatives and name not in given
-    ]
-    values = [_values(declared[name]) for name in open_names]
+    names = [name for name, item in declared.items() if item.alternatives and name not in given]
+    values = [_values(declared[name]) for name in names]
     count = prod(map(len, values))
-    if count <= MAX_COMBINATIONS:
-        chosen: Iterable[Sequence[Scalar | None]] = product(*values)
-        problems = []
-    else:
-        chosen = _each_value_once(values)
-        message = (
-            f"the arguments have {count:,} combinations, more than {MAX_COMBINATIONS}: each value"
-            " is only checked with the defaults of the others"
-        )
-        span = declared[open_names[0]].key.span
-        problems = [Diagnostic(replace(TOO_LARGE, severity=Severity.INFO), message, span)]
-    return [
+    changes = len(names) if count <= MAX_COMBINATIONS else 1
+    chosen = [
         {
             **given,
             **{
                 name: Entry(declared[name].key, value)
-                for name, value in zip(open_names, combination, strict=True)
+                for name, value in zip(names, combination, strict=True)
                 if value is not None
             },
         }
-        for combination in chosen
-    ], problems
+        for combination in islice(_with_changes(values, changes), MAX_COMBINATIONS)
+    ]
+    others = sum(len(choices) - 1 for choices in values)
+    return Combinations(chosen, count, others, declared[names[0]].key.span if names else None)
 
 
 def _values(declared: Declared) -> list[Scalar | None]:
@@ -79,12 +98,19 @@ def _values(declared: Declared) -> list[Scalar | None]:
     return [None, *(item for item in declared.alternatives if item != declared.value)]
 
 
-def _each_value_once(values: Sequence[Sequence[Scalar | None]]) -> Iterator[list[Scalar | None]]:
+def _with_changes(
+    values: Sequence[Sequence[Scalar | None]], most: int
+) -> Iterator[list[Scalar | None]]:
+    """Yield the combinations in which at most some arguments do not have their first value."""
     first = [choices[0] for choices in values]
-    yield first
-    for index, choices in enumerate(values):
-        for value in choices[1:]:
-            yield [*first[:index], value, *first[index + 1 :]]
+    several = [index for index, choices in enumerate(values) if len(choices) > 1]
+    for number in range(min(most, len(several)) + 1):
+        for changed in combinations(several, number):
+            for others in product(*(values[index][1:] for index in changed)):
+                combination = list(first)
+                for index, value in zip(changed, others, strict=True):
+                    combination[index] = value
+                yield combination
 
 
 def chosen_values(tree: MapTree, arguments: Arguments) -> dict[str, str]:
@@ -128,9 +154,6 @@ def joined_diagnostics(checked: Sequence[Checked]) -> list[Diagnostic]:
 
     A diagnostic that the first combination does not have names the arguments with which it appears.
     """
-    first, *others = checked
-    if not others:
-        return list(first.diagnostics)
     having: dict[Identity, list[int]] = {}
     samples: dict[Identity, list[Diagnostic]] = {}
     for number, item in enumerate(checked):
@@ -175,7 +198,8 @@ def _named(diagnostic: Diagnostic, checked: Sequence[Checked], having: Sequence[
             if all(item.values.get(name) == value for name, value in chosen.items())
         )
 
-    names = _smallest(tuple(sample), implies)
+    varying = (name for name in sample if len({item.values.get(name) for item in checked}) > 1)
+    names = _smallest(tuple(varying), implies)
     text = ", ".join(f"{shown(name)}={shown(sample[name])}" for name in names)
     return replace(diagnostic, message=f"{diagnostic.message} (with {text})")
 

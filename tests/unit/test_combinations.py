@@ -226,6 +226,19 @@ def test_of_too_many_combinations_each_value_is_checked(tmp_path: Path) -> None:
     assert all(f"(with {name}=true)" in text for name, text in zip(names, others, strict=True))
 
 
+def test_of_a_large_system_fewer_combinations_are_checked(tmp_path: Path) -> None:
+    many = "".join(
+        f"  n{number}: {{unless: a, on_activate: {{log: x}}}}\n" for number in range(4000)
+    )
+    names = "abcdef"
+    arguments = "".join(f"  {name}: false\n" for name in names)
+    wrong = "".join(f"  {name}: {{if: {name}, executor: fast}}\n" for name in names)
+    text = f"system: s\narguments:\n{arguments}nodes:\n{wrong}{many}"
+    first, *others = messages_in(tmp_path, text)
+    assert first.startswith("too-large: the arguments have 64 combinations, too many for a system")
+    assert 0 < len(others) < len(names)
+
+
 CONDITIONS = (
     "", "if: a, ", "unless: a, ", "if: b == 'y', ", "if: a and b == 'x', ", "unless: b == 'z', "
 )  # fmt: skip

@@ -136,6 +136,17 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
     "misspelt types": ("nodes:\n", "  n#: {publishers: {t: {type: std_msgs/msg/Flot#}}}\n", ""),
     "state": ("nodes:\n  x:\n    state:\n", "      a#: 1\n", ""),
     "executors": ("nodes: {x: {}}\nexecutors:\n", "  e#: {}\n", ""),
+    "combinations": (
+        "arguments: {a: false, b: false, c: false, d: false, e: false, f: false}\nnodes:\n",
+        "  n#: {if: a or f, executor: fast}\n",
+        "",
+    ),
+    "choices": (
+        "arguments: {a: {choices: [",
+        "c#, ",
+        "c]}}\nnodes: {n: {on_activate: {log: '${a}'}}}\n",
+    ),
+    "arguments": ("nodes: {x: {executor: fast}}\narguments:\n", "  a#: {choices: [x]}\n", ""),
     "one topic": (
         "nodes:\n",
         f"  n#: {{publishers: {{p: {{{STRING}, topic: /t}}}}, "

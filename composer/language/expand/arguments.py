@@ -1,12 +1,12 @@
 """Declarations of the arguments of a system, and of the variables of a node type.
 
-Arguments:
-      lidar: {choices: [velodyne, ouster], default: velodyne, description: The driver to start.}
-      simulation: false
+For example, in ``arguments``::
+
+    lidar: {choices: [velodyne, ouster], default: velodyne, description: The driver to start.}
+    simulation: false
 
 A map declares; any other value is a default. The type is declared, or follows from the default and
 the choices. A bool is also written as in launch files: ``True``, ``1``, ``'false'``.
-
 """
 
 from __future__ import annotations

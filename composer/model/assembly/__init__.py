@@ -14,6 +14,7 @@ from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.document.limits import Stopped
+from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
 from composer.language.tree import Entry, LeftOut, Mapping
 from composer.language.tree_values import entries, is_opaque
@@ -36,7 +37,8 @@ class AssembledSystem:
 
     ``folders`` are the folders of all files and ``included`` the places that include them, by file
     name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
-    ``diagnostics``. ``left_out`` are entries that conditions leave out.
+    ``diagnostics``. ``left_out`` are entries that conditions leave out, ``values`` the number of
+    keys and values of all files, as written and as merged.
     """
 
     tree: Mapping | None
@@ -45,6 +47,7 @@ class AssembledSystem:
     folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()
+    values: int = 0
 
 
 def assemble(
@@ -74,5 +77,11 @@ def assemble(
     )
     included = {path: tuple(places.values()) for path, places in resolver.included.items()}
     return AssembledSystem(
-        merged, diagnostics, is_partial, resolver.folders, included, resolver.left_out
+        merged,
+        diagnostics,
+        is_partial,
+        resolver.folders,
+        included,
+        resolver.left_out,
+        resolver.values + measure(merged).values,
     )

@@ -38,7 +38,8 @@ class IncludeResolver:
 
     ``is_partial`` is true if an included file is unavailable. ``folders`` are the folders of all
     files and ``included`` the places that include them, each once, by file name. ``left_out`` are
-    the entries that conditions leave out of the file that was merged last.
+    the entries that conditions leave out of the file that was merged last, ``values`` the number of
+    keys and values of all files as written, counted each time that they are merged.
     """
 
     reader: IncludeReader
@@ -48,6 +49,7 @@ class IncludeResolver:
     folders: dict[str, Path] = field(default_factory=dict)
     included: dict[str, dict[str, Span]] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()
+    values: int = 0
     _stack: list[_Frame] = field(default_factory=list)
 
     def merge(self, file: SystemFile, arguments: dict[str, Entry]) -> Mapping:
@@ -56,6 +58,7 @@ class IncludeResolver:
         Raises Stopped.
         """
         self.folders[file.source.path] = file.path.parent
+        self.values += measure(file.tree).values
         tree, misspelled = with_intended_sections(file.tree, SYSTEM)
         self.diagnostics += misspelled
         expanded, found, left_out = expand(tree, arguments)

@@ -1,0 +1,159 @@
+"""Files before they become models: read, merged with what they include or extend, and expanded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Map
+from dataclasses import field
+from pathlib import Path
+
+from composer.base.diagnostics import Diagnostic, shown
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import SourceFile, Span
+from composer.interfaces import Interfaces
+from composer.language.document import read_document
+from composer.language.document.limits import MAX_ENTRIES
+from composer.language.expand import expand
+from composer.language.rules import TOO_LARGE
+from composer.language.schema import check_schema, kind_of, kinds
+from composer.language.schema.kinds import check_kind
+from composer.language.tree import Entry, LeftOut, Mapping
+from composer.language.tree import Sequence as ListTree
+from composer.model.assembly import NodeTypeFile, assemble, inherit
+from composer.project import SETTINGS_FILE, Project
+from composer.project.node_types import NodeTypes, interface_folders
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A file as a located tree."""
+
+    tree: Mapping | None
+    source: SourceFile
+    diagnostics: list[Diagnostic]
+
+
+@dataclass(frozen=True, slots=True)
+class Definitions:
+    """The node types and interfaces that files in ``folder`` may refer to."""
+
+    folder: Path
+    project: Project
+    node_types: NodeTypes
+    interfaces: Interfaces
+
+    @classmethod
+    def of(cls, folder: Path, interfaces: Interfaces | None) -> Definitions:
+        """Return the definitions; without ``interfaces``, those of the project are read."""
+        project = Project.at(folder)
+        if interfaces is None:
+            interfaces = Interfaces.load(interface_folders(project))
+        return cls(folder, project, NodeTypes.of(project), interfaces)
+
+    @classmethod
+    def with_shared_interfaces(
+        cls, folder: Path, shared: dict[tuple[Path, ...], Interfaces]
+    ) -> Definitions:
+        """Return the definitions, with interfaces that other folders of the project share."""
+        project = Project.at(folder)
+        folders = interface_folders(project)
+        if folders not in shared:
+            shared[folders] = Interfaces.load(folders)
+        return cls(folder, project, NodeTypes.of(project), shared[folders])
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """A file merged with what it includes or extends.
+
+    ``tree`` is what ``compose config`` shows, ``expanded`` has values in place of variables.
+    ``folders`` and ``included`` are the folders of all files and the places that include them, by
+    file name. ``is_partial`` is true if nodes may be missing. ``left_out`` are entries that
+    conditions leave out. ``values`` is the number of keys and values that were read and made.
+    """
+
+    tree: Mapping | None = None
+    expanded: Mapping | None = None
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    folders: Map[str, Path] = field(default_factory=dict)
+    included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+    is_partial: bool = False
+    left_out: tuple[LeftOut, ...] = ()
+    values: int = 0
+
+
+def read(path: Path, shown: str | None = None) -> Document:
+    """Return a file as a tree; ``shown`` is its name in diagnostics."""
+    tree, source, diagnostics = read_document(path, shown)
+    if path.name == SETTINGS_FILE:  # its diagnostics are those of the project
+        tree, diagnostics = None, []
+    return Document(tree, source, diagnostics)
+
+
+def real_folder(path: Path) -> Path:
+    """Return the folder of a file; of a symbolic link, the folder of its target."""
+    try:
+        return path.resolve().parent
+    except (OSError, RuntimeError, ValueError):  # reported when the file is read
+        return Path.cwd()
+
+
+def merge(document: Document, definitions: Definitions, arguments: Map[str, Entry]) -> Merged:
+    """Return a file with what it includes or extends, and its ``arguments`` in place."""
+    tree = document.tree
+    if not tree:
+        return Merged()
+    match kind_of(tree):
+        case kinds.SYSTEM if (surplus := _surplus_entry(tree)) is not None:
+            return Merged(diagnostics=[surplus])
+        case kinds.SYSTEM:
+            return _merge_system(tree, document.source, definitions, arguments)
+        case kinds.NODE:
+            return _merge_node_type(tree, document.source, definitions)
+        case _:
+            problem = check_kind(tree, document.source)
+            return Merged(diagnostics=[] if problem is None else [problem])
+
+
+def _merge_system(
+    tree: Mapping, source: SourceFile, definitions: Definitions, arguments: Map[str, Entry]
+) -> Merged:
+    # Each file is expanded and checked against the schema before it is merged.
+    assembly = assemble(tree, source, definitions.folder, definitions.project, arguments)
+    surplus = None if assembly.tree is None else _surplus_entry(assembly.tree)
+    if surplus is not None:
+        return Merged(diagnostics=[*assembly.diagnostics, surplus])
+    return Merged(
+        assembly.tree,
+        assembly.tree,
+        assembly.diagnostics,
+        assembly.folders,
+        assembly.included,
+        assembly.is_partial,
+        assembly.left_out,
+        assembly.values,
+    )
+
+
+def _surplus_entry(tree: Mapping) -> Diagnostic | None:
+    """Return the diagnostic for a section with too many entries."""
+    for section in tree:
+        match section.value:
+            case Mapping(entries=entries) if len(entries) > MAX_ENTRIES:
+                span = entries[MAX_ENTRIES].key.span
+            case ListTree(items=items) if len(items) > MAX_ENTRIES:
+                span = items[MAX_ENTRIES].span
+            case _:
+                continue
+        message = f"'{shown(section.name)}' has more than {MAX_ENTRIES:,} entries"
+        return Diagnostic(TOO_LARGE, message, span)
+    return None
+
+
+def _merge_node_type(tree: Mapping, source: SourceFile, definitions: Definitions) -> Merged:
+    file = NodeTypeFile(definitions.folder / Path(source.path).name, source, tree)
+    inherited = inherit(file)
+    if inherited.tree is None:
+        return Merged(diagnostics=inherited.diagnostics)
+    expanded, found, _ = expand(inherited.tree, {})
+    diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
+    return Merged(inherited.tree, expanded, diagnostics, inherited.folders)
