@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import re
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
@@ -31,17 +30,6 @@ from launch.actions import (
 )
 from launch.events import Shutdown as ShutdownEvent
 from launch.launch_description_sources import AnyLaunchDescriptionSource
-from launch.substitutions import (
-    AndSubstitution,
-    EqualsSubstitution,
-    LaunchConfiguration,
-    NotEqualsSubstitution,
-    NotSubstitution,
-    OrSubstitution,
-    PythonExpression,
-    TextSubstitution,
-)
-from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros.actions import (
     ComposableNodeContainer,
@@ -50,8 +38,10 @@ from launch_ros.actions import (
     Node,
 )
 from launch_ros.actions.load_composable_nodes import get_composable_node_load_request
+from rclpy.parameter import parameter_value_to_python
 
 from composer.base.source import shown_path
+from composer.launch.comparisons import compared, text_of
 from composer.launch.parameter_values import parameter_values
 from composer.launch.variants import all_visits
 
@@ -59,12 +49,6 @@ _UNKNOWN_NAME = "<node_name_unspecified>"
 #: The name that launch gives to the module of each launch file.
 _LAUNCH_MODULE = "python_launch_file"
 _MAXIMUM_ENTITIES = 100_000
-#: The fields of rcl_interfaces/msg/ParameterValue, by its type.
-_VALUE_FIELDS = (
-    "",
-    *("bool_value", "integer_value", "double_value", "string_value", "byte_array_value"),
-    *("bool_array_value", "integer_array_value", "double_array_value", "string_array_value"),
-)
 #: What launch waits for after a signal by default, in seconds.
 _SIGNAL_TIMEOUT_S = 5.0
 
@@ -114,7 +98,7 @@ class Visitor:
         condition = getattr(entity, "condition", None)
         if condition is None:
             return True
-        for name, text in _compared(condition, self._context):
+        for name, text in compared(condition, self._context):
             self.compared.setdefault(name, []).append(text)
         return bool(condition.evaluate(self._context))
 
@@ -230,56 +214,13 @@ class Visitor:
         return " ".join(self._text(word) for word in entity.cmd)
 
     def _text(self, value: Any) -> str:
-        return _text_of(value, self._context)
+        return text_of(value, self._context)
 
 
 def _described(argument: DeclareLaunchArgument) -> str:
     """Return the description of an argument, without what launch adds to it."""
     text = argument.description.partition("One of: [")[0].strip()
     return "" if text == "no description given" else text
-
-
-#: A comparison of an argument, as ``${name}``, with a constant, in an expression of Python.
-_COMPARISONS = (
-    re.compile(r"""\$\{(?P<name>\w+)\}['"\s]*[!=]=\s*(['"])(?P<text>[^'"$]*)\2"""),
-    re.compile(r"""(['"])(?P<text>[^'"$]*)\1\s*[!=]=['"\s]*\$\{(?P<name>\w+)\}"""),
-)
-
-
-def _compared(condition: Any, context: LaunchContext) -> Iterator[tuple[str, str]]:
-    """Yield the arguments that a condition compares with constants, and the constants."""
-    for kind in ("LaunchConfigurationEquals", "LaunchConfigurationNotEquals"):
-        name = getattr(condition, f"_{kind}__launch_configuration_name", None)
-        if name is not None:
-            yield str(name), _text_of(getattr(condition, f"_{kind}__expected_value"), context)
-    predicate = getattr(condition, "_predicate_expression", None)
-    inner = getattr(condition, "_IfCondition__predicate_expression", None)
-    inner = inner or getattr(condition, "_UnlessCondition__predicate_expression", None)
-    text = _as_code(predicate or inner or [])
-    for pattern in _COMPARISONS:
-        for match in pattern.finditer(text):
-            yield match["name"], match["text"]
-
-
-def _as_code(substitutions: Iterable[Any]) -> str:
-    """Return substitutions as text, with ``${name}`` for arguments."""
-    return "".join(map(_piece, substitutions))
-
-
-def _piece(substitution: Any) -> str:
-    match substitution:
-        case TextSubstitution():
-            return str(substitution.text)
-        case LaunchConfiguration():
-            return f"${{{_as_code(substitution.variable_name)}}}"
-        case PythonExpression():
-            return _as_code(substitution.expression)
-        case EqualsSubstitution() | NotEqualsSubstitution():
-            sides = map(_as_code, (substitution.left, substitution.right))
-            return " == ".join(text if "${" in text else f"'{text}'" for text in sides)
-        case AndSubstitution() | OrSubstitution():
-            return f"{_as_code(substitution.left)} and {_as_code(substitution.right)}"
-    return _as_code(substitution.value) if isinstance(substitution, NotSubstitution) else ""
 
 
 def _process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
@@ -290,7 +231,7 @@ def _process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
     given = _attribute(node, "on_exit")
     on_exit = list(given) if isinstance(given, list | tuple) else [given] if given else []
     found: dict[str, Any] = {
-        "cwd": _text_of(node.cwd, context) if node.cwd else None,
+        "cwd": text_of(node.cwd, context) if node.cwd else None,
         "ends_launch": any(map(_is_shutdown, on_exit)),
         "left_out": list(_left_out_options(node, context, on_exit)),
     }
@@ -299,20 +240,13 @@ def _process_options(node: Any, context: LaunchContext) -> dict[str, Any]:
         context, _attribute(node, "respawn") or False, bool
     ):
         delay = _attribute(node, "respawn_delay")
-        found["respawn_delay"] = 0.0 if delay is None else float(_text_of(delay, context))
+        found["respawn_delay"] = 0.0 if delay is None else float(text_of(delay, context))
         found["respawn_max_retries"] = -1 if retries is None else int(retries)
     for name in ("sigterm_timeout", "sigkill_timeout"):
-        timeout_s = float(_text_of(_attribute(node, name), context) or _SIGNAL_TIMEOUT_S)
+        timeout_s = float(text_of(_attribute(node, name), context) or _SIGNAL_TIMEOUT_S)
         if timeout_s != _SIGNAL_TIMEOUT_S:
             found[name] = timeout_s
     return found
-
-
-def _text_of(value: Any, context: LaunchContext) -> str:
-    """Return a text, a number or substitutions as a text."""
-    if isinstance(value, int | float):
-        return str(value)
-    return str(perform_substitutions(context, normalize_to_list_of_substitutions(value or "")))
 
 
 def _attribute(node: Any, name: str) -> Any:
@@ -321,7 +255,7 @@ def _attribute(node: Any, name: str) -> Any:
 
 
 def _left_out_options(node: Any, context: LaunchContext, on_exit: Iterable[Any]) -> Iterator[str]:
-    prefix = _text_of(node.process_description.prefix, context)
+    prefix = text_of(node.process_description.prefix, context)
     if prefix:
         yield f"prefix: {prefix}"
     if perform_typed_substitution(context, node.shell, bool):
@@ -354,10 +288,11 @@ def _cause(error: BaseException) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return the value in a message of a parameter."""
-    name = _VALUE_FIELDS[value.type]
-    found: Any = getattr(value, name) if name else None
-    return list(found) if name.endswith("array_value") else found
+    """Return the value in a message of a parameter; byte strings become numbers."""
+    found = parameter_value_to_python(value)
+    if isinstance(found, list):
+        return [item[0] if isinstance(item, bytes) else item for item in found]
+    return found
 
 
 def _components(action: Any) -> Iterable[Any]:
