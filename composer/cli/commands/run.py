@@ -32,7 +32,6 @@ from composer.cli.support.options import (
     finite,
     given_options,
 )
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import (
     announce_discovery,
     require_interfaces,
@@ -43,9 +42,8 @@ from composer.cli.support.system_arguments import (
     Arguments,
     ShowWarnings,
     SystemName,
-    declared_arguments,
+    print_arguments,
     runnable_system,
-    system_file,
 )
 from composer.cli.support.terminal import say, write
 
@@ -205,11 +203,10 @@ def run(
     --fail-on-error in tests.
     """
     if help_arguments:
-        _print_arguments(system)
+        print_arguments(system)
         return
-    if await_processes and process is not None:
-        raise UsageError("--await-processes cannot be used with --process, which starts no other")
-    _check_time(time, run_for, is_observed=wait or dashboard or process is not None)
+    is_part = process is not None
+    _check_options(time, run_for, await_processes and is_part, wait or dashboard or is_part)
     from composer.cli.support.c_streams import C_STREAMS
 
     C_STREAMS.redirect()  # before libraries of ROS are loaded
@@ -234,6 +231,8 @@ def run(
             update_typings(runnable.result.project)
     declared = runnable.system
     member = None if process is None else _member(declared, process)
+    if member is not None:
+        os.environ.update({name.value: value for name, value in member.environment})
     part, up, down = _planned(declared, member, autostart)
     if dry_run:
         if up.steps:
@@ -277,34 +276,14 @@ def run(
         raise typer.Exit(outcome.exit_code)
 
 
-def _print_arguments(text: str) -> None:
-    """Print the arguments of a system, as 'ros2 launch --show-args' does."""
-    from composer.language.tree import plain
-    from composer.language.tree_values import word
-
-    declared = declared_arguments(system_file(text))
-    if not declared:
-        say(f"'{text}' has no arguments")
-    for name, argument in declared.items():
-        kind = f" ({argument.type})" if argument.type else ""
-        default = "needs a value"
-        if argument.value is not None:
-            default = f"default: {as_json(plain(argument.value))}"
-        choices = ", ".join(word(item) for item in argument.choices)
-        listed = f"; one of: {choices}" if choices else ""
-        write(f"{name}{kind}: {argument.description}".rstrip(": "))
-        write(f"    {default}{listed}")
-
-
 def _member(system: System, name: str) -> Process:
-    """Return a process of the system by its name, and set its environment variables."""
+    """Return a process of the system by its name."""
     from composer.base.diagnostics import suggestion
 
     found = {process.name.value: process for process in system.processes}
     if name not in found:
         hint = suggestion(name, list(found)) or "the system has no 'processes'"
         raise UsageError(f"'{name}' is not a process of system '{system.name}'", hint=hint)
-    os.environ.update({key.value: value for key, value in found[name].environment})
     return found[name]
 
 
@@ -406,8 +385,12 @@ def _options(
     )
 
 
-def _check_time(time: Time, run_for: float | None, *, is_observed: bool) -> None:
-    """Raise UsageError for options that have no meaning in virtual time."""
+def _check_options(
+    time: Time, run_for: float | None, awaits_in_part: bool, is_observed: bool
+) -> None:
+    """Raise UsageError for options that have no meaning together."""
+    if awaits_in_part:
+        raise UsageError("--await-processes cannot be used with --process, which starts no other")
     if time is Time.REAL:
         return
     if run_for is None:

@@ -13,7 +13,8 @@ import typer
 
 from composer.cli.support.completion import complete_running_system, silent
 from composer.cli.support.errors import FAILED, CommandError, UsageError
-from composer.cli.support.terminal import say, say_raw, use_color
+from composer.cli.support.results import as_json
+from composer.cli.support.terminal import say, say_raw, use_color, write
 
 if TYPE_CHECKING:
     from composer.language.expand.arguments import Declared
@@ -109,6 +110,25 @@ def declared_arguments(path: Path) -> dict[str, Declared]:
 
     tree, _, _ = read_document(path)
     return {} if tree is None else read_declarations(tree, "system") or {}
+
+
+def print_arguments(text: str) -> None:
+    """Print the arguments of a system, as 'ros2 launch --show-args' does."""
+    from composer.language.tree import plain
+    from composer.language.tree_values import word
+
+    declared = declared_arguments(system_file(text))
+    if not declared:
+        say(f"'{text}' has no arguments")
+    for name, argument in declared.items():
+        kind = f" ({argument.type})" if argument.type else ""
+        default = "needs a value"
+        if argument.value is not None:
+            default = f"default: {as_json(plain(argument.value))}"
+        choices = ", ".join(word(item) for item in argument.choices)
+        listed = f"; one of: {choices}" if choices else ""
+        write(f"{name}{kind}: {argument.description}".rstrip(": "))
+        write(f"    {default}{listed}")
 
 
 def system_file(text: str) -> Path:

@@ -50,6 +50,8 @@ class Broken(Node):
 
 
 class Slow(Talker):
+    """Takes longer than a second, after which other requests are sent again."""
+
     def __init__(self, **options: Any) -> None:
         time.sleep(1.2)
         super().__init__(**options)
