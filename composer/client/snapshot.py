@@ -105,7 +105,7 @@ class GraphObserver:
     def parameters(
         self, nodes: Collection[str], deadline: Deadline
     ) -> dict[str, dict[str, Plain] | None]:
-        """Return the parameters of those of the nodes that have any, None without a response."""
+        """Return the parameters of the nodes that have any, None without a response."""
         responses = self._responses(nodes, "list_parameters", ListParameters, deadline)
         names = {
             f"{node}/get_parameters": sorted(response.result.names)

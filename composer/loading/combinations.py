@@ -128,7 +128,7 @@ def chosen_values(tree: MapTree, arguments: Arguments) -> dict[str, str]:
 class Checked:
     """What is reported with one combination of arguments, ``values``.
 
-    ``places`` are those of all keys and values of the system.
+    ``places`` are the places of all keys and values of the system.
     """
 
     values: Mapping[str, str]

@@ -43,7 +43,7 @@ class Definitions:
 
     @classmethod
     def of(cls, folder: Path, interfaces: Interfaces | None) -> Definitions:
-        """Return the definitions; without ``interfaces``, those of the project are read."""
+        """Return the definitions. Interfaces are read unless they are given."""
         project = Project.at(folder)
         if interfaces is None:
             interfaces = Interfaces.load(interface_folders(project))
@@ -84,7 +84,7 @@ class Merged:
 def read(path: Path, shown: str | None = None) -> Document:
     """Return a file as a tree; ``shown`` is its name in diagnostics."""
     tree, source, diagnostics = read_document(path, shown)
-    if path.name == SETTINGS_FILE:  # its diagnostics are those of the project
+    if path.name == SETTINGS_FILE:  # the project reports its diagnostics
         tree, diagnostics = None, []
     return Document(tree, source, diagnostics)
 

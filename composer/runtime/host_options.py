@@ -32,7 +32,7 @@ class HostOptions:
     return from the middleware and, with a minute to spare, the bring-up and a run of ``run_for_s``.
     ``ends_process`` promises that the process ends after the run, by ``os._exit`` if the outcome
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
-    by ``clock``; by default, from when the host is created. ``clock`` is that of the whole system.
+    by ``clock``; by default, from when the host is created. ``clock`` is the clock of the system.
     """
 
     run_for_s: float | None = None

@@ -13,7 +13,7 @@ from composer.language.tree import Scalar, plain
 from composer.language.tree_values import word
 from composer.model import System
 
-#: The arguments of every such launch file, which hide those of the system with the same names.
+#: The arguments of every such launch file. They hide arguments of the system with the same names.
 _OF_LAUNCH = frozenset({"log_level", "namespace", "use_sim_time"})
 
 

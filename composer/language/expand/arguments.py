@@ -30,7 +30,7 @@ _NUMBER = "number"
 class Declared:
     """A declared name; ``value`` is None if one must be given.
 
-    ``type`` is that of a ROS parameter, ``number``, or empty for any value.
+    ``type`` is a type of ROS parameters, ``number``, or empty for any value.
     """
 
     key: Scalar

@@ -1,4 +1,4 @@
-"""The clock of a system, and that of the computer.
+"""The clock of a system, and the clock of the computer.
 
 The host owns the clock of its system and passes it to the loops, the main queue and the status;
 everything else asks the one of its loop or queue. Only this package imports :mod:`time`.
