@@ -6,12 +6,14 @@ the levels of all its loggers.
 
 from __future__ import annotations
 
+from typing import Any
+
 from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 
 from composer.client.graph_names import GraphNames
-from composer.client.requests import call_all_with_retries, call_once
-from composer.client.session import Deadline, NoResponseError, RosError, Session
+from composer.client.requests import call_all_with_retries, call_once, required
+from composer.client.session import Deadline, RosError, Session
 from composer.client.systems.managers import DISCOVERY_S, Systems
 from composer.model import SEVERITIES, LogLevel
 from composer.runtime.callbacks.log import logger_name
@@ -48,7 +50,7 @@ class LoggerLevels:
             by_server.setdefault(server, []).append(node)
         levels: dict[str, str | None] = dict.fromkeys(sorted(servers))
         for server, nodes in by_server.items():
-            response = self._levels(server, nodes)
+            (response,) = self._levels(server, nodes).values()
             if response is not None:
                 levels.update(zip(nodes, map(_name_of, response.levels), strict=False))
         return levels
@@ -59,10 +61,7 @@ class LoggerLevels:
         Raises NotFoundError; RosError if the level of the node cannot be read.
         """
         found, server = self._find(node)
-        response = self._levels(server, [found])
-        if response is None:
-            text = f"{server} did not respond within {self._deadline.timeout_s:g} s"
-            raise NoResponseError(text)
+        response = required(self._levels(server, [found]), self._deadline)
         return found, _name_of(response.levels[0])
 
     def set(self, node: str, level: LogLevel) -> str:
@@ -79,12 +78,12 @@ class LoggerLevels:
             raise LevelRejectedError(f"{found} did not set its log level: {result.reason}")
         return found
 
-    def _levels(self, server: str, nodes: list[str]) -> GetLoggerLevels.Response | None:
-        service = f"{server}/{_GET}"
+    def _levels(self, server: str, nodes: list[str]) -> dict[str, Any]:
+        """Return the response of a server by the name of its service, None without one."""
         request = GetLoggerLevels.Request(names=list(map(logger_name, nodes)))
         return call_all_with_retries(
-            self._session, GetLoggerLevels, [service], request, self._deadline
-        )[service]
+            self._session, GetLoggerLevels, [f"{server}/{_GET}"], request, self._deadline
+        )
 
     def _find(self, node: str) -> tuple[str, str]:
         """Return the full name of a node, and the node with the services for it."""

@@ -69,7 +69,7 @@ class ServiceCaller:
         if servers != self._knowing.get(name):
             wait_until_known(self._session, name, deadline)
             self._knowing[name] = servers
-        return _required(self._call({name: (service, request)}, deadline, math.inf), deadline)
+        return required(self._call({name: (service, request)}, deadline, math.inf), deadline)
 
     def _call(
         self, calls: Mapping[str, tuple[Any, Any]], deadline: Deadline, retry_after_s: float
@@ -128,7 +128,7 @@ def call_once(session: Session, service: Any, name: str, request: Any, deadline:
         return caller.call_once(service, name, request, deadline)
 
 
-def _required(responses: Mapping[str, Any], deadline: Deadline) -> Any:
+def required(responses: Mapping[str, Any], deadline: Deadline) -> Any:
     """Return the response of the only service. Raises NoResponseError."""
     ((name, response),) = responses.items()
     if response is None:

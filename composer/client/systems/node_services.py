@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Self
 
-from composer.client.requests import ServiceCaller
-from composer.client.session import Deadline, NoResponseError, Session
+from composer.client.requests import ServiceCaller, required
+from composer.client.session import Deadline, Session
 from composer.client.systems.managers import Systems
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.requests import NAME, REQUEST, CallNodes, NodeCall
@@ -90,11 +90,7 @@ class NodeServices:
             message = request_message(document)
             answer = self._caller.call_once(RequestService, service, message, deadline)
             response = dict(_responses(kind, document, answer)).get(name)
-        if response is None:
-            raise NoResponseError(
-                f"service '{name}' did not respond within {deadline.timeout_s:g} s"
-            )
-        return response
+        return required({name: response}, deadline)
 
     def call_all(
         self, kind: Any, requests: Mapping[str, Any], deadline: Deadline
