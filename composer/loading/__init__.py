@@ -102,7 +102,9 @@ def load_files(paths: Iterable[Path]) -> list[LoadResult]:
 
 
 @_without_cycle_collection()
-def load_models(paths: Iterable[Path]) -> list[LoadResult]:
+def load_models(
+    paths: Iterable[Path], overrides: OverrideOptions = NO_OVERRIDES
+) -> list[LoadResult]:
     """Load the files without checking them; ``diagnostics`` say what reading them found."""
     return [
         LoadResult(
@@ -114,12 +116,18 @@ def load_models(paths: Iterable[Path]) -> list[LoadResult]:
             item.definitions.interfaces,
             item.variants[0].merged.tree,
         )
-        for item in _resolve_files(paths)
+        for item in _resolve_files(paths, overrides)
     ]
 
 
-def _resolve_files(paths: Iterable[Path], *, all_combinations: bool = False) -> list[_Resolved]:
+def _resolve_files(
+    paths: Iterable[Path],
+    options: OverrideOptions = NO_OVERRIDES,
+    *,
+    all_combinations: bool = False,
+) -> list[_Resolved]:
     """Turn files into their models. Files of one project share its interfaces."""
+    overrides, diagnostics = read_overrides(options)
     shared: dict[tuple[Path, ...], Interfaces] = {}
     by_folder: dict[Path, Definitions] = {}
     resolved = []
@@ -128,7 +136,15 @@ def _resolve_files(paths: Iterable[Path], *, all_combinations: bool = False) -> 
         if folder not in by_folder:
             by_folder[folder] = Definitions.with_shared_interfaces(folder, shared)
         document = read(path)
-        resolved.append(_resolve(document, by_folder[folder], all_combinations=all_combinations))
+        resolved.append(
+            _resolve(
+                document,
+                by_folder[folder],
+                overrides,
+                diagnostics,
+                all_combinations=all_combinations,
+            )
+        )
     return resolved
 
 

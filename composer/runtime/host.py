@@ -23,6 +23,7 @@ from __future__ import annotations
 import gc
 import math
 import os
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 
@@ -53,6 +54,7 @@ from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.signals import stop_signals
+from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.protocol.requests import Instance
 from composer.runtime.ros.message_sizes import sends_large_messages
 from composer.runtime.supervision import events
@@ -116,6 +118,15 @@ class Host:
         """Request a stop, from any thread or a signal handler. A second request is urgent."""
         self._limits.limit_end()
         self._main_queue.request_stop(reason)
+
+    @property
+    def nodes(self) -> Mapping[str, ManagedNode]:
+        """The nodes that have been created, by their keys."""
+        return self._node_set.nodes
+
+    def chains(self) -> tuple[ChainFigures, ...]:
+        """Return the latencies of the chains of the system so far."""
+        return self._node_set.chains()
 
     def run(self) -> Outcome:
         """Bring the system up, supervise it until it has to stop, and tear it down.

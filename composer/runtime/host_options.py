@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Protocol, TypeVar
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel, Process
+from composer.model import LogLevel, Node, Port, Process
 from composer.runtime.clock.clock import COMPUTER, Clock
+
+R = TypeVar("R")
+
+
+class Instruments(Protocol):
+    """What a test sees and changes of the nodes in the process."""
+
+    def receiver(self, port: Port, receiver: R) -> R:
+        """Return what receives the messages of a subscription in its place."""
+
+    def behavior(self, node: Node, behavior: object) -> None:
+        """Prepare a new behavior, before its handlers are bound."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +46,7 @@ class HostOptions:
     ``ends_process`` promises that the process ends after the run, by ``os._exit`` if the outcome
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
     by ``clock``; by default, from when the host is created. ``clock`` is the clock of the system.
+    ``instruments`` are those of a test.
     """
 
     run_for_s: float | None = None
@@ -53,6 +67,7 @@ class HostOptions:
     process: Process | None = None
     report_key: str = ""
     member_command: Sequence[str] = ()
+    instruments: Instruments | None = None
 
 
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.

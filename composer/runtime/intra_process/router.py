@@ -14,6 +14,7 @@ from rclpy.subscription import Subscription
 
 from composer.model import Channel, ChannelKind, Delivery, Port, System, channels
 from composer.model.qos import Liveliness, QosProfile, incompatibilities
+from composer.runtime.host_options import Instruments
 from composer.runtime.intra_process.ignore_local_publications import (
     ignore_local,
     unsupported_reason,
@@ -113,11 +114,14 @@ class LocalRouter:
     So the local endpoints among the matched ones are always known, and the others are external.
     """
 
-    def __init__(self, shared: Mapping[ChannelKey, str | None]) -> None:
+    def __init__(
+        self, shared: Mapping[ChannelKey, str | None], instruments: Instruments | None = None
+    ) -> None:
         """``shared`` has the channels with ports at both endpoints, and why they need DDS, if any.
 
-        rclpy must be initialized.
+        ``instruments`` are those of a test. rclpy must be initialized.
         """
+        self._instruments = instruments
         self._dds_reasons = dict(shared)
         #: Why eligible topics use DDS nevertheless; None if they do not.
         self.refusal: str | None = None
@@ -160,6 +164,8 @@ class LocalRouter:
         if topic is None:
             return receiver.close
         ignore_local(subscription)
+        if self._instruments is not None:
+            receiver = self._instruments.receiver(port, receiver)
         local = LocalSubscription(subscription.msg_type, port, receiver)
         topic.add_subscription(local)
         return lambda: topic.remove_subscription(local)

@@ -68,6 +68,7 @@ class RunningNode(LocalNode):
         self._failures: list[str] | None = None  # reported while a lifecycle handler runs
         self._failed_in = -1  # the activation in which it has last reported a failure
         self._make_library_node = options.make_library_node
+        self._instruments = options.instruments
         self._library: LibraryNode | None = None
         self._listeners = options.process.transforms
         self._entities = NodeEntities(self._context, self._always_on_context)
@@ -99,7 +100,10 @@ class RunningNode(LocalNode):
 
     @calls_user_code
     def _make_behavior(self, reference: BehaviorReference) -> Any:
-        return behavior_class(reference)()
+        behavior = behavior_class(reference)()
+        if self._instruments is not None:
+            self._instruments.behavior(self.model, behavior)
+        return behavior
 
     def _set_attributes(self, behavior: Any, entities: NodeEntities) -> None:
         behavior.name = self.full_name
@@ -112,14 +116,15 @@ class RunningNode(LocalNode):
         if entities.transforms is not None:
             behavior.transforms = entities.transforms
         if not hasattr(behavior, "fail"):
-            behavior.fail = self._fail
+            behavior.fail = self.fail
         if self._make_library_node is not None and not hasattr(behavior, "node"):
             library: LibraryNode = self._make_library_node(self)
             self._library, entities.of_libraries = library, library.entities
             behavior.node = library.node
         self._set_used(behavior, behavior.publishers, *entities.senders.values())
 
-    def _fail(self, reason: str) -> None:
+    def fail(self, reason: str) -> None:
+        """Report that the node has failed; see :class:`composer.behavior.Fail`."""
         failures = self._failures
         if failures is not None:
             failures.append(str(reason))

@@ -14,6 +14,7 @@ from composer.model import Node
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.executors.event_counts import EventCounts
+from composer.runtime.host_options import Instruments
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.node_time.sim_time import SimTimeSource
 from composer.runtime.ros.limited_requests import limit_type_descriptions
@@ -39,6 +40,7 @@ class NodeOptions:
     ``system_is_up`` is false during the bring-up, when errors do not count as faults: some nodes
     wait for others.
     ``make_library_node(node)`` returns the rclpy node that the libraries of its behavior use.
+    ``instruments`` are those of a test.
     """
 
     router: LocalRouter
@@ -48,6 +50,7 @@ class NodeOptions:
     transition_timeout_s: float = 10.0
     system_is_up: bool = False
     make_library_node: Callable[[Any], Any] | None = None
+    instruments: Instruments | None = None
 
 
 class _NoPublisher:

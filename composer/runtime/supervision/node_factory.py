@@ -86,7 +86,7 @@ class NodeFactory:
         """
         self._process = process
         self._nodes = nodes
-        self._router = LocalRouter(shared_channels(self._system))
+        self._router = LocalRouter(shared_channels(self._system), self._options.instruments)
         return self._router.refusal
 
     def make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:
@@ -108,6 +108,7 @@ class NodeFactory:
             transition_timeout_s=self._timeout_s(node),
             system_is_up=before is not None,
             make_library_node=partial(NodeOfBehavior, parameters={}),
+            instruments=self._options.instruments,
         )
         if before is None:  # else the level may have been changed at run time
             set_level(node.full_name, self._log_level_of(node))

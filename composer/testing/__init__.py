@@ -1,0 +1,1 @@
+"""Tests of systems and behaviors, in time that the test controls."""

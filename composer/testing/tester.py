@@ -1,0 +1,138 @@
+"""The node by which a test takes part in a system: the other end of each topic and server."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from composer.base.source import Located
+from composer.behavior import Behavior
+from composer.model import (
+    BehaviorReference,
+    ChannelKind,
+    Dependency,
+    Introspection,
+    Node,
+    OnFailure,
+    Port,
+    PortKind,
+    Qos,
+    Supervision,
+    System,
+    channels,
+)
+from composer.model.qos import Durability, History, Liveliness, Reliability
+
+#: The key and the name of the node.
+TESTER: Final = "compose_test"
+#: From the weakest to the strongest.
+_RELIABILITIES = (Reliability.BEST_EFFORT, Reliability.RELIABLE)
+_DURABILITIES = (Durability.VOLATILE, Durability.TRANSIENT_LOCAL)
+_NO_SERVICES = Introspection(
+    parameters=False, rosout=False, type_description=False, lifecycle_services=False
+)
+
+
+class Tester(Behavior):
+    """Passes the messages of all topics to the test: ``on_message(topic, message)``.
+
+    A port is named by its kind and the full name of its topic, service or action.
+    """
+
+    on_message: Callable[[str, Any], None]
+
+    def __getattr__(self, name: str) -> Callable[[Any], None]:
+        """Return the handler ``on_<port>`` of a subscription."""
+        prefix, _, topic = name.partition(f"on_{PortKind.SUBSCRIPTION}:")
+        if prefix or not topic:
+            raise AttributeError(name)
+        return lambda message: self.on_message(topic, message)
+
+
+def port_name(kind: PortKind, full_name: str) -> str:
+    """Return the name of the tester's port."""
+    return f"{kind}:{full_name}"
+
+
+def with_tester(system: System) -> System:
+    """Return the system with a node for the test, which all others wait for."""
+    tester = _tester(system)
+    waits = Dependency(tester.name)
+    nodes = (replace(node, depends_on=(*node.depends_on, waits)) for node in system.nodes)
+    return replace(system, nodes=(tester, *nodes))
+
+
+def _tester(system: System) -> Node:
+    span = system.name.span
+    namespace = Located("/", span)
+    return Node(
+        Located(TESTER, span),
+        namespace,
+        span,
+        behavior=BehaviorReference(
+            Located(f"{Tester.__module__}:{Tester.__name__}", span), Path(__file__).parent
+        ),
+        ports=tuple(_ports(system)),
+        supervision=Supervision(on_failure=Located(OnFailure.SHUTDOWN, span)),
+        introspection=_NO_SERVICES,
+    )
+
+
+def _ports(system: System) -> Iterator[Port]:
+    nodes = [node for node in system.nodes if node.in_process]
+    for channel in channels(nodes, with_transforms=True):
+        types = {end.port.interface.value for end in channel.ends}
+        if len(types) > 1:
+            continue  # it needs the middleware; validation has reported it
+        sources = [end.port for end in channel.sources]
+        sinks = [end.port for end in channel.sinks]
+        if channel.kind is ChannelKind.TOPIC:
+            if sources:
+                yield _port(PortKind.SUBSCRIPTION, sources, min, _RECORDED)
+            if sinks:
+                yield _port(PortKind.PUBLISHER, sinks, max, {})
+        elif len(sources) == 1:
+            is_service = channel.kind is ChannelKind.SERVICE
+            yield _port(PortKind.CLIENT if is_service else PortKind.ACTION_CLIENT, sources, max, {})
+
+
+#: A subscription of a test keeps all messages, and requests nothing in time.
+_RECORDED: Mapping[str, Any] = {
+    "history": History.KEEP_ALL,
+    "deadline_ms": None,
+    "liveliness": Liveliness.AUTOMATIC,
+    "liveliness_lease_duration_ms": None,
+}
+
+
+def _port(
+    kind: PortKind,
+    others: Sequence[Port],
+    strength: Callable[[Iterable[int]], int],
+    changes: Mapping[str, Any],
+) -> Port:
+    """Return a port that matches all ``others``, with the weakest or the strongest policies."""
+    first = others[0]
+    profiles = [port.qos.profile for port in others]
+    profile = replace(
+        first.qos.profile,
+        reliability=_RELIABILITIES[
+            strength(_RELIABILITIES.index(profile.reliability) for profile in profiles)
+        ],
+        durability=_DURABILITIES[
+            strength(_DURABILITIES.index(profile.durability) for profile in profiles)
+        ],
+        **changes,
+    )
+    name = Located(port_name(kind, first.full_name), first.span)
+    return Port(
+        kind,
+        name,
+        first.interface,
+        Located(first.full_name, first.span),
+        first.full_name,
+        Qos(profile, first.qos.span),
+        first.span,
+    )
