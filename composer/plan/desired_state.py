@@ -29,6 +29,7 @@ class FaultKind(StrEnum):
     ERRORS = "errors"  # too many of them
     REPORTED = "reported"  # by the node itself
     ENDED = "ended"  # a process or an external node, by itself
+    FINISHED = "finished"  # a process, by itself, with exit status 0
     ABSENT = "absent"  # not there, and only something else can start it
     LOST = "lost"  # a callback does not return and cannot be interrupted
 
@@ -39,6 +40,7 @@ class Condition(StrEnum):
     RESTARTING = "restarting"  # a restart is scheduled
     ISOLATED = "isolated"  # down until a command or a tool brings it up
     GIVEN_UP = "given up"  # the same, after too many restarts
+    FINISHED = "finished"  # down as isolated: its program ended itself, with exit status 0
     ABSENT = "absent"  # down until something else starts it
     IGNORED = "failure ignored"  # not down: no node is moved
 
@@ -232,6 +234,7 @@ class Decision:
 
     For ``restart``, the node is taken down now and brought up after ``wait_s``, as attempt number
     ``attempt`` within the window of its restart policy. ``is_given_up``: it had its restarts.
+    ``is_finished``: its program has ended itself with exit status 0. The run has not failed then.
     """
 
     action: OnFailure
@@ -239,6 +242,7 @@ class Decision:
     wait_s: float = 0.0
     attempt: int = 0
     is_absent: bool = False
+    is_finished: bool = False
     is_given_up: bool = False
 
     @property
@@ -246,6 +250,8 @@ class Decision:
         """What becomes of the node."""
         if self.is_absent and self.action is OnFailure.ISOLATE:
             return Condition.ABSENT
+        if self.is_finished and self.action in (OnFailure.ISOLATE, OnFailure.SHUTDOWN):
+            return Condition.FINISHED
         return Condition.GIVEN_UP if self.is_given_up else _CONDITIONS[self.action]
 
     @property
@@ -279,7 +285,8 @@ def decide(system: System, desired: DesiredState, fault: Fault, now_s: float) ->
     decision = _by_policy(node, desired, fault, now_s)
     if decision.action is OnFailure.SHUTDOWN and not node.required:
         decision = replace(decision, action=OnFailure.ISOLATE)
-    return replace(decision, is_absent=fault.kind is FaultKind.ABSENT)
+    is_finished = fault.kind is FaultKind.FINISHED and not decision.is_given_up
+    return replace(decision, is_absent=fault.kind is FaultKind.ABSENT, is_finished=is_finished)
 
 
 def _by_policy(node: Node, desired: DesiredState, fault: Fault, now_s: float) -> Decision:

@@ -302,6 +302,9 @@ class World:
     def is_absent(self, name: str) -> bool:
         return self.nodes[name].is_absent
 
+    def has_finished(self, _: str) -> bool:
+        return False
+
     def timeout_s(self, _: str) -> float:
         return 10.0
 

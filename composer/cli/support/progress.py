@@ -95,7 +95,11 @@ def severity_of(event: Event) -> str:
     match event:
         case Logged():
             return event.level.upper()
-        case NodeFailed(is_tolerated=True) | BroughtUp(is_complete=False):
+        case (
+            NodeFailed(is_tolerated=True)
+            | NodeFailed(is_finished=True)
+            | BroughtUp(is_complete=False)
+        ):
             return "WARN"
         case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
             return "ERROR"
@@ -104,16 +108,16 @@ def severity_of(event: Event) -> str:
 
 
 def _code(event: Event) -> str:
-    match event:
-        case NodeFailed(is_tolerated=True) | BroughtUp(is_complete=False):
+    match "" if isinstance(event, Logged) else severity_of(event), event:
+        case "WARN", _:
             return _YELLOW
-        case NodeTransitionFailed() | RollingBack() | Stuck() | NodeFailed():
+        case "ERROR", _:
             return _RED
-        case BroughtUp() | Restarted():
+        case _, BroughtUp() | Restarted():
             return _GREEN
-        case Stopping() | RolledBack():
+        case _, Stopping() | RolledBack():
             return _YELLOW
-        case StateChanged():
+        case _, StateChanged():
             return _DIM
         case _:
             return ""

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from composer.model import Node
+from composer.plan import Condition
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import within
@@ -46,6 +47,7 @@ class MemberNode(OutsideNode):
         self._awaited: tuple[str, Future[None]] | None = None  # the goal of a transition
         self._after: Sequence[str] = ()
         self._has_failed = False
+        self._has_finished = False
         self._late_reports: _LateReports | None = None  # while it is awaited to be taken down
         self._is_lost = False  # its process has ended, and its return has not been reported
         self._given_up: set[str] = set()  # goals of requests that may still arrive after a cut
@@ -75,6 +77,11 @@ class MemberNode(OutsideNode):
     def is_absent(self) -> bool:
         """Whether its process is awaited, because something else starts it."""
         return self._process.is_absent
+
+    @property
+    def has_finished(self) -> bool:
+        """Whether its process reports that its program has ended itself, with exit status 0."""
+        return self._has_finished
 
     def destroy(self) -> None:
         """Do nothing: the node belongs to its process."""
@@ -252,6 +259,7 @@ class MemberNode(OutsideNode):
             self._awaited[1].set_result(None)
         failed_now = bool(reported.held_down) and not self._has_failed
         self._has_failed = bool(reported.held_down)
+        self._has_finished = reported.condition == Condition.FINISHED
         if self._lock.is_held:
             return
         has_moved = is_primary and state not in (self._state, before) and before == self._state

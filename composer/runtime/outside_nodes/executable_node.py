@@ -40,6 +40,7 @@ class ExecutableNode(StartedNode[Child]):
         self._executable = executable
         self._children = context.children
         self._command: Command | None = None
+        self._last: Child | None = None
 
     @property
     def transition_timeout_s(self) -> float:
@@ -51,6 +52,14 @@ class ExecutableNode(StartedNode[Child]):
     def pid(self) -> int | None:
         """The process id, None while no process runs."""
         return None if self._started is None else self._started.pid
+
+    @property
+    def has_finished(self) -> bool:
+        """Whether its last process has ended itself, with exit status 0."""
+        last = self._last
+        if last is None or last.is_ending or not last.ended.done():
+            return False
+        return _status(last) == 0
 
     @property
     def figures(self) -> Mapping[str, Any]:
@@ -86,6 +95,7 @@ class ExecutableNode(StartedNode[Child]):
     # --- the process
 
     def _find(self) -> None:
+        self._last = None
         try:
             self._command = make_command(self.model, self._executable, self._log_level, os.environ)
         except NotRunnable as error:
@@ -108,6 +118,7 @@ class ExecutableNode(StartedNode[Child]):
         except (OSError, StartFailed) as error:
             raise TransitionRefused(f"cannot be started: {error}", state) from error
         self._watch(child)
+        self._last = child
         return child
 
     def _with_parameters(self, command: Command) -> Command:

@@ -136,6 +136,11 @@ class OutsideNode(ABC):
         return self._is_lost
 
     @property
+    def has_finished(self) -> bool:
+        """Whether it is a program that has ended itself, with exit status 0."""
+        return False
+
+    @property
     def callback_owners(self) -> tuple[object, ...]:
         """Nothing: its callbacks run elsewhere."""
         return ()

@@ -69,7 +69,8 @@ class RolledBack:
 class NodeFailed:
     """Nodes have failed for one reason; ``consequence`` is the reaction to that.
 
-    ``is_tolerated``: the system does not need them, or ignores it.
+    ``is_tolerated``: the system does not need them, or ignores it. ``is_finished``: their programs
+    have ended with exit status 0.
     """
 
     elapsed_s: float
@@ -77,9 +78,11 @@ class NodeFailed:
     reason: str
     consequence: str
     is_tolerated: bool = False
+    is_finished: bool = False
 
     def __str__(self) -> str:
-        return f"{', '.join(self.nodes)} failed: {self.reason}; {self.consequence}"
+        verb = "ended" if self.is_finished else "failed"
+        return f"{', '.join(self.nodes)} {verb}: {self.reason}; {self.consequence}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,9 @@ class FaultHandler:
             if decision.action is OnFailure.SHUTDOWN:
                 full_name = self._full_name(fault.node)
                 self._reconciler.publish_desired()
-                if self.before is None:
+                if decision.is_finished:
+                    self._main_queue.request_stop(f"{full_name} ended: {decision.reason}")
+                elif self.before is None:
                     self._main_queue.request_stop(f"{full_name} failed: {decision.reason}")
                 else:
                     self._reconciler.roll_back(*self.before, full_name, decision.reason)
@@ -62,6 +64,9 @@ class FaultHandler:
     def _decide(self, fault: Fault, now_s: float) -> Decision | None:
         """Record what becomes of a failed node; None if there is nothing to do."""
         name = fault.node
+        is_end = fault.kind in (FaultKind.ENDED, FaultKind.STEP)
+        if is_end and self._node_set.has_finished(name):
+            fault = replace(fault, kind=FaultKind.FINISHED)
         decision = decide(self._system, self._shared.value, fault, now_s)
         if decision is None or self._is_outdated(fault):
             self._shared.update(partial(DesiredState.ignore, fault=fault))
@@ -78,16 +83,13 @@ class FaultHandler:
 
     def _report_failed(self, handled: Iterable[tuple[Fault, Decision]]) -> None:
         """Report failures; the nodes of one process, for example, have failed together."""
-        nodes: dict[tuple[str, str, bool], list[str]] = {}
+        nodes: dict[tuple[str, str, bool, bool], list[str]] = {}
         for fault, decision in handled:
             is_tolerated = decision.action is OnFailure.IGNORE or not self._is_required(fault.node)
-            key = decision.reason, decision.consequence, is_tolerated
+            key = decision.reason, decision.consequence, is_tolerated, decision.is_finished
             nodes.setdefault(key, []).append(self._full_name(fault.node))
-        for (text, consequence, is_tolerated), names in nodes.items():
-            at_s = self._reporter.elapsed_s
-            self._reporter.report(
-                NodeFailed(at_s, tuple(names), text, consequence, is_tolerated=is_tolerated)
-            )
+        for key, names in nodes.items():
+            self._reporter.report(NodeFailed(self._reporter.elapsed_s, tuple(names), *key))
 
     def _finish(self, fault: Fault, decision: Decision, now_s: float) -> None:
         """Schedule the restart of a node that is down now."""

@@ -176,6 +176,11 @@ class NodeSet:
         node = self.nodes[name]
         return isinstance(node, OutsideNode) and node.is_absent
 
+    def has_finished(self, name: str) -> bool:
+        """Return whether the node is a program that has ended itself, with exit status 0."""
+        node = self.nodes[name]
+        return isinstance(node, OutsideNode) and node.has_finished
+
     def running_callbacks(self, name: str) -> list[RunningCallback]:
         """Return the callbacks that keep the threads of the node's loop busy, one per thread."""
         return [innermost for innermost, *_ in running_callbacks(self.nodes[name].loop)]

@@ -158,8 +158,8 @@ class SystemEnd:
         self._has_failed = self._supervisor.has_failed_nodes
         self._status.set_activity("stopping")
         remarks = self._status.snapshot().remarks
-        # The reason says that of the node that has ended the system.
-        ended_by = self._reason.partition(" failed")[0]
+        # The reason begins with the node that has ended the system, if one has.
+        ended_by = self._reason.partition(" ")[0]
         self._remarks = tuple(text for text in remarks if not text.startswith(f"{ended_by} is "))
         self._reporter.report(Stopping(self._reporter.elapsed_s, self._reason))
         self.keep_entities()

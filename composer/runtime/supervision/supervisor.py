@@ -13,6 +13,7 @@ from functools import partial
 
 from composer.model import PrimaryState
 from composer.plan import (
+    Condition,
     DesiredState,
     Fault,
     FaultKind,
@@ -57,8 +58,16 @@ class Supervisor:
 
     @property
     def has_failed_nodes(self) -> bool:
-        """Whether a node is held down, or ended the system, that the system needs."""
-        return any(self._node_set.nodes[name].model.required for name in self.desired.down)
+        """Whether a node is held down, or ended the system, that the system needs.
+
+        A program that has ended itself with exit status 0 does not count.
+        """
+        conditions = self.desired.conditions
+        return any(
+            self._node_set.nodes[name].model.required
+            for name in self.desired.down
+            if conditions.get(name) is not Condition.FINISHED
+        )
 
     def has_moved(self, node: str, since: int) -> bool:
         """Return whether an external transition has moved the node since a serial number."""

@@ -250,6 +250,33 @@ def test_failed_starts_are_rolled_back(
     assert not system.reported(BroughtUp)
 
 
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGKILL, None])
+@pytest.mark.parametrize("policy", ["shutdown", "isolate"])
+def test_the_end_of_a_program_and_the_exit_code(
+    signal_number: signal.Signals | None, policy: str, tmp_path: Path
+) -> None:
+    """The run has not failed if the program has ended by itself with exit status 0."""
+    command = "[sh, -c, exit 0]" if signal_number is None else DRIVER
+    text = f"""
+system: robot
+nodes:
+  base: {{}}
+  viewer: {{executable: {{command: {command}}}, lifecycle: {{on_failure: {policy}}}}}
+"""
+    with running(text, tmp_path) as system:
+        if signal_number is not None:
+            os.kill(pid_of(system, "viewer"), signal_number)
+        failed = system.wait_for_failure("/viewer")
+        outcome = system.stop() if policy == "isolate" else system.end()
+    is_finished = signal_number is not signal.SIGKILL
+    assert failed.is_finished == is_finished
+    assert outcome.exit_code == (0 if is_finished else 1)
+    assert not system.reported(RollingBack)
+    condition = "finished" if is_finished else "isolated"
+    remark = f"/viewer is {condition}: {failed.reason}"
+    assert outcome.remarks == ((remark,) if policy == "isolate" else ())
+
+
 def test_a_program_that_hangs_in_its_configuration_holds_up_only_its_dependents(
     tmp_path: Path,
 ) -> None:

@@ -316,6 +316,10 @@ def test_the_budget(
         ("ignore", FaultKind.STEP, OnFailure.IGNORE, "failure ignored", "ignoring it"),
         ("ignore", FaultKind.ABSENT, OnFailure.IGNORE, "failure ignored", "ignoring it"),
         ("ignore", FaultKind.LOST, OnFailure.ISOLATE, "isolated", "isolating it"),
+        ("isolate", FaultKind.FINISHED, OnFailure.ISOLATE, "finished", "isolating it"),
+        ("shutdown", FaultKind.FINISHED, OnFailure.SHUTDOWN, "finished", SHUTTING_DOWN),
+        ("restart", FaultKind.FINISHED, OnFailure.RESTART, "restarting", "restart 1 in 0.5 s"),
+        ("ignore", FaultKind.FINISHED, OnFailure.IGNORE, "failure ignored", "ignoring it"),
     ],
 )  # fmt: skip
 def test_policies(
