@@ -20,7 +20,6 @@ class Format(StrEnum):
     """The format of a diagram."""
 
     MERMAID = "mermaid"
-    DOT = "dot"
     SVG = "svg"
     PNG = "png"
     JSON = "json"
@@ -31,8 +30,6 @@ class Format(StrEnum):
 FORMATS_BY_SUFFIX = {
     ".mmd": Format.MERMAID,
     ".mermaid": Format.MERMAID,
-    ".dot": Format.DOT,
-    ".gv": Format.DOT,
     ".svg": Format.SVG,
     ".png": Format.PNG,
     ".json": Format.JSON,

@@ -11,7 +11,7 @@ from typing import Any
 from composer.base.characters import escape_json
 from composer.graph.diagram import Cluster, Edge, Graph, Vertex
 from composer.graph.diagram_options import Format
-from composer.graph.formats import dot, html, mermaid, svg
+from composer.graph.formats import html, mermaid, svg
 from composer.graph.layout import arrange
 
 #: Pixels per layout unit for high-resolution screens, reduced for very large pictures.
@@ -34,8 +34,6 @@ def render(graphs: Sequence[Graph], form: Format, shown: int = 0) -> bytes:
     match form:
         case Format.MERMAID:
             return mermaid.render(graph).encode()
-        case Format.DOT:
-            return dot.render(graph).encode()
         case Format.JSON:
             return _json(graph).encode()
         case Format.SVG:

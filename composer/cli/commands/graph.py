@@ -32,7 +32,6 @@ EPILOG = examples(
     "compose graph pipeline -o pipeline.svg                write an image",
     "compose graph pipeline --view lifecycle -o order.png  draw the bring-up order",
     "compose graph frames --view frames -o frames.svg       draw the frames of tf2",
-    "compose graph pipeline -f dot | dot -Tpdf > p.pdf     use Graphviz",
     "compose graph pipeline robot -o both.svg               draw several systems together",
     "compose graph fleet robots=3 -o fleet.svg              draw it with these arguments",
     "compose graph --live -o now.html                      draw the running ROS graph",
@@ -175,7 +174,7 @@ def _drawn(scene: Scene, form: Format, view: View, *, live: bool) -> bytes:
     except output.PngMissing as error:
         raise CommandError(
             str(error),
-            hint='pip install "ros2-composer[png]"; or use -f svg, or -f dot with Graphviz',
+            hint='pip install "ros2-composer[png]"; or use -f svg',
         ) from error
 
 

@@ -23,8 +23,7 @@ def test_the_default_is_a_mermaid_diagram_on_stdout() -> None:
     ("name", "begin"),
     [
         ("p.svg", "<svg "),
-        ("p.DOT", "digraph "),
-        ("p.json", "{\n"),
+        ("p.JSON", "{\n"),
         ("p.mmd", "---\n"),
         ("p.html", "<!DOCTYPE html>\n"),
     ],
@@ -44,8 +43,8 @@ def test_an_unknown_file_suffix_is_a_usage_error(tmp_path: Path) -> None:
 
 def test_the_format_option_overrides_the_suffix(tmp_path: Path) -> None:
     target = tmp_path / "p.txt"
-    assert compose("graph", PIPELINE, "-o", str(target), "-f", "dot").code == 0
-    assert target.read_text(encoding="utf-8").startswith("digraph ")
+    assert compose("graph", PIPELINE, "-o", str(target), "-f", "json").code == 0
+    assert target.read_text(encoding="utf-8").startswith("{\n")
 
 
 def test_an_unwritable_file_is_reported(tmp_path: Path) -> None:
