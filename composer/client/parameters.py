@@ -98,18 +98,6 @@ class ParameterClient:
             raise ParameterRejectedError(f"{self.node} rejected " + "; ".join(rejected))
         return {item.name: plain_value(item.value) for item in messages}
 
-    def delete(self, name: str) -> None:
-        """Delete a parameter. Raises UnknownParameterError, ParameterRejectedError.
-
-        Nodes delete only parameters that they declared without a fixed type.
-        """
-        self._check_known([name])
-        request = SetParameters.Request(parameters=[ParameterMessage(name=name)])
-        (result,) = self._call(SetParameters, "set_parameters", request, once=True).results
-        if not result.successful:
-            reason = result.reason or "no reason given"
-            raise ParameterRejectedError(f"{self.node} did not delete {name}: {reason}")
-
     def load(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Set the parameters of a file, except for read-only ones that have the value already.
 

@@ -26,7 +26,7 @@ const emit = (event, data) => process.stdout.write(JSON.stringify({ event, data 
 client.on("open", () => emit("open", socket.protocol));
 client.on("close", (event) => emit("close", { code: event.code, reason: event.reason }));
 client.on("error", (error) => emit("error", String(error?.message ?? error)));
-for (const event of ["serverInfo", "status", "parameterValues", "connectionGraphUpdate", "serviceCallFailure"]) {
+for (const event of ["serverInfo", "status", "serviceCallFailure"]) {
   client.on(event, (data) => emit(event, data));
 }
 client.on("time", (data) => emit("time", data.timestamp));
@@ -69,21 +69,6 @@ const commands = {
     const callId = ++calls;
     pending.set(callId, service);
     client.sendServiceCallRequest({ serviceId: service.id, callId, encoding: "cdr", data: writer.writeMessage(request) });
-  },
-  get({ names, id }) {
-    client.getParameters(names, id);
-  },
-  set({ parameters, id }) {
-    client.setParameters(parameters, id);
-  },
-  watch({ names }) {
-    client.subscribeParameterUpdates(names);
-  },
-  unwatch({ names }) {
-    client.unsubscribeParameterUpdates(names);
-  },
-  graph() {
-    client.subscribeConnectionGraph();
   },
   advertise({ topic, schemaName }) {
     emit("advertised", client.advertise({ topic, encoding: "cdr", schemaName }));

@@ -17,19 +17,13 @@ from composer.model.qos import QosProfile
 
 if TYPE_CHECKING:
     from composer.client.shared_session import SampledTopic
-    from composer.dashboard.observing.ros_graph import RosGraph
 
 _EVENTS = "/parameter_events"
 _EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
 #: Events that may wait.
-MAX_EVENTS = 1000
+_MAX_EVENTS = 1000
 _READ_PERIOD_S = 2.0
 _READ_WITHIN_S = 3.0
-
-
-def parameter_events(ros: RosGraph) -> SampledTopic:
-    """Subscribe to announcements of changes of parameters, of all nodes."""
-    return ros.session.sample(_EVENTS, _EVENTS_TYPE, QosProfile(depth=MAX_EVENTS))
 
 
 class ParametersFeed(Feed):
@@ -52,12 +46,13 @@ class ParametersFeed(Feed):
 
     def start(self) -> None:
         """Subscribe to announcements of changes."""
-        self._events = parameter_events(self.ros)
+        profile = QosProfile(depth=_MAX_EVENTS)
+        self._events = self.ros.session.sample(_EVENTS, _EVENTS_TYPE, profile)
         self.resources.callback(self._events.close)
 
     def poll(self) -> Iterator[Update]:
         """Yield all parameters if any has changed."""
-        events = self._events.take(MAX_EVENTS)
+        events = self._events.take(_MAX_EVENTS)
         now_s = time.monotonic()
         if any(event.content.node == self._node for event in events):
             self._due_s = now_s

@@ -1,4 +1,4 @@
-"""The channels and services that clients are offered, and who uses them."""
+"""The channels and services that clients are offered."""
 
 from __future__ import annotations
 
@@ -16,11 +16,8 @@ from composer.model import PortKind
 if TYPE_CHECKING:
     from composer.dashboard.observing.topology import Topology
 
-_CLOCK = ("/clock", "rosgraph_msgs/msg/Clock")
+_CLOCK, _CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 _PERIOD_S = 0.2
-
-#: The nodes at each name, sorted.
-Users = Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +47,6 @@ class Contents:
 
     channels: Offers = field(default_factory=dict)
     services: Offers = field(default_factory=dict)
-    publishers: Users = field(default_factory=dict)
-    subscribers: Users = field(default_factory=dict)
-    providers: Users = field(default_factory=dict)
     unknown: Mapping[str, str] = field(default_factory=dict)
     has_clock: bool = False
 
@@ -76,15 +70,14 @@ class Catalog:
             for end in topology.nodes[node]
             if end.kind is PortKind.SERVICE
         }
-        publishers = _users(topology, PortKind.PUBLISHER)
         self.current = Contents(
             channels=self._offers(before.channels, topics, self._channel, unknown),
             services=self._offers(before.services, servers, self._service, unknown),
-            publishers=publishers,
-            subscribers=_users(topology, PortKind.SUBSCRIPTION),
-            providers=_users(topology, PortKind.SERVICE),
             unknown=unknown,
-            has_clock=_CLOCK in topics and _CLOCK[0] in publishers,
+            has_clock=any(
+                end.kind is PortKind.PUBLISHER and end.type == _CLOCK_TYPE
+                for _, end in topology.of_topics.get(_CLOCK, ())
+            ),
         )
 
     def _offers(
@@ -152,39 +145,3 @@ def changes(before: Offers, now: Offers) -> tuple[list[int], list[Offer]]:
     """Return the numbers of what is gone, and what is new."""
     gone = [number for number in before if number not in now]
     return gone, [item for number, item in now.items() if number not in before]
-
-
-def graph_update(before: Contents, now: Contents) -> dict[str, Any] | None:
-    """Return the changes of the connection graph as they are sent, None without any.
-
-    What has lost its last user, but has others, is sent with an empty list.
-    """
-    topics = now.publishers.keys() | now.subscribers.keys()
-    removed_topics = (before.publishers.keys() | before.subscribers.keys()) - topics
-    update: dict[str, Any] = {
-        "publishedTopics": _changed(before.publishers, now.publishers, topics, "publisherIds"),
-        "subscribedTopics": _changed(before.subscribers, now.subscribers, topics, "subscriberIds"),
-        "advertisedServices": _changed(
-            before.providers, now.providers, now.providers.keys(), "providerIds"
-        ),
-        "removedTopics": sorted(removed_topics),
-        "removedServices": sorted(before.providers.keys() - now.providers.keys()),
-    }
-    return {"op": "connectionGraphUpdate", **update} if any(update.values()) else None
-
-
-def _changed(before: Users, now: Users, names: Any, key: str) -> list[dict[str, Any]]:
-    return [
-        {"name": name, key: list(now.get(name, ()))}
-        for name in sorted(names)
-        if before.get(name, ()) != now.get(name, ())
-    ]
-
-
-def _users(topology: Topology, kind: PortKind) -> Users:
-    found: dict[str, set[str]] = {}
-    for node in topology.visible:
-        for end in topology.nodes[node]:
-            if end.kind is kind:
-                found.setdefault(end.name, set()).add(node)
-    return {name: tuple(sorted(nodes)) for name, nodes in sorted(found.items())}

@@ -17,7 +17,6 @@ from composer.dashboard.foxglove.catalog import (
     CatalogFeed,
     Contents,
     changes,
-    graph_update,
 )
 from composer.dashboard.foxglove.encoding import (
     CDR,
@@ -33,7 +32,6 @@ from composer.dashboard.foxglove.encoding import (
 )
 from composer.dashboard.foxglove.link import Link, error_text
 from composer.dashboard.foxglove.messages import ClockFeed, Publications, Subscriptions
-from composer.dashboard.foxglove.parameters import Parameters
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, unknown
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
 from composer.dashboard.web.client import Running
@@ -47,7 +45,6 @@ _CALL_S = 10.0
 _MAX_WAITING = 256
 #: The time, among the subscriptions, whose numbers are not negative.
 _TIME = -1
-_CAPABILITIES = ("parameters", "parametersSubscribe", "connectionGraph")
 _CHANGING = ("clientPublish", "services")
 
 
@@ -75,21 +72,13 @@ class FoxgloveConnection(Link):
         self._catalog: Running | None = None
         self._clock: Running | None = None
         self._unknown: set[str] = set()
-        self._has_graph = False
         self._subscriptions = Subscriptions(self)
         self._publications = Publications(self)
-        self._parameters = Parameters(self)
         self._operations: dict[str, Callable[[Values], None]] = {
             "subscribe": lambda values: self._subscriptions.subscribe(values, self._known.channels),
             "unsubscribe": self._subscriptions.unsubscribe,
             "advertise": self._publications.advertise,
             "unadvertise": self._publications.unadvertise,
-            "getParameters": self._parameters.read,
-            "setParameters": self._parameters.set,
-            "subscribeParameterUpdates": self._parameters.subscribe,
-            "unsubscribeParameterUpdates": self._parameters.unsubscribe,
-            "subscribeConnectionGraph": self._subscribe_graph,
-            "unsubscribeConnectionGraph": self._unsubscribe_graph,
         }
 
     def _begin(self) -> None:
@@ -102,7 +91,6 @@ class FoxgloveConnection(Link):
                 self.stop(running)
         self._subscriptions.end()
         self._publications.end()
-        self._parameters.end()
 
     def _take(self, message: str | bytes) -> bool:
         is_valid = False
@@ -160,7 +148,6 @@ class FoxgloveConnection(Link):
                 "op": "serverInfo",
                 "name": f"ros2-composer: {self._dashboard.hello.get('title', '')}",
                 "capabilities": [
-                    *_CAPABILITIES,
                     *(() if self.is_read_only else _CHANGING),
                     *(("time",) if self._known.has_clock else ()),
                 ],
@@ -175,8 +162,6 @@ class FoxgloveConnection(Link):
         self._offer_channels(before)
         if not self.is_read_only:
             self._offer_services(before)
-        if self._has_graph:
-            self._send_graph(before)
         if self._known.has_clock and self._clock is None:
             self._send_info()
             self._outbox.open(_TIME, "", Delivery.LATEST)
@@ -202,19 +187,6 @@ class FoxgloveConnection(Link):
     def _post_some(self, op: str, key: str, items: list[Any]) -> None:
         if items:
             self.post({"op": op, key: items})
-
-    def _subscribe_graph(self, _: Values) -> None:
-        if not self._has_graph:
-            self._has_graph = True
-            self._send_graph(Contents())
-
-    def _unsubscribe_graph(self, _: Values) -> None:
-        self._has_graph = False
-
-    def _send_graph(self, before: Contents) -> None:
-        update = graph_update(before, self._known)
-        if update is not None:
-            self.post(update)
 
 
 def _compose(subscription: int, _: Waiting, update: Update) -> bytes:

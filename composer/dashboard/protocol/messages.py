@@ -152,13 +152,6 @@ class Values:
         """Return a string; it is required without a default."""
         return self._get(key, str, default)
 
-    def optional_text(self, key: str) -> str | None:
-        """Return a string, None without one."""
-        self._known.append(key)
-        if self._content.get(key) is None:
-            return None
-        return self.text(key)
-
     def flag(self, key: str, *, default: bool = False) -> bool:
         """Return true or false."""
         return self._get(key, bool, default)

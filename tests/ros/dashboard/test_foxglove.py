@@ -5,9 +5,8 @@ Requires Node.js and ``npm ci --prefix tests/foxglove``.
 
 from __future__ import annotations
 
-import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -16,15 +15,11 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from tests.programs import require_package
-from tests.ros.support.commands import listed
 from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.foxglove import FOLDER, FoxgloveClient, foxglove
 from tests.ros.support.in_process import Peer, wait_until
 
 PLANNER, CONTROLLER = "/planning/planner", "/control/motor_controller"
-SPEED = f"{PLANNER}.max_velocity"
-#: Numbers of requests, so that no older response is taken for the one to a request.
-READS = itertools.count()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -48,10 +43,7 @@ def test_both_names_of_the_protocol(server: Dashboard, subprotocol: str) -> None
         info = client.until("serverInfo")
         assert set(info["capabilities"]) == {
             "clientPublish",
-            "parameters",
-            "parametersSubscribe",
             "services",
-            "connectionGraph",
         }
         assert info["supportedEncodings"] == ["cdr"]
         client.has("/sensor_data")
@@ -135,82 +127,6 @@ def test_a_message_of_the_client_is_published(client: FoxgloveClient) -> None:
         pytest.fail("the message has not arrived")
 
 
-def test_parameters_are_set_and_followed(client: FoxgloveClient) -> None:
-    everything = _read(client, {SPEED, "/lab/talker.limits.reach", "/lab/talker.name"})
-    assert everything[SPEED] == {"name": SPEED, "value": 1, "type": "float64"}
-    assert everything["/lab/talker.limits.reach"]["value"] == 1.0
-    assert everything["/lab/talker.name"] == {"name": "/lab/talker.name", "value": "robot"}
-    client.do("watch", names=[SPEED])
-    client.do("set", parameters=[{"name": SPEED, "value": 2}], id="set")
-    assert _parameters(client, "set")[SPEED]["value"] == 2
-    client.until("parameterValues", lambda data: "id" not in data and data["parameters"])
-    assert "2.0" in listed(("2.0",), "param", "get", PLANNER, "max_velocity")
-    client.do("set", parameters=[{"name": SPEED, "value": 1, "type": "float64"}], id="back")
-    assert _parameters(client, "back")[SPEED]["value"] == 1
-
-
-def test_only_watched_parameters_are_followed(client: FoxgloveClient, peer: Peer) -> None:
-    period = f"{PLANNER}.sample_period_ms"
-
-    def change(name: str, value: float) -> None:
-        assert peer.set_parameter(PLANNER, name.rpartition(".")[2], value) == ""
-
-    def arrives(name: str, value: float) -> None:
-        client.until("parameterValues", lambda data: {name: value}.items() <= _values(data).items())
-
-    client.do("unwatch", names=[])
-    client.do("watch", names=[SPEED])
-    _read(client, {SPEED}, SPEED)  # the client has been served up to here
-    change(period, 110.0)
-    change(SPEED, 2.25)
-    arrives(SPEED, 2.25)
-    client.do("unwatch", names=[SPEED])
-    client.do("watch", names=[period])
-    _read(client, {SPEED}, SPEED)
-    change(SPEED, 2.75)
-    change(period, 120.0)
-    arrives(period, 120.0)
-    followed = [_values(data) for event, data in client.events if event == "parameterValues"]
-    assert {period: 110.0} not in followed
-    assert {SPEED: 2.75} not in followed
-    change(SPEED, 1.0)
-    change(period, 100.0)
-
-
-def _values(data: Any) -> dict[str, Any]:
-    return {item["name"]: item.get("value") for item in data["parameters"]}
-
-
-def test_a_refused_parameter_keeps_its_value(client: FoxgloveClient) -> None:
-    _read(client, {SPEED}, SPEED)
-    client.do("set", parameters=[{"name": SPEED, "value": 1e9}], id="refused")
-    assert _parameters(client, "refused")[SPEED]["value"] == 1
-    status = client.until("status", lambda data: "max_velocity" in data["message"])
-    assert status["level"] == 2
-    client.do("get", names=["/missing.x", f"{PLANNER}.max_velocty"], id="missing")
-    assert _parameters(client, "missing") == {}
-    client.until("status", lambda data: "/missing" in data["message"])
-
-
-def _read(client: FoxgloveClient, wanted: set[str], *names: str) -> dict[str, Any]:
-    """Read parameters, of all nodes without names, until all that are wanted are found."""
-    found: dict[str, Any] = {}
-
-    def are_found() -> bool:
-        identifier = f"read {next(READS)}"
-        client.do("get", names=names, id=identifier)
-        found.update(_parameters(client, identifier))
-        return wanted <= found.keys()
-
-    wait_until(are_found, f"the parameters {sorted(wanted)}")
-    return found
-
-
-def _parameters(client: FoxgloveClient, identifier: str) -> dict[str, Any]:
-    data = client.until("parameterValues", lambda data: data.get("id") == identifier)
-    return {item["name"]: item for item in data["parameters"]}
-
-
 def test_services_are_called(client: FoxgloveClient) -> None:
     assert _called(client, "/lab/add", data=True) == {"success": True, "message": "switched"}
     state = _called(client, f"{PLANNER}/get_state")
@@ -245,71 +161,10 @@ def test_a_call_that_fails(client: FoxgloveClient, peer: Peer) -> None:
     assert _called(client, "/lab/add", data=True)["success"]
 
 
-class Graph:
-    """The connection graph, put together from its updates."""
-
-    def __init__(self) -> None:
-        self.published: dict[str, list[str]] = {}
-        self.subscribed: dict[str, list[str]] = {}
-        self.services: dict[str, list[str]] = {}
-
-    def add(self, update: dict[str, Any]) -> None:
-        for known, names, items, ids in (
-            (self.published, "removedTopics", "publishedTopics", "publisherIds"),
-            (self.subscribed, "removedTopics", "subscribedTopics", "subscriberIds"),
-            (self.services, "removedServices", "advertisedServices", "providerIds"),
-        ):
-            for name in update[names]:
-                known.pop(name, None)
-            known |= {item["name"]: item[ids] for item in update[items]}
-
-
-def _wait_for_graph(client: FoxgloveClient, *conditions: Callable[[Graph], bool]) -> None:
-    """Wait until the graph has fulfilled the conditions, one after the other."""
-    graph, left = Graph(), list(conditions)
-
-    def are_fulfilled(update: dict[str, Any]) -> bool:
-        graph.add(update)
-        while left and left[0](graph):
-            left.pop(0)
-        return not left
-
-    client.until("connectionGraphUpdate", are_fulfilled)
-
-
-def test_the_connection_graph(client: FoxgloveClient) -> None:
-    client.do("graph")
-    _wait_for_graph(
-        client,
-        lambda graph: graph.published.get("/sensor_data") == ["/perception/sensor_simulator"],
-        lambda graph: graph.subscribed.get("/sensor_data") == [CONTROLLER, PLANNER],
-        lambda graph: graph.services.get("/plan_trajectory") == [PLANNER],
-        lambda graph: graph.subscribed.get("/lab/in") == ["/lab/talker"],
-    )
-
-
-def test_what_is_gone_is_not_offered_any_more(client: FoxgloveClient) -> None:
-    def is_there(graph: Graph) -> bool:
-        return graph.published.get("/motor_commands") == [CONTROLLER]
-
-    def is_gone(graph: Graph) -> bool:
-        return not graph.published.get("/motor_commands")
-
-    client.do("graph")
-    _wait_for_graph(client, is_there)
-    listed((), "lifecycle", "set", CONTROLLER, "--to", "unconfigured")
-    _wait_for_graph(client, is_there, is_gone)
-    listed((), "lifecycle", "set", CONTROLLER, "--to", "active")
-    _wait_for_graph(client, is_there, is_gone, is_there)
-
-
 def test_a_read_only_dashboard_only_shows(pipeline: Any) -> None:
     with dashboard("--read-only") as server, foxglove(server.address) as client:
         info = client.until("serverInfo")
         assert not {"clientPublish", "services"} & set(info["capabilities"])
         client.has("/sensor_data")
-        client.do("set", parameters=[{"name": SPEED, "value": 2}], id="x")
         client.do("advertise", topic="/lab/in", schemaName="std_msgs/msg/String")
-        client.until("status", lambda data: "setting parameters" in data["message"])
         client.until("status", lambda data: "publishing is not possible" in data["message"])
-        assert _read(client, {SPEED}, SPEED)[SPEED]["value"] == 1

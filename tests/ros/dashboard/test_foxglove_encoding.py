@@ -1,17 +1,16 @@
-"""Frames, schemas, channels and parameters of the Foxglove protocol, without ROS."""
+"""Frames, schemas and channels of the Foxglove protocol, without ROS."""
 
 from __future__ import annotations
 
 import struct
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.dashboard.foxglove.catalog import Contents, changes, graph_update
+from composer.dashboard.foxglove.catalog import changes
 from composer.dashboard.foxglove.encoding import (
     ClientMessage,
     Schemas,
@@ -22,7 +21,6 @@ from composer.dashboard.foxglove.encoding import (
     service_response,
     time_frame,
 )
-from composer.dashboard.foxglove.parameters import Setting, parameter, read_setting
 from composer.dashboard.protocol.messages import BadRequestError
 from composer.interfaces import Interfaces
 
@@ -115,74 +113,3 @@ def test_services_have_two_schemas(tmp_path: Path) -> None:
 
 def test_changes() -> None:
     assert changes({1: "a", 2: "b"}, {2: "b", 3: "c"}) == ([1], ["c"])
-
-
-def test_changes_of_the_connection_graph() -> None:
-    before = Contents(publishers={"/a": ("/x",), "/b": ("/x",)}, providers={"/s": ("/x",)})
-    now = Contents(publishers={"/a": ("/x", "/y")}, subscribers={"/c": ("/z",)})
-    assert graph_update(before, now) == {
-        "op": "connectionGraphUpdate",
-        "publishedTopics": [{"name": "/a", "publisherIds": ["/x", "/y"]}],
-        "subscribedTopics": [{"name": "/c", "subscriberIds": ["/z"]}],
-        "advertisedServices": [],
-        "removedTopics": ["/b"],
-        "removedServices": ["/s"],
-    }
-    # The last publisher of a topic with subscriptions is gone.
-    left = Contents(subscribers={"/a": ("/z",)})
-    update = graph_update(Contents(publishers={"/a": ("/x",)}, subscribers={"/a": ("/z",)}), left)
-    assert update is not None
-    assert update["publishedTopics"] == [{"name": "/a", "publisherIds": []}]
-    assert graph_update(left, left) is None
-
-
-@pytest.mark.parametrize(
-    ("value", "sent"),
-    [
-        (None, {}),
-        (1, {"value": 1}),
-        (True, {"value": True}),
-        ("x", {"value": "x"}),
-        (1.0, {"value": 1.0, "type": "float64"}),
-        ([1.0, 2.0], {"value": [1.0, 2.0], "type": "float64_array"}),
-        ([1, 2], {"value": [1, 2]}),
-        ([], {"value": []}),
-    ],
-)
-def test_parameters_as_they_are_sent(value: Any, sent: dict[str, Any]) -> None:
-    assert parameter("/n.p", value) == {"name": "/n.p", **sent}
-
-
-@pytest.mark.parametrize(
-    ("item", "value"),
-    [
-        ({"value": 1}, 1),
-        ({"value": 1, "type": "float64"}, 1.0),
-        ({"value": [1, 2.5], "type": "float64_array"}, [1.0, 2.5]),
-        ({"value": "AQI=", "type": "byte_array"}, [1, 2]),
-        ({"value": True}, True),
-        ({}, None),
-    ],
-)
-def test_parameters_as_they_are_set(item: dict[str, Any], value: Any) -> None:
-    setting = read_setting({"name": "/ns/node.limits.reach", **item})
-    assert setting == Setting("/ns/node", "limits.reach", value)
-    assert type(setting.value) is type(value)
-
-
-@pytest.mark.parametrize(
-    ("item", "reason"),
-    [
-        (1, "must be an object"),
-        ({"name": 1}, "a string 'name'"),
-        ({"name": "/node"}, "must have the form /node.parameter"),
-        ({"name": "/n.p", "value": {}}, "must be a number, text, or array of them"),
-        ({"name": "/n.p", "value": [[1]]}, "must be a number, text, or array of them"),
-        ({"name": "/n.p", "value": 2**63}, "not an integer of 64 bits"),
-        ({"name": "/n.p", "value": 10**400, "type": "float64"}, "too large"),
-        ({"name": "/n.p", "value": "!", "type": "byte_array"}, "not base64"),
-    ],
-)
-def test_parameters_that_are_refused(item: Any, reason: str) -> None:
-    with pytest.raises(BadRequestError, match=reason):
-        read_setting(item)
