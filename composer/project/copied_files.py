@@ -8,7 +8,6 @@ for files that do not exist yet.
 from __future__ import annotations
 
 import os
-import posixpath
 import re
 import stat
 from collections.abc import Iterable, Iterator
@@ -16,10 +15,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TypeAlias
 
-from pathspec import GitIgnoreSpec, PathSpec
-
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import open_regular, read_regular
+from composer.base.regular_files import open_regular
+from composer.project.ignored_files import (
+    Pattern,
+    decision,
+    docker_lines,
+    docker_patterns,
+    git_patterns,
+    pattern_lines,
+)
 
 #: In a workspace: it holds a copy of a project, which may be replaced.
 MARK = ".compose-sync"
@@ -30,18 +35,23 @@ _NOT_COPIED = (
 )
 _SECRET_NAMES = (
     *(".env", ".env.*", "!.env.example", "!.env.sample", "!.env.template"),
-    *(".netrc", "id_rsa", "id_dsa", "id_ecdsa", "id_ed25519", "*.ppk"),
+    *("id_rsa", "id_dsa", "id_ecdsa", "id_ed25519", "id_ecdsa_sk", "id_ed25519_sk", "*.ppk"),
+    *(".netrc", ".pgpass", ".pypirc", ".git-credentials", ".ssh", ".gnupg", ".aws"),
 )
 #: Of a file that only its owner may read. Names of source files end otherwise.
 _KEY_NAME = re.compile(
-    r"id_\w+|(.*[._-])?(keys?|secrets?|credentials?|tokens?|passwords?)(\.json|\.txt)?"
-    r"|.*\.(pem|der|p12|pfx|jks|keystore|kdbx|gpg|asc)",
+    r"id_[\w-]+|.*(key|secret|credential|token|password|passwd|psk)s?(\.(txt|json|bak|old))?"
+    r"|.*(secret|credential|token|password)s?\.(ya?ml|toml|ini|cfg|conf)"
+    r"|.*\.(pem|der|key|p8|p12|pfx|jks|keystore|kdbx|gpg|asc|age|env|ovpn)",
     re.IGNORECASE | re.DOTALL,
 )
+_PRIVATE_KEY = rb"-{4,5} ?BEGIN [A-Z0-9 ]*PRIVATE KEY"
 _KEY_CONTENT = re.compile(
-    rb"^(-{4,5} ?BEGIN [A-Z0-9 ]*PRIVATE KEY|PuTTY-User-Key-File|AGE-SECRET-KEY-)", re.MULTILINE
+    rb"^(\xef\xbb\xbf)?[ \t]*(%b|PuTTY-User-Key-File|AGE-SECRET-KEY-|PrivateKey ?=)" % _PRIVATE_KEY,
+    re.MULTILINE,
 )
-_MAX_PATTERN_BYTES = 1_000_000
+#: In a file that only its owner may read, such as the JSON file of a service account.
+_KEY_ANYWHERE = re.compile(_PRIVATE_KEY)
 _HEAD_BYTES = 16_384  # text may precede a key
 _OTHER_USERS = 0o077
 _PRIVATE = "the private key of a host"
@@ -89,12 +99,12 @@ def pattern_of(path: str) -> str:
     return "/" + re.sub(" $", "*", text)
 
 
-def docker_patterns(root: Path) -> Iterator[str]:
+def patterns_for_images(root: Path) -> Iterator[str]:
     """Yield the patterns for docker that do not depend on the files that exist now.
 
     Docker reads the patterns of one file only, so those of the project's own are among them.
     """
-    yield from _lines(root / ".dockerignore")
+    yield from docker_lines(root)
     for name in (*_NOT_COPIED, *_SECRET_NAMES):
         yield re.sub(r"^(!?)(?=[^!/])", r"\1**/", name)
 
@@ -110,17 +120,18 @@ def copied_files(root: Path, private: Iterable[Path] = ()) -> CopiedFiles:
     checks = _Checks(root, keys)
     copied: list[str] = []
     staying: dict[str, str] = {}
-    folders = [(root, _ignores_above(root))]
+    folders = [(root, _ignores_above(root), False)]
     while folders:
-        folder, outer = folders.pop()
-        ignores = (*outer, (folder, GitIgnoreSpec.from_lines(_lines(folder / ".gitignore"))))
+        folder, outer, is_closed = folders.pop()
+        ignores = (*outer, (folder, _git_ignores(folder / ".gitignore")))
         for entry in _entries(folder):
             path = Path(entry.path).relative_to(root).as_posix()
-            reason = checks.reason(entry, path, ignores)
+            only_owner = is_closed or _only_owner_reads(entry)
+            reason = checks.reason(entry, path, ignores, only_owner=only_owner)
             if reason is not None:
                 staying[path] = reason
             elif entry.is_dir(follow_symlinks=False):
-                folders.append((Path(entry.path), ignores))
+                folders.append((Path(entry.path), ignores, only_owner))
             elif entry.is_file(follow_symlinks=False) or entry.is_symlink():
                 copied.append(path)
     missing = (path.relative_to(root).as_posix() for path in keys if path.is_relative_to(root))
@@ -129,84 +140,74 @@ def copied_files(root: Path, private: Iterable[Path] = ()) -> CopiedFiles:
 
 
 #: Folders with the patterns of their .gitignore, the outermost first.
-_Ignores: TypeAlias = tuple[tuple[Path, GitIgnoreSpec], ...]
+_Ignores: TypeAlias = tuple[tuple[Path, tuple[Pattern, ...]], ...]
 
 
 class _Checks:
     """Says why a file below ``root`` stays here."""
 
     def __init__(self, root: Path, keys: Iterable[Path]) -> None:
-        lines = _lines(root / ".dockerignore")
-        # For docker, unlike git, the last pattern decides, also below an excluded folder.
-        self._docker = PathSpec(GitIgnoreSpec.from_lines(map(_from_docker, lines)).patterns)
-        self._docker_includes = any(line.startswith("!") for line in lines)
-        self._not_copied = GitIgnoreSpec.from_lines(_NOT_COPIED)
-        self._secret = GitIgnoreSpec.from_lines(_SECRET_NAMES)
+        self._docker = docker_patterns(docker_lines(root))
+        self._docker_includes = not all(pattern.excludes for pattern in self._docker)
+        self._not_copied = git_patterns(_NOT_COPIED)
+        self._secret = git_patterns(_SECRET_NAMES)
         self._keys = {(found.st_dev, found.st_ino) for found in filter(None, map(_status, keys))}
 
-    def reason(self, entry: os.DirEntry[str], path: str, ignores: _Ignores) -> str | None:
+    def reason(
+        self, entry: os.DirEntry[str], path: str, ignores: _Ignores, *, only_owner: bool
+    ) -> str | None:
         """Return why a file or folder stays here; ``path`` is relative to the root."""
         is_folder = entry.is_dir(follow_symlinks=False)
-        name = f"{path}/" if is_folder else path
-        if self._not_copied.match_file(name):
+        if decision(self._not_copied, path, is_folder=is_folder):
             return _MADE_THERE
         if _is_ignored(Path(entry.path), ignores, is_folder=is_folder):
             return "ignored by .gitignore"
-        if self._docker.match_file(name) and not (is_folder and self._docker_includes):
+        # Other than git, docker includes files of excluded folders again.
+        is_ignored = decision(self._docker, path, is_folder=is_folder)
+        if is_ignored and not (is_folder and self._docker_includes):
             return "ignored by .dockerignore"
-        if self._secret.match_file(name):
+        if decision(self._secret, path, is_folder=is_folder):
             return "a secret, by its name"
-        return None if is_folder else self._secret_reason(Path(entry.path))
+        return None if is_folder else self._secret_reason(Path(entry.path), only_owner=only_owner)
 
-    def _secret_reason(self, path: Path) -> str | None:
+    def _secret_reason(self, path: Path, *, only_owner: bool) -> str | None:
         """Return why a file is a secret, by its content and permissions."""
         status = _status(path, follow=False)
         if status is None or not stat.S_ISREG(status.st_mode):
             return None
         if (status.st_dev, status.st_ino) in self._keys:
             return _PRIVATE
-        if _KEY_CONTENT.search(_head(path)):
+        head = _head(path)
+        if _KEY_CONTENT.search(head):
             return "a private key"
-        if not status.st_mode & _OTHER_USERS and _KEY_NAME.fullmatch(path.name):
+        if only_owner and (_KEY_NAME.fullmatch(path.name) or _KEY_ANYWHERE.search(head)):
             return "a secret: only you may read it"
         return None
 
 
 def _ignores_above(root: Path) -> _Ignores:
-    """Return the patterns of git that apply to ``root``: those of folders of its repository."""
+    """Return the patterns of git that apply to ``root``: those of its repository and of folders."""
     folders = (root, *root.parents)
     repository = next((path for path in folders if (path / ".git").exists()), root)
     above = [path for path in root.parents if path.is_relative_to(repository)]
-    return tuple(
-        (path, GitIgnoreSpec.from_lines(_lines(path / ".gitignore"))) for path in reversed(above)
+    return (
+        (repository, _git_ignores(repository / ".git" / "info" / "exclude")),
+        *((path, _git_ignores(path / ".gitignore")) for path in reversed(above)),
     )
+
+
+def _git_ignores(path: Path) -> tuple[Pattern, ...]:
+    return git_patterns(pattern_lines(path))
 
 
 def _is_ignored(path: Path, ignores: _Ignores, *, is_folder: bool) -> bool:
     """Return whether git ignores a file: the innermost .gitignore that mentions it decides."""
     for folder, patterns in reversed(ignores):
         name = path.relative_to(folder).as_posix()
-        decision = patterns.check_file(f"{name}/" if is_folder else name).include
-        if decision is not None:
-            return decision
+        is_ignored = decision(patterns, name, is_folder=is_folder)
+        if is_ignored is not None:
+            return is_ignored
     return False
-
-
-def _from_docker(line: str) -> str:
-    """Return a pattern of docker as one of git: docker's begin at the root."""
-    inverted, pattern = ("!", line[1:].strip()) if line.startswith("!") else ("", line)
-    return f"{inverted}/{posixpath.normpath(pattern).lstrip('/')}"
-
-
-def _lines(path: Path) -> list[str]:
-    """Return the patterns of a file; none if it is not there."""
-    try:
-        data = read_regular(path, _MAX_PATTERN_BYTES)
-    except OSError:
-        return []
-    text = data.decode(errors="replace").removeprefix("\ufeff")
-    lines = [line.strip() for line in text.splitlines()]
-    return [line for line in lines if line and not line.startswith("#")]
 
 
 def _entries(folder: Path) -> list[os.DirEntry[str]]:
@@ -226,3 +227,9 @@ def _head(path: Path) -> bytes:
     with suppress(OSError), open_regular(path) as file:
         return file.read(_HEAD_BYTES)
     return b""
+
+
+def _only_owner_reads(entry: os.DirEntry[str]) -> bool:
+    with suppress(OSError):
+        return not entry.stat(follow_symlinks=False).st_mode & _OTHER_USERS
+    return False

@@ -9,8 +9,8 @@ import sys
 import venv
 from pathlib import Path
 
-import pathspec
 import pytest
+import typer
 
 from tests.packaging.conftest import ROOT
 from tests.packaging.installation import Installation, with_this_ros, without_ros
@@ -85,4 +85,4 @@ def test_an_interface_package_is_built(installation: Installation, tmp_path: Pat
 
 def _site() -> str:
     """Return the folder with the dependencies of the composer."""
-    return str(Path(pathspec.__file__).parents[1])
+    return str(Path(typer.__file__).parents[1])

@@ -156,7 +156,7 @@ def _image(
     from composer.bridges.export.deployment import services
     from composer.interfaces.sources import Bundle, find_packages
     from composer.model.interface_packages import NOT_IN_WHEELS, used_packages
-    from composer.project.copied_files import docker_patterns
+    from composer.project.copied_files import patterns_for_images
 
     root = result.project.root
     files = files_to_copy(system, root)
@@ -172,7 +172,7 @@ def _image(
         unknown_interfaces=tuple(
             name for name in used if name not in own and name not in Bundle().packages()
         ),
-        ignored=(tuple(docker_patterns(root)), files.docker_patterns),
+        ignored=(tuple(patterns_for_images(root)), files.docker_patterns),
     )
     return contents, name or f"{services(system)[0].label}:latest"
 

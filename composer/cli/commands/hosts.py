@@ -144,13 +144,10 @@ def sync(
     require_hosts("compose hosts sync", "rsync", "ssh")
     result, declared, _ = load_for_hosts(system, arguments)
     from composer.client.hosts.start import sync_hosts
-    from composer.client.hosts.sync import SyncOptions, root_problem
+    from composer.client.hosts.sync import SyncOptions
     from composer.runtime.process.computer import is_this_computer
 
     root = result.project.root
-    problem = root_problem(root)
-    if problem is not None:
-        raise CommandError(problem, hint="an empty composer.yaml marks the root of a project")
     others = [host for host in declared.hosts if not is_this_computer(host.address.value)]
     chosen = _chosen(others, names or [], declared.name.value)
     check_workspaces(chosen)

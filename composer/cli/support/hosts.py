@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -35,10 +36,19 @@ def require_hosts(command: str, *programs: str) -> None:
 
 
 def files_to_copy(system: System, root: Path) -> CopiedFiles:
-    """Return which files of the project are copied, to hosts and into images."""
+    """Return which files of the project are copied, to hosts and into images.
+
+    Raises CommandError if the project is a whole home folder or file system.
+    """
     from composer.model.hosts import key_file
     from composer.project.copied_files import copied_files
 
+    home = os.path.realpath(os.path.expanduser("~"))  # noqa: PTH111 - there may be none
+    if root in (Path(home), Path(root.anchor)):
+        raise CommandError(
+            f"the root of the project is '{root}', which is not copied as a whole",
+            hint="an empty composer.yaml marks the root of a project",
+        )
     names = [host.identity_file for host in system.hosts if host.identity_file is not None]
     return copied_files(root, [key_file(name, root) for name in names])
 

@@ -42,15 +42,6 @@ class SyncOptions:
     excluded: tuple[str, ...] = ()
 
 
-def root_problem(root: Path) -> str | None:
-    """Return why a folder is not copied as a project; None if it is."""
-    if root == Path(root.anchor):
-        return "the root of the project is that of the file system"
-    if root == Path.home():
-        return "the root of the project is the home folder"
-    return None
-
-
 async def prepare_workspace(
     host: Host, connection: asyncssh.SSHClientConnection, *, dry_run: bool
 ) -> str:

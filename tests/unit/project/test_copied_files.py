@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.project.copied_files import copied_files, docker_patterns
+from composer.project.copied_files import copied_files, patterns_for_images
 
 PRIVATE_KEY = "Bag Attributes\n-----BEGIN ENCRYPTED PRIVATE KEY-----\nMII\n"
 
@@ -59,6 +59,13 @@ def test_what_git_and_docker_ignore_stays(tmp_path: Path) -> None:
         ("deploy.key", "binary", 0o600, True),
         ("deploy.key", "binary", 0o644, False),
         ("api_token", "x", 0o400, True),
+        ("private/hidden", '{"k": "-----BEGIN PRIVATE KEY-----"}', 0o600, True),
+        ("robot.json", '{"k": "-----BEGIN PRIVATE KEY-----"}', 0o644, False),
+        ("secret.yaml", "k: |\n  -----BEGIN RSA PRIVATE KEY-----\n", 0o644, True),
+        ("bom", "\ufeff-----BEGIN PRIVATE KEY-----\n", 0o644, True),
+        ("deploykey", "x", 0o600, True),
+        ("wifi_password.yaml", "x", 0o600, True),
+        ("teleop_keys.yaml", "x", 0o600, False),
         ("key\n", "x", 0o600, False),
         ("key_teleop.py", "x", 0o600, False),
         ("robot.yaml", "system: r\n", 0o600, False),
@@ -68,6 +75,36 @@ def test_what_git_and_docker_ignore_stays(tmp_path: Path) -> None:
 def test_secrets_stay(tmp_path: Path, name: str, text: str, mode: int, stays: bool) -> None:
     write(tmp_path, {name: text}, mode)
     assert staying(tmp_path) == ({name} if stays else set())
+
+
+def test_files_of_a_folder_that_only_its_owner_enters_are_like_keys(tmp_path: Path) -> None:
+    write(tmp_path, {"closed/sub/robot.key": "x", "closed/robot.yaml": "x"})
+    (tmp_path / "closed").chmod(0o700)
+    assert staying(tmp_path) == {"closed/sub/robot.key"}
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "ignored"),
+    [
+        (".gitignore", "*.key\n!certs/", {"b.key", "certs/a.key"}),
+        (".gitignore", "name\\ ", {"name "}),
+        (".gitignore", "!\n\\\n[b\n!/\nname*", {"name", "name "}),
+        (".gitignore", "[[:alpha:]].[^a]ey", {"b.key", "certs/a.key"}),
+        (".gitignore", "certs/**\n!certs/*/\n", {"certs/a.key", "certs/sub/x"}),
+        (".git/info/exclude", "name", {"name"}),
+        (".dockerignore", "**.key", {"b.key", "certs/a.key"}),
+        (".dockerignore", "# c\n!\n[\n*\n! certs\n!n*", {"b.key"}),
+        (".dockerignore", "c**a.key\n.", {"certs/a.key"}),
+        (".dockerignore", "/./certs/../name\r", {"name"}),
+        ("certs/.dockerignore", "a.key", set()),
+    ],
+)
+def test_patterns(tmp_path: Path, file: str, pattern: str, ignored: set[str]) -> None:
+    """Git and docker read them like that."""
+    files = {"b.key", "name", "name ", "certs/a.key", "certs/sub/x"}
+    write(tmp_path, dict.fromkeys(files, "x") | {".git/HEAD": "", file: pattern})
+    copied = set(copied_files(tmp_path).copied) & files
+    assert files - copied == ignored
 
 
 @pytest.mark.parametrize(
@@ -131,6 +168,6 @@ def test_files_that_cannot_be_read_are_skipped(tmp_path: Path) -> None:
 
 def test_docker_reads_the_patterns_of_the_project_first(tmp_path: Path) -> None:
     write(tmp_path, {".dockerignore": "# mine\nmaps\n!.env\n"})
-    patterns = list(docker_patterns(tmp_path))
+    patterns = list(patterns_for_images(tmp_path))
     assert patterns[:2] == ["maps", "!.env"]
     assert {"**/.env", "!**/.env.example", "/build", "**/.git"} <= set(patterns[2:])

@@ -138,7 +138,7 @@ def test_the_image_has_no_secrets(project: Path) -> None:
     assert folder == "/deploy"
     assert wheel.startswith("!/deploy/ros2_composer-")
     assert files == ["/.env", "/keys/robot"]
-    assert not [line for line in ignored if ".ssh" in line]
+    assert not [line for line in ignored if ".ssh/" in line]
     done = compose("export", "kubernetes", "robot", "--list")
     assert done.out.splitlines() == [
         ".gitignore",
@@ -147,6 +147,15 @@ def test_the_image_has_no_secrets(project: Path) -> None:
         "not copied: deploy (ignored by .gitignore)",
         "not copied: keys/robot (the private key of a host)",
     ]
+
+
+def test_a_home_folder_is_no_project(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (project / "link").symlink_to(project)
+    monkeypatch.setenv("HOME", str(project / "link"))
+    (project / "robot.yaml").write_text(SYSTEM.replace("LONG: LONG", "LONG: x"))
+    done = compose("export", "kubernetes", "robot.yaml", "--list")
+    assert done.code == 1
+    assert f"the root of the project is '{project}', which is not copied" in done.err
 
 
 def test_two_formats_share_the_image(project: Path) -> None:
