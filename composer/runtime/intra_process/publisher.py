@@ -12,6 +12,7 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
 from composer.base.fast_dataclass import dataclass
+from composer.runtime.clock.clock import Clock
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 
@@ -19,7 +20,7 @@ from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 class Target(Protocol):
     """Receives messages in this process."""
 
-    def put(self, message: Any) -> None:
+    def put(self, message: Any, /) -> None:
         """Receive the message, from any thread."""
 
 
@@ -54,6 +55,7 @@ class PublisherContext:
     """
 
     gate: LifecycleGate
+    clock: Clock
     on_refused: Callable[[], None]
     observers: tuple[Target, ...] = ()
     listens_to_matches: bool = True

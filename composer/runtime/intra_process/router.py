@@ -5,7 +5,7 @@ Which topics, services and actions stay in the process is decided from the model
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TypeAlias, TypeVar
 
@@ -21,6 +21,7 @@ from composer.runtime.intra_process.ignore_local_publications import (
 )
 from composer.runtime.intra_process.publisher import GatedPublisher, PublisherContext
 from composer.runtime.intra_process.servers import LocalActionServer, LocalService
+from composer.runtime.intra_process.time_limits import SubscriptionLimits
 from composer.runtime.intra_process.topic import (
     LocalSubscription,
     Receiver,
@@ -47,14 +48,17 @@ def channel_of(port: Port) -> ChannelKey:
     return port.kind.channel, port.full_name
 
 
-def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
+def shared_channels(
+    system: System, *, in_virtual_time: bool = False
+) -> Mapping[ChannelKey, str | None]:
     """Return the channels with local ports at both endpoints, each with the reason it needs DDS.
 
     The reason is None for channels that stay in the process. A subscription ignores either all or
-    none of the publications of its process, so one port that needs DDS decides for the topic.
+    none of the publications of its process, so one port that needs DDS decides for the topic. Time
+    limits of QoS profiles are a reason in real time only.
     """
     return {
-        (channel.kind, channel.name): _dds_reason(channel, system.delivery)
+        (channel.kind, channel.name): _dds_reason(channel, system.delivery, in_virtual_time)
         for channel in channels(
             (node for node in system.nodes if node.in_process), with_transforms=True
         )
@@ -62,11 +66,11 @@ def shared_channels(system: System) -> Mapping[ChannelKey, str | None]:
     }
 
 
-def _dds_reason(channel: Channel, default: Delivery) -> str | None:
+def _dds_reason(channel: Channel, default: Delivery, in_virtual_time: bool) -> str | None:
     if any((end.port.delivery or default) is Delivery.DDS for end in channel.ends):
         return "'delivery: dds' is set"
     if channel.kind is ChannelKind.TOPIC:
-        return _topic_reason(channel)
+        return _topic_reason(channel, in_virtual_time)
     return _server_reason(channel)
 
 
@@ -83,22 +87,20 @@ def _server_reason(channel: Channel) -> str | None:
     return None
 
 
-def _topic_reason(channel: Channel) -> str | None:
+def _topic_reason(channel: Channel, in_virtual_time: bool) -> str | None:
     if channel.name in _NOT_BY_PORTS or channel.name.endswith(_ENDINGS_NOT_BY_PORTS):
         return "the runtime publishes it too"
-    if is_timed(end.port.qos.profile for end in channel.ends):
+    if not in_virtual_time and any(_is_timed(end.port.qos.profile) for end in channel.ends):
         return "its QoS has a deadline, lifespan or liveliness, which only the middleware monitors"
     return None
 
 
-def is_timed(profiles: Iterable[QosProfile]) -> bool:
-    """Return whether a profile has a time limit, which only the middleware monitors."""
-    return any(
+def _is_timed(profile: QosProfile) -> bool:
+    return (
         profile.deadline_ms is not None
         or profile.lifespan_ms is not None
         or profile.liveliness is not Liveliness.AUTOMATIC
         or profile.liveliness_lease_duration_ms is not None
-        for profile in profiles
     )
 
 
@@ -157,16 +159,23 @@ class LocalRouter:
         return local, lambda: topic.remove_publisher(local)
 
     def add_subscription(
-        self, port: Port, subscription: Subscription, receiver: Receiver
+        self,
+        port: Port,
+        subscription: Subscription,
+        receiver: Receiver,
+        limits: SubscriptionLimits | None = None,
     ) -> Remove:
-        """Pass local publications to ``receiver``; return a function that stops that."""
+        """Pass local publications to ``receiver``; return a function that stops that.
+
+        ``limits`` are those that the runtime monitors itself, in virtual time.
+        """
         topic = self._topics.get(channel_of(port))
         if topic is None:
             return receiver.close
         ignore_local(subscription)
         if self._instruments is not None:
             receiver = self._instruments.receiver(port, receiver)
-        local = LocalSubscription(subscription.msg_type, port, receiver)
+        local = LocalSubscription(subscription.msg_type, port, receiver, limits)
         topic.add_subscription(local)
         return lambda: topic.remove_subscription(local)
 

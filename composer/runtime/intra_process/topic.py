@@ -1,16 +1,22 @@
-"""One topic within the process: its local publishers and subscriptions, and the need for DDS."""
+"""One topic within the process: its local publishers and subscriptions, and the need for DDS.
+
+All that a publisher puts to a subscription goes through the target that
+``LocalPublisher._target_of`` returns.
+"""
 
 from __future__ import annotations
 
 import threading
 from collections import deque
 from collections.abc import Callable
+from math import inf
 from typing import Any, Protocol
 
 from rclpy.publisher import Publisher
 
 from composer.model import Isolation, Port
-from composer.model.qos import Durability, incompatibilities
+from composer.model.qos import Durability, QosProfile, incompatibilities
+from composer.runtime.clock.clock import Clock
 from composer.runtime.intra_process.match_flag import MATCHING, MatchListener
 from composer.runtime.intra_process.publisher import (
     GatedPublisher,
@@ -19,6 +25,7 @@ from composer.runtime.intra_process.publisher import (
     combined,
     copy_of,
 )
+from composer.runtime.intra_process.time_limits import SubscriptionLimits
 
 
 class Receiver(Target, Protocol):
@@ -31,40 +38,55 @@ class Receiver(Target, Protocol):
 class LocalSubscription:
     """A subscription, as publishers of its topic see it."""
 
-    __slots__ = ("isolated", "message_type", "profile", "receiver")
+    __slots__ = ("isolated", "limits", "message_type", "profile", "receiver")
 
-    def __init__(self, message_type: Any, port: Port, receiver: Receiver) -> None:
+    def __init__(
+        self,
+        message_type: Any,
+        port: Port,
+        receiver: Receiver,
+        limits: SubscriptionLimits | None = None,
+    ) -> None:
+        """``limits`` are given in virtual time."""
         self.message_type = message_type
         self.profile = port.qos.profile
         self.isolated = port.isolation is Isolation.COPY
         self.receiver = receiver
+        self.limits = limits
 
 
 class CopyingTarget:
     """Puts a copy of each message."""
 
-    __slots__ = ("_receiver",)
+    __slots__ = ("_target",)
 
-    def __init__(self, receiver: Receiver) -> None:
-        self._receiver = receiver
+    def __init__(self, target: Target) -> None:
+        self._target = target
 
     def put(self, message: Any) -> None:
         """Put a copy of the message."""
-        self._receiver.put(copy_of(message))
+        self._target.put(copy_of(message))
 
 
 class LatchedMessages:
-    """Keeps the last messages of a transient-local topic; copies, if they are isolated."""
+    """Keeps the last messages of a transient-local topic, until their lifespan ends."""
 
-    __slots__ = ("_isolated", "messages")
+    __slots__ = ("_kept", "_lifespan_s", "_monotonic")
 
-    def __init__(self, depth: int | None, *, isolated: bool) -> None:
-        self._isolated = isolated
-        self.messages: deque[Any] = deque(maxlen=depth)
+    def __init__(self, profile: QosProfile, clock: Clock) -> None:
+        lifespan_ms = profile.lifespan_ms
+        self._lifespan_s = inf if lifespan_ms is None else lifespan_ms / 1000.0
+        self._monotonic = clock.monotonic
+        self._kept: deque[tuple[float, Any]] = deque(maxlen=profile.queue_depth)
 
     def put(self, message: Any) -> None:
         """Keep the message."""
-        self.messages.append(copy_of(message) if self._isolated else message)
+        self._kept.append((self._monotonic(), message))
+
+    def messages(self) -> list[Any]:
+        """Return the messages, the oldest first."""
+        since_s = self._monotonic() - self._lifespan_s
+        return [message for at_s, message in self._kept if at_s > since_s]
 
 
 class LocalPublisher(GatedPublisher):
@@ -109,6 +131,9 @@ class LocalPublisher(GatedPublisher):
     def close(self) -> None:
         """Release the match listener. Call it before the publisher is destroyed."""
         self._match_listener.close()
+        for subscription in self._subscriptions:
+            if subscription.limits is not None:
+                subscription.limits.forget(self)
 
     def _matches(self, subscription: LocalSubscription) -> bool:
         has_type = subscription.message_type is self.message_type
@@ -120,8 +145,10 @@ class LocalPublisher(GatedPublisher):
         self._check_external()
 
     def _target_of(self, subscription: LocalSubscription) -> Target:
-        isolated = self._isolated or subscription.isolated
-        return CopyingTarget(subscription.receiver) if isolated else subscription.receiver
+        target: Target = subscription.receiver
+        if subscription.limits is not None:
+            target = subscription.limits.target(self, self.profile)
+        return CopyingTarget(target) if self._isolated or subscription.isolated else target
 
     def _check_external(self) -> None:
         with self._checking:
@@ -142,8 +169,9 @@ class LatchingPublisher(LocalPublisher):
 
     def __init__(self, publisher: Publisher, context: PublisherContext, port: Port) -> None:
         super().__init__(publisher, context, port)
-        self._latched = LatchedMessages(self.profile.queue_depth, isolated=self._isolated)
-        self._observers = (*context.observers, self._latched)
+        self._latched = LatchedMessages(self.profile, context.clock)
+        latched = CopyingTarget(self._latched) if self._isolated else self._latched
+        self._observers = (*context.observers, latched)
         self._target = combined(self._observers)
         self._has_external = True  # an external subscription that joins later needs the messages
         self._lock = threading.Lock()  # a joining subscription gets each message once
@@ -162,7 +190,7 @@ class LatchingPublisher(LocalPublisher):
             return
         with self._lock:
             if subscription.profile.durability is Durability.TRANSIENT_LOCAL:
-                for message in self._latched.messages:
+                for message in self._latched.messages():
                     self._target_of(subscription).put(message)
             self._set_subscriptions((*self._subscriptions, subscription))
 

@@ -39,6 +39,7 @@ class PublisherPort(RunningPort):
         self._publisher = self._make_publisher(port)
         origin = PublisherContext(
             context.gate,
+            context.loop.clock,
             self._drop,
             tuple(self._observers(port)),
             listens_to_matches=not self._qos_events.uses_matches,
@@ -77,6 +78,7 @@ class PublisherPort(RunningPort):
         self._context.node.destroy_publisher(self._publisher)
 
     def _observers(self, port: Port) -> Iterator[Target]:
+        yield from self._qos_events.publisher_limits()
         yield from self._context.chains.published_by(port)
         if self._context.mutations is not None:
             yield RememberingTarget(self._context.mutations, f"published by '{self._name}'")

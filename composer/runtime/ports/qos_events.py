@@ -22,9 +22,11 @@ from rclpy.event_handler import (
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
-from composer.model.qos import incompatibilities
+from composer.model.qos import Liveliness, incompatibilities
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import RepeatedWarning
+from composer.runtime.intra_process.publisher import Target
+from composer.runtime.intra_process.time_limits import OnOverdue, Overdue, SubscriptionLimits
 from composer.runtime.ros_graph.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
@@ -91,6 +93,9 @@ class IncompatibleQos:
             yield f"{topic}: {policy} is {there} there, {here} here; {reason}"
 
 
+_DEADLINE_MISSED = "deadline_missed"
+_LIVELINESS_LOST = "liveliness_lost"
+_LIVELINESS_CHANGED = "liveliness_changed"
 _PUBLISHER = QoSPublisherEventType
 _SUBSCRIPTION = QoSSubscriptionEventType
 #: Events about endpoints that do not match, which occur when they are discovered.
@@ -132,6 +137,8 @@ class QosEvents:
     Events are ignored while the node is not active. The middleware does not know lifecycle states:
     it measures a deadline or a lease from the last message, even if that was sent before the node
     was deactivated. So an event also counts only if the node was active for the whole period.
+
+    In virtual time, the middleware is not asked: ``time_limits`` monitors deadlines and leases.
     """
 
     #: Whether it watches matches, so that in-process delivery cannot.
@@ -144,11 +151,14 @@ class QosEvents:
         self._warnings: dict[str, RepeatedWarning] = {}
         self._stop_watching: list[Callable[[], None]] = []
         self._active_since_s = inf  # by the loop's clock
+        self._is_virtual = context.loop.clock.is_virtual
 
     def create_event_handlers(
         self, _callback_group: CallbackGroup, endpoint: Any, _topic_name: str
     ) -> list[EventHandler]:
         """Watch the events that the middleware supports; lost messages last."""
+        if self._is_virtual:
+            return []
         for kind in _INCOMPATIBLE[self._port.kind]:
             with suppress(UnsupportedEventTypeError):
                 self._watch_incompatible(endpoint, kind)
@@ -162,6 +172,39 @@ class QosEvents:
         """Count events from now on, and those that take a period after that period."""
         self._active_since_s = self._context.loop.clock.monotonic()
 
+    def publisher_limits(self) -> tuple[Target, ...]:
+        """Return what has to get each message of a publisher: its time limits in virtual time."""
+        profile = self._port.qos.profile
+        periods = {event.name: event for event in self._publisher_events()}
+        if profile.liveliness is Liveliness.AUTOMATIC:  # asserted as long as the process exists
+            periods.pop(_LIVELINESS_LOST, None)
+        limits = [
+            Overdue(
+                *(self._context.loop, 1000.0 * event.period_s, self._on_overdue(event)),
+                repeats=event.name == _DEADLINE_MISSED,
+            )
+            for event in periods.values()
+            if self._is_virtual
+        ]
+        self._stop_watching += [limit.close for limit in limits]
+        return tuple(limits)
+
+    def subscription_limits(self, receiver: Target) -> SubscriptionLimits | None:
+        """Return the time limits of a subscription whose messages go to ``receiver``.
+
+        They are None in real time.
+        """
+        if not self._is_virtual:
+            return None
+        events = {event.name: self._on_overdue(event) for event in self._subscription_events()}
+        limits = SubscriptionLimits(
+            *(self._context.loop, self._port.qos.profile, receiver),
+            on_deadline=events.get(_DEADLINE_MISSED, _ignore),
+            on_lease=events.get(_LIVELINESS_CHANGED, _ignore),
+        )
+        self._stop_watching.append(limits.close)
+        return limits
+
     def close(self) -> None:
         """Stop watching. Call it before the endpoint is destroyed."""
         self._incompatible.close()
@@ -174,7 +217,7 @@ class QosEvents:
         profile = self._port.qos.profile
         if profile.deadline_ms is not None:
             yield _EventKind(
-                "deadline_missed",
+                _DEADLINE_MISSED,
                 _PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
                 f"nothing was published within its deadline of {profile.deadline_ms:g} ms",
                 period_s=profile.deadline_ms / 1000.0,
@@ -182,7 +225,7 @@ class QosEvents:
         lease_ms = profile.liveliness_lease_duration_ms
         if lease_ms is not None:
             yield _EventKind(
-                "liveliness_lost",
+                _LIVELINESS_LOST,
                 _PUBLISHER.RCL_PUBLISHER_LIVELINESS_LOST,
                 f"it did not assert its liveliness within its lease of {lease_ms:g} ms",
                 period_s=lease_ms / 1000.0,
@@ -192,7 +235,7 @@ class QosEvents:
         profile = self._port.qos.profile
         if profile.deadline_ms is not None:
             yield _EventKind(
-                "deadline_missed",
+                _DEADLINE_MISSED,
                 _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,
                 f"nothing was received within its deadline of {profile.deadline_ms:g} ms",
                 period_s=profile.deadline_ms / 1000.0,
@@ -200,7 +243,7 @@ class QosEvents:
         lease_ms = profile.liveliness_lease_duration_ms
         if lease_ms is not None:
             yield _EventKind(
-                "liveliness_changed",
+                _LIVELINESS_CHANGED,
                 _SUBSCRIPTION.RCL_SUBSCRIPTION_LIVELINESS_CHANGED,
                 f"a publisher did not assert its liveliness within the lease of {lease_ms:g} ms",
                 lambda status: status.not_alive_count_change,  # negative for a recovery
@@ -219,7 +262,6 @@ class QosEvents:
 
     def _watch(self, endpoint: Any, event: _EventKind) -> None:
         context = self._context
-        name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
 
         def on_events(number: int) -> None:
             began_s = self._context.loop.clock.monotonic() - event.period_s
@@ -233,9 +275,26 @@ class QosEvents:
                 endpoint, event.kind, lambda status: on_events(count(status))
             )
         self._stop_watching.append(stop)
+        self._warn_of(event)
+
+    def _warn_of(self, event: _EventKind) -> None:
+        """Prepare the warning of an event."""
+        name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
         self._warnings[event.name] = RepeatedWarning(
-            context.log, context.loop, lambda: f"{name}: {event.text}{self._publishers()}"
+            self._context.log,
+            self._context.loop,
+            lambda: f"{name}: {event.text}{self._publishers()}",
         )
+
+    def _on_overdue(self, event: _EventKind) -> OnOverdue:
+        """Return what is called when the period of an event has passed, in virtual time."""
+        self._warn_of(event)
+
+        def on_overdue(since_s: float) -> None:
+            now_s = self._context.loop.clock.monotonic()
+            self._on_events(event.name, 1, since_s if event.period_s else now_s)
+
+        return on_overdue
 
     def _on_events(self, event: str, number: int, began_s: float) -> None:
         is_active = self._context.gate.incoming and began_s >= self._active_since_s
@@ -254,3 +313,7 @@ class QosEvents:
     def _on_incompatible(self) -> None:
         self._context.statistics.qos_events["incompatible"] += 1
         self._incompatible.check()
+
+
+def _ignore(_: float) -> None:
+    """Do nothing: there is no such limit."""

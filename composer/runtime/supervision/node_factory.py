@@ -86,7 +86,8 @@ class NodeFactory:
         """
         self._process = process
         self._nodes = nodes
-        self._router = LocalRouter(shared_channels(self._system), self._options.instruments)
+        shared = shared_channels(self._system, in_virtual_time=self.clock.is_virtual)
+        self._router = LocalRouter(shared, self._options.instruments)
         return self._router.refusal
 
     def make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:

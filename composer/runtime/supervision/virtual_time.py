@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.model import Node, System
-from composer.runtime.intra_process.router import is_timed, shared_channels
+from composer.runtime.intra_process.router import shared_channels
 from composer.runtime.process import StartRefused
 
 #: Nothing outside of the process takes part in a run.
@@ -30,11 +30,8 @@ def _reasons(system: System) -> Iterator[str]:
         kind = _kind_outside(node)
         if kind is not None:
             yield f"{node.full_name} {kind}, which has the time of the computer"
-        for port in node.ports:
-            if is_timed([port.qos.profile]):
-                yield f"{port.full_name} of {node.full_name} has a deadline, lifespan or lease"
-    for (kind, name), reason in shared_channels(system).items():
-        if reason is not None and not reason.startswith("its QoS"):
+    for (kind, name), reason in shared_channels(system, in_virtual_time=True).items():
+        if reason is not None:
             yield f"{kind.value} {name} needs the middleware: {reason}"
 
 
