@@ -36,6 +36,7 @@ from composer.model import LogLevel, Node, System
 from composer.model.names import PROGRAM_LOGGER, join
 from composer.plan import Plan
 from composer.runtime.children.discovery_server import discovery_servers
+from composer.runtime.clock.randomness import use_seed
 from composer.runtime.executors.placement import (
     memory_excess,
     place_process,
@@ -137,6 +138,9 @@ class Host:
         if is_virtual:
             check_virtual_time(self._system)
             os.environ.update(ISOLATION)
+        seed = 0 if is_virtual and self._options.seed is None else self._options.seed
+        if seed is not None:
+            use_seed(seed)
         discovery = None if is_virtual else self._system.discovery
         prepare_environment(discovery)
         if self._end.uses_fast_exit:

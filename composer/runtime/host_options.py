@@ -46,6 +46,7 @@ class HostOptions:
     ``ends_process`` promises that the process ends after the run, by ``os._exit`` if the outcome
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
     by ``clock``; by default, from when the host is created. ``clock`` is the clock of the system.
+    With ``seed``, which is 0 by default in virtual time, random numbers are the same in each run.
     ``instruments`` are those of a test.
     """
 
@@ -64,6 +65,7 @@ class HostOptions:
     on_alive: Callable[[], None] = lambda: None
     started_at_s: float | None = None
     clock: Clock = COMPUTER
+    seed: int | None = None
     process: Process | None = None
     report_key: str = ""
     member_command: Sequence[str] = ()

@@ -116,6 +116,16 @@ def run(
             "Needs --for, and nodes of this process only.",
         ),
     ] = Time.REAL,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER",
+            min=0,
+            max=2**32 - 1,
+            help="Begin the random numbers of 'random' and 'numpy.random' with this seed.",
+            show_default="0 in virtual time",
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the plan with its causes and exit.")
     ] = False,
@@ -245,7 +255,7 @@ def run(
     _require(part, dashboard=dashboard)
     if member is None:
         announce_discovery(part)
-    options = given_options(context, (*START_OPTIONS, "tracing", "check_mutation"))
+    options = given_options(context, (*START_OPTIONS, "seed", "tracing", "check_mutation"))
     start = [*declared.arguments, *options]
     from composer.cli.support.process import compose_command, run_in_background
     from composer.runtime.process.computer import process_start_s
@@ -266,6 +276,7 @@ def run(
         process=member,
         report_key=os.environ.pop(REPORT_KEY_VARIABLE, ""),  # not for its own children
         clock=_clock(time),
+        seed=seed,
         started_at_s=None if time is Time.VIRTUAL else process_start_s(),
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
     )

@@ -12,8 +12,9 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
+from composer.model import LogLevel
 from composer.model.names import PROGRAM_LOGGER
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.stacks import calls_user_code, is_internal
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
@@ -25,8 +26,6 @@ _TRACEBACK_LENGTH = 20_000
 BEHAVIOR_PACKAGE = "_composer_behavior_"
 #: What Python puts before the names of the exceptions that these modules define.
 _IN_PACKAGE = re.compile(rf"\b{BEHAVIOR_PACKAGE}[0-9a-f]+\.")
-
-_LOGGED = RepeatLimit(COMPUTER)
 
 
 def describe(error: BaseException) -> str:
@@ -75,14 +74,28 @@ def printable(text: object) -> str:
     return _plain(str(text))
 
 
-def log_exception(what: str, error: BaseException) -> None:
-    """Log an exception that left a callback, at most once a second for each ``what``."""
-    admission = _LOGGED.admit(what)
-    if admission is not None:
-        text = internal_report_of(error) if admission.is_first else describe(error)
-        from rclpy.logging import get_logger  # noqa: PLC0415 - the rest of the module needs no ROS
+def _write_by_rcl(_: LogLevel, name: str, text: str) -> None:
+    from rclpy.logging import get_logger  # noqa: PLC0415 - the rest of the module needs no ROS
 
-        get_logger(PROGRAM_LOGGER).error(f"{what}: {text}{admission.suffix}")
+    get_logger(name).error(text)
+
+
+def exception_log(
+    clock: Clock, write: Callable[[LogLevel, str, str], None] = _write_by_rcl
+) -> Callable[[str, BaseException], None]:
+    """Return a function that logs an exception that left a callback, by the name of the callback.
+
+    Each callback is logged at most once a second. ``write(level, logger, text)`` gets the lines.
+    """
+    limit = RepeatLimit(clock)
+
+    def log_exception(what: str, error: BaseException) -> None:
+        admission = limit.admit(what)
+        if admission is not None:
+            text = internal_report_of(error) if admission.is_first else describe(error)
+            write(LogLevel.ERROR, PROGRAM_LOGGER, f"{what}: {text}{admission.suffix}")
+
+    return log_exception
 
 
 def is_closing(error: BaseException) -> bool:

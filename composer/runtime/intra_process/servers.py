@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
-from uuid import uuid4
 from weakref import ref
 
 from unique_identifier_msgs.msg import UUID
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Isolation, Port
+from composer.runtime.clock.randomness import new_id
 from composer.runtime.executors import actions
 from composer.runtime.executors.actions import GoalServer
 from composer.runtime.executors.futures import Future
@@ -102,7 +102,7 @@ class LocalActionServer:
 
         ``on_feedback`` is called on the server's loop.
         """
-        goal_id = UUID(uuid=list(uuid4().bytes))
+        goal_id = UUID(uuid=list(new_id()))
         handle = LocalGoal(goal_id, self)
         sent: Future[LocalGoal] = Future()
         self._spawn(self._on_goal(handle, self._passed(goal), on_feedback, sent))

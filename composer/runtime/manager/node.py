@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.log import Log, Write
 from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver
@@ -129,7 +129,7 @@ class ManagerNode:
         """
         self._status = status
         self._host = host
-        self._loop = Loop(NAME, log_exception, clock=status.clock)
+        self._loop = Loop(NAME, exception_log(status.clock, host.write_log), clock=status.clock)
         self._member: MemberService | None = None
         self._node = Node(
             NAME,

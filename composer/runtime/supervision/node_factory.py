@@ -21,7 +21,7 @@ from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.log import Write, set_level
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.executors.exceptions import log_exception
+from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.loop import Loop
 from composer.runtime.host_options import HostOptions
 from composer.runtime.hosting.behavior_node import NodeOfBehavior
@@ -71,6 +71,7 @@ class NodeFactory:
         self.executors = {executor.name.value: executor for executor in system.executors}
         self.loops: dict[str, Loop] = {}
         self.clock = options.clock
+        self._log_exception = exception_log(self.clock, write_log)
         self.chains = Chains(system, self.clock, tracing=options.tracing)
         self.children = ChildProcesses()
         namespace = join(system.namespace, system.name.value)
@@ -149,7 +150,7 @@ class NodeFactory:
         name = executor.name.value
         if name not in self.loops:
             self.loops[name] = Loop(
-                name, _log_exception, executor.kind, executor.threads, self.clock
+                name, self._on_exception, executor.kind, executor.threads, self.clock
             )
         return self.loops[name]
 
@@ -174,8 +175,7 @@ class NodeFactory:
             Located(DEFAULT_EXECUTOR, node.span), ExecutorKind.EVENTS, node.span
         )
 
-
-def _log_exception(what: str, error: BaseException) -> None:
-    """Log an exception that leaves a callback, unless its node was only deactivated."""
-    if not isinstance(error, CallCancelled):
-        log_exception(what, error)
+    def _on_exception(self, what: str, error: BaseException) -> None:
+        """Log an exception that leaves a callback, unless its node was only deactivated."""
+        if not isinstance(error, CallCancelled):
+            self._log_exception(what, error)

@@ -12,7 +12,6 @@ import rclpy
 
 from composer.base.source import Located, SourceFile, Span
 from composer.model import Executor, ExecutorKind
-from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.placement import place_threads
 from tests.ros.support.in_process import running
@@ -46,7 +45,7 @@ def ros() -> Iterator[None]:
 @pytest.mark.parametrize("kind", list(ExecutorKind))
 def test_every_thread_of_an_executor_is_placed(kind: ExecutorKind) -> None:
     wanted = executor(kind, cpus=(CPU,), priority=7, threads=3)
-    loop = Loop(wanted.name.value, log_exception, kind, wanted.threads)
+    loop = Loop(wanted.name.value, None, kind, wanted.threads)
     loop.start()
     try:
         refused = place_threads(wanted, loop.native_thread_ids())

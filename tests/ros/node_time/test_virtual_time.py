@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -44,6 +45,9 @@ connections:
   - {service: /decide, server: server.decide, clients: source.decide}
 """
 PARTS = """
+import random
+
+import numpy
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
@@ -61,6 +65,7 @@ class Source(Behavior):
             self.log.info(f"answer: {answer.message}")
         except CallError as error:
             self.log.info(f"no answer: {error}")
+        self.log.info(f"dice: {random.random()} {numpy.random.random()}")
 
 
 class Server(Behavior):
@@ -83,9 +88,9 @@ class Recorder(Behavior):
 """
 
 
-def run(system: Path, hash_seed: str) -> tuple[str, str]:
+def run(system: Path, hash_seed: str, *options: str) -> tuple[str, str]:
     """Run a system for a minute of virtual time, in a new interpreter; return what it prints."""
-    command = (*COMPOSE, "run", str(system), "--time", "virtual", "--for", "60")
+    command = (*COMPOSE, "run", str(system), "--time", "virtual", "--for", "60", *options)
     environment = os.environ | {"PYTHONHASHSEED": hash_seed}
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=60, check=True
@@ -105,6 +110,10 @@ def test_the_same_run_byte_by_byte_whatever_the_hash_seed(tmp_path: Path) -> Non
     assert "no answer: service '/decide' did not answer within 300 ms" in log
     assert "[59." in log
     assert run(system, "1") == first
+    assert run(system, "1", "--seed", "0") == first
+    dice = {*re.findall("dice: (.*)", log)}
+    assert len(dice) == 120
+    assert dice.isdisjoint(re.findall("dice: (.*)", run(system, "1", "--seed", "1")[1]))
 
 
 @pytest.mark.parametrize("name", ["pipeline", "supervised"])

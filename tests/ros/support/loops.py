@@ -14,7 +14,6 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
 from composer.model import ExecutorKind
-from composer.runtime.executors.exceptions import log_exception
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken
 from composer.runtime.executors.tasks import Report
@@ -63,7 +62,7 @@ class Bench:
         return client
 
 
-def loop_of(kind: ExecutorKind, on_exception: Report = log_exception) -> Loop:
+def loop_of(kind: ExecutorKind, on_exception: Report | None = None) -> Loop:
     return Loop("default", on_exception, kind, threads=3)
 
 
