@@ -37,6 +37,7 @@ from composer.model.names import PROGRAM_LOGGER, join
 from composer.plan import Plan
 from composer.runtime.children.discovery_server import discovery_servers
 from composer.runtime.clock.randomness import use_seed
+from composer.runtime.clock.virtual import VirtualClock
 from composer.runtime.executors.placement import (
     memory_excess,
     place_process,
@@ -70,7 +71,12 @@ from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.start_and_end import SystemEnd, SystemStart
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
-from composer.runtime.supervision.virtual_time import ISOLATION, check_virtual_time
+from composer.runtime.supervision.virtual_time import (
+    ISOLATION,
+    Standstill,
+    check_virtual_time,
+    outside_calls,
+)
 
 _KEY_BYTES = 32
 
@@ -161,10 +167,10 @@ class Host:
         servers = discovery_servers(discovery, os.environ, self._reporter.log, wait)
         variables = active_variables(discovery, os.environ)
         # A run in virtual time is isolated: the same system may run at the same time.
-        lock: AbstractContextManager[None] = nullcontext()
+        context: AbstractContextManager[None] = outside_calls(self._warn)
         if not is_virtual:
-            lock = hold_instance_lock(namespace, variables, self._report_key)
-        with lock, signals, servers:
+            context = hold_instance_lock(namespace, variables, self._report_key)
+        with context, signals, servers:
             self._limits.limit_start()
             try:
                 with self._segment():
@@ -185,8 +191,8 @@ class Host:
             segment_for_large_messages,
         )
 
-        warn = partial(self._reporter.log, LogLevel.WARN, PROGRAM_LOGGER)
-        return segment_for_large_messages(os.environ, get_rmw_implementation_identifier(), warn)
+        rmw = get_rmw_implementation_identifier()
+        return segment_for_large_messages(os.environ, rmw, self._warn)
 
     def _join(self, namespace: str) -> ManagerNode:
         """Join the ROS graph, as the first node of a process does."""
@@ -250,7 +256,9 @@ class Host:
             self._fail(f"{error.node} failed")
             return False
         for warning in self._node_set.warnings:
-            self._reporter.log(LogLevel.WARN, PROGRAM_LOGGER, warning)
+            self._warn(warning)
+        if isinstance(self._clock, VirtualClock):
+            Standstill(self._clock, self._node_set, self._fail)
         if self._options.ends_process:
             # What is there now stays to the end. A search for reference cycles in it takes 0.1 s.
             gc.freeze()
@@ -293,6 +301,9 @@ class Host:
         at_s = self._reporter.elapsed_s
         self._reporter.report(events.Commanded(at_s, command.name, command.nodes))
         command.answer(*self._commands.run(command))
+
+    def _warn(self, text: str) -> None:
+        self._reporter.log(LogLevel.WARN, PROGRAM_LOGGER, text)
 
     def _fail(self, reason: str) -> None:
         self._failed = True

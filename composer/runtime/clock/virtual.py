@@ -19,6 +19,9 @@ from composer.runtime.clock.clock import COMPUTER, Clock
 #: Virtual time begins in September 2001: not at zero, which means in ROS that no time is known.
 START_NS: Final = 10**18
 _NANOSECONDS = 1_000_000_000
+#: A standstill is noticed each time that the clock was read so often at one point in time. A prime,
+#: so that it is noticed at each place of a loop.
+STANDSTILL_READS: Final = 2_999
 #: How often a system that has nothing to wait for looks for signals and other threads.
 _POLL_S = 0.001
 
@@ -50,10 +53,25 @@ class VirtualClock(Clock):
         self._members = {get_ident()}
         self._alive: set[threading.Thread] = set()
         self._followers: list[Callable[[int], None]] = []
+        self._reads = 0  # since the last jump
+        self._creeps_s = 0.0  # at each read
+        #: Called on the thread that reads the clock, each :data:`STANDSTILL_READS` without a jump.
+        self.on_standstill: Callable[[], None] = lambda: None
 
     def monotonic(self) -> float:
         """Return the seconds since the start."""
+        self._reads += 1
+        if not self._reads % STANDSTILL_READS:
+            self.on_standstill()
+        self._now_s += self._creeps_s
         return self._now_s
+
+    def creep(self) -> None:
+        """Let each read of the clock take a microsecond: the system does not wait any more.
+
+        Then its threads get their turns although one has work without end.
+        """
+        self._creeps_s = 1e-6
 
     def time_ns(self) -> int:
         """Return the nanoseconds since 1970, as if the system had started at :data:`START_NS`."""
@@ -95,6 +113,7 @@ class VirtualClock(Clock):
 
     def wait_until(self, is_over: Callable[[], bool], until_s: float = inf) -> bool:
         """Block until ``is_over()``, at most until ``until_s`` (monotonic); return its value."""
+        self.monotonic()  # threads may wake each other without end
         if get_ident() in self._members:
             waiting = _Waiting(is_over, until_s)
             self._waiting.append(waiting)
@@ -134,6 +153,7 @@ class VirtualClock(Clock):
     def _jump(self, to_s: float) -> None:
         if to_s > self._now_s:
             self._now_s = to_s
+            self._reads = 0
             for follower in self._followers:
                 follower(self.time_ns())
 

@@ -74,7 +74,7 @@ def stacks_of(threads: Iterable[int]) -> dict[int, list[FrameType]]:
         return {}
     with gc_paused():
         current = sys._current_frames()
-        stacks = {ident: list(_outward(current[ident])) for ident in idents if ident in current}
+        stacks = {ident: list(outward(current[ident])) for ident in idents if ident in current}
         # This frame is among them: a cycle, which would keep the callbacks' locals, such as large
         # messages, until the next garbage collection.
         current.clear()
@@ -119,7 +119,7 @@ def location_of(stack: Iterable[FrameType]) -> str:
     Code of libraries counts only if there is no other.
     """
     outside = [frame for frame in stack if not is_internal(frame.f_code.co_filename)]
-    own = [frame for frame in outside if not frame.f_code.co_filename.startswith(_LIBRARIES)]
+    own = [frame for frame in outside if not is_library(frame.f_code.co_filename)]
     for frame in own or outside:
         return f"{frame.f_code.co_filename}:{frame.f_lineno}"
     return ""
@@ -131,7 +131,13 @@ def is_internal(path: str) -> bool:
     return is_composer or path.startswith(_IMPORT_SYSTEM)
 
 
-def _outward(frame: FrameType | None) -> Iterator[FrameType]:
+def is_library(path: str) -> bool:
+    """Return whether a source file is one of Python's modules, or of an installed package."""
+    return path.startswith(_LIBRARIES)
+
+
+def outward(frame: FrameType | None) -> Iterator[FrameType]:
+    """Yield a frame and those that have called it, the innermost first."""
     while frame is not None:
         yield frame
         frame = frame.f_back

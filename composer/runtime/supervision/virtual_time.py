@@ -1,12 +1,24 @@
-"""Whether a system can run in virtual time: everything in this process, and on its clock."""
+"""What virtual time asks of a system: all of it in this process, and on one clock that advances."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import wraps
+from pkgutil import resolve_name
+from types import FrameType
+from typing import Any
 
+from composer.base.fast_dataclass import dataclass
 from composer.model import Node, System
+from composer.runtime.clock.virtual import VirtualClock
+from composer.runtime.executors.stacks import is_internal, is_library, location_of, outward
+from composer.runtime.hosting.dispatch import install
 from composer.runtime.intra_process.router import shared_channels
 from composer.runtime.process import StartRefused
+from composer.runtime.supervision.node_set import NodeSet
 
 #: Nothing outside of the process takes part in a run.
 ISOLATION = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
@@ -47,3 +59,140 @@ def _kind_outside(node: Node) -> str | None:
     if node.hosted_class is not None:
         return "is a class of rclpy"
     return None
+
+
+#: Of the signals of a standstill at one point in time, the one at which calls begin to be counted,
+#: and the one that ends the system: after 300 000 reads of the clock.
+_COUNTS_FROM = 50
+_ENDS_AT = 100
+_MAX_CALLBACKS = 5
+
+
+class Standstill:
+    """Ends a system whose time does not advance, because callbacks cause each other without end."""
+
+    def __init__(self, clock: VirtualClock, node_set: NodeSet, fail: Callable[[str], None]) -> None:
+        """``fail(text)`` ends the run; the text names the callbacks."""
+        self._clock = clock
+        self._node_set = node_set
+        self._fail = fail
+        self._at_ns = -1
+        self._signals = 0
+        self._calls: Counter[str] = Counter()
+        self._places: set[str] = set()
+        clock.on_standstill = self._on_signal
+
+    def _on_signal(self) -> None:
+        now_ns = self._clock.time_ns()
+        if now_ns != self._at_ns:
+            self._at_ns, self._signals = now_ns, 0
+        self._signals += 1
+        if self._signals == _COUNTS_FROM:
+            self._calls = self._count_calls()
+            self._places.clear()
+        elif self._signals > _COUNTS_FROM:
+            place = location_of(outward(sys._getframe(1)))
+            if place and not is_library(place):  # the loop itself is called by such code
+                self._places.add(place)
+        if self._signals == _ENDS_AT:
+            self._clock.creep()
+            self._fail(f"the time does not advance, because {self._cause()}")
+
+    def _count_calls(self) -> Counter[str]:
+        return Counter(
+            {
+                f"{each.node} {each.kind} '{each.name}'": each.count
+                for each in self._node_set.callbacks()
+            }
+        )
+
+    def _cause(self) -> str:
+        calls = self._count_calls() - self._calls
+        if calls:
+            busiest = sorted(calls.items(), key=lambda item: (-item[1], item[0]))[:_MAX_CALLBACKS]
+            names = ", ".join(f"{name} ({count} calls)" for name, count in busiest)
+            return f"callbacks cause each other without end: {names}"
+        places = ", ".join(sorted(self._places)[:_MAX_CALLBACKS])
+        return f"a callback goes on without waiting{' at ' + places if places else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Outside:
+    """A function of Python that is not of virtual time, and what to use instead.
+
+    If libraries call it for user code, the user code is named (``walks``).
+    """
+
+    name: str
+    use: str
+    shown: str = ""
+    walks: bool = False
+
+    def applies(self, arguments: tuple[Any, ...], options: dict[str, Any]) -> bool:
+        """Return whether a call is outside: generators of random numbers may have a seed."""
+        if self.name != "random.Random.seed":
+            return True
+        return (arguments[1] if len(arguments) > 1 else options.get("a")) is None
+
+
+_NOW = "self.clock.now()"
+_OUTSIDE = (
+    *(_Outside(f"time.{name}", _NOW) for name in ("time", "monotonic", "perf_counter")),
+    *(_Outside(f"time.{name}_ns", _NOW) for name in ("time", "monotonic", "perf_counter")),
+    _Outside("time.sleep", "await self.clock.sleep(seconds)"),
+    _Outside("os.urandom", "random.randbytes(size)"),
+    *(
+        _Outside(f"uuid.{name}", "uuid.UUID(int=random.getrandbits(128), version=4)")
+        for name in ("uuid1", "uuid4")
+    ),
+    _Outside("random.Random.seed", "random.Random(seed)", "random.Random", walks=True),
+    _Outside("threading.Thread.start", "timers, or 'async def' handlers", "a thread", walks=True),
+    _Outside("socket.socket.__init__", "a stand-in for this node", "a socket", walks=True),
+    _Outside("subprocess.Popen.__init__", "a stand-in for this node", "a process", walks=True),
+)
+
+
+@contextmanager
+def outside_calls(report: Callable[[str], None]) -> Iterator[None]:
+    """Context manager: report once each place of user code that does not use virtual time.
+
+    Modules that were imported before, and have names of their own for these functions, are not
+    noticed, nor is code in C.
+    """
+    install()  # it replaces Thread.start as well, for good
+    places: set[tuple[str, str]] = set()
+    with ExitStack() as stack:
+        for outside in _OUTSIDE:
+            owner_name, _, attribute = outside.name.rpartition(".")
+            owner: Any = resolve_name(owner_name)
+            original = getattr(owner, attribute)
+            stack.callback(setattr, owner, attribute, original)
+            setattr(owner, attribute, _watched(original, outside, places, report))
+        yield
+
+
+def _watched(
+    function: Callable[..., Any],
+    outside: _Outside,
+    places: set[tuple[str, str]],
+    report: Callable[[str], None],
+) -> Callable[..., Any]:
+    @wraps(function)
+    def call(*arguments: Any, **options: Any) -> Any:
+        place = _user_place(sys._getframe(1), walks=outside.walks)
+        if place and (place, outside.name) not in places and outside.applies(arguments, options):
+            places.add((place, outside.name))
+            shown = outside.shown or f"{outside.name}()"
+            report(f"{place} uses {shown}, which virtual time does not control; use {outside.use}")
+        return function(*arguments, **options)
+
+    return call
+
+
+def _user_place(frame: FrameType | None, *, walks: bool) -> str:
+    """Return ``file:line`` of a frame if it is user code, which may call libraries (``walks``)."""
+    while walks and frame is not None and is_library(frame.f_code.co_filename):
+        frame = frame.f_back
+    path = "" if frame is None else frame.f_code.co_filename
+    is_user_code = frame is not None and not (is_library(path) or is_internal(path))
+    return f"{path}:{frame.f_lineno}" if frame is not None and is_user_code else ""

@@ -193,6 +193,80 @@ def test_deadlines_leases_and_lifespans_are_those_of_virtual_time(tmp_path: Path
     assert maps == ["[0.500] [INFO] [late] a map", "[0.800] [INFO] [late] a map"]
 
 
+ENDLESS = [
+    (
+        "{x: {publishers: {a: {type: std_msgs/msg/Empty}},"
+        " subscriptions: {b: {type: std_msgs/msg/Empty, publish: {a: {}}}},"
+        " timers: {start: {period_ms: 1000, publish: {a: {}}}}},"
+        " y: {publishers: {b: {type: std_msgs/msg/Empty}},"
+        " subscriptions: {a: {type: std_msgs/msg/Empty, publish: {b: {}}}}}}\n"
+        "connections: [{topic: /a, from: x.a, to: y.a}, {topic: /b, from: y.b, to: x.b}]",
+        r"because callbacks cause each other without end: /x subscription 'b' \(\d+ calls\),"
+        r" /y subscription 'a' \(\d+ calls\)",
+    ),
+    (
+        "{x: {behavior: parts:Endless, timers: {start: {period_ms: 1000}}}}",
+        r"because a callback goes on without waiting at \S+/parts.py:7",
+    ),
+]
+PART_WITHOUT_END = """
+from composer.behavior import Behavior
+
+class Endless(Behavior):
+    async def on_start(self):
+        while True:
+            await self.clock.sleep(0)
+"""
+
+
+@pytest.mark.parametrize(("nodes", "reason"), ENDLESS)
+def test_a_system_whose_time_does_not_advance_ends(tmp_path: Path, nodes: str, reason: str) -> None:
+    system = tmp_path / "endless.yaml"
+    system.write_text(f"system: endless\nnodes: {nodes}\n")
+    (tmp_path / "parts.py").write_text(PART_WITHOUT_END)
+    done = compose("run", str(system), "--time", "virtual", "--for", "60")
+    assert done.returncode == 1
+    assert re.search(rf"ran for 1.0 s: the time does not advance, {reason}", done.stderr)
+
+
+#: What is not of virtual time, by its line.
+OUTSIDE = """
+import os, random, socket, subprocess, threading, time, uuid
+from concurrent.futures import ThreadPoolExecutor
+from time import monotonic
+from composer.behavior import Behavior
+
+class Outside(Behavior):
+    def on_activate(self):
+        for _ in range(2):
+            time.time()
+            monotonic()
+            time.sleep(0)
+            os.urandom(1)
+            uuid.uuid4()
+            random.Random()
+            socket.socket().close()
+            ThreadPoolExecutor(1).submit(int).result()
+            threading.Thread(target=int).start()
+            subprocess.run(["true"])
+        random.Random(1).random()
+        self.log.info(f"{self.clock.now()}")
+"""
+NOTICED = (
+    *("time.time()", "time.monotonic()", "time.sleep()", "os.urandom()", "uuid.uuid4()"),
+    *("random.Random", "a socket", "a thread", "a thread", "a process"),
+)
+
+
+def test_what_virtual_time_does_not_control_is_named_once(tmp_path: Path) -> None:
+    system = tmp_path / "outside.yaml"
+    system.write_text("system: outside\nnodes: {x: {behavior: parts:Outside}}\n")
+    (tmp_path / "parts.py").write_text(OUTSIDE)
+    log = run(system, "0")[1]
+    uses = re.findall(r"parts.py:(\d+) uses (.*), which virtual time does not control; use", log)
+    assert uses == [(str(line), name) for line, name in enumerate(NOTICED, 10)]
+
+
 REFUSED = [
     ('talker: {class: "demo:Talker"}', "/talker is a class of rclpy, which has the time of the"),
     ("battery: {external: true}", "/battery is an external node, which has the time of the"),
