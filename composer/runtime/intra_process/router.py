@@ -21,10 +21,9 @@ from composer.runtime.intra_process.ignore_local_publications import (
 )
 from composer.runtime.intra_process.publisher import GatedPublisher, PublisherContext
 from composer.runtime.intra_process.servers import LocalActionServer, LocalService
-from composer.runtime.intra_process.time_limits import SubscriptionLimits
+from composer.runtime.intra_process.time_limits import Leases, Receiver
 from composer.runtime.intra_process.topic import (
     LocalSubscription,
-    Receiver,
     Topic,
     local_publisher_for,
 )
@@ -163,11 +162,11 @@ class LocalRouter:
         port: Port,
         subscription: Subscription,
         receiver: Receiver,
-        limits: SubscriptionLimits | None = None,
+        leases: Leases | None = None,
     ) -> Remove:
         """Pass local publications to ``receiver``; return a function that stops that.
 
-        ``limits`` are those that the runtime monitors itself, in virtual time.
+        ``leases`` are those of the publishers, if the runtime monitors them.
         """
         topic = self._topics.get(channel_of(port))
         if topic is None:
@@ -175,7 +174,7 @@ class LocalRouter:
         ignore_local(subscription)
         if self._instruments is not None:
             receiver = self._instruments.receiver(port, receiver)
-        local = LocalSubscription(subscription.msg_type, port, receiver, limits)
+        local = LocalSubscription(subscription.msg_type, port, receiver, leases)
         topic.add_subscription(local)
         return lambda: topic.remove_subscription(local)
 

@@ -7,15 +7,23 @@ begins with a message: nothing is late before the first one.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from composer.model.qos import Liveliness, QosProfile
 from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.tasks import Cancellable
-from composer.runtime.intra_process.publisher import Target, combined
+from composer.runtime.intra_process.publisher import FanOut, Target
 
 #: A message at the very end of a period is in time, whatever the rounding of both.
 _TOLERANCE_S = 1e-6
+
+
+class Receiver(Target, Protocol):
+    """The receiving side of a subscription."""
+
+    def close(self) -> None:
+        """Receive nothing more."""
+
 
 #: Called with the time of the last message, by the clock of the loop.
 OnOverdue = Callable[[float], None]
@@ -68,36 +76,45 @@ class Overdue(Target):
             self._on_overdue(since_s)
 
 
-class SubscriptionLimits:
-    """The time limits of one subscription, for the messages of each of its publishers."""
+class MonitoredReceiver(Overdue):
+    """Passes messages to the receiver of a subscription, and monitors its deadline."""
+
+    __slots__ = ("_receiver",)
 
     def __init__(
-        self,
-        loop: BaseLoop,
-        profile: QosProfile,
-        receiver: Target,
-        on_deadline: OnOverdue,
-        on_lease: OnOverdue,
+        self, loop: BaseLoop, deadline_ms: float, on_overdue: OnOverdue, receiver: Receiver
     ) -> None:
-        self._loop = loop
+        super().__init__(loop, deadline_ms, on_overdue, repeats=True)
         self._receiver = receiver
-        self._lease_ms = profile.liveliness_lease_duration_ms
-        self._on_lease = on_lease
-        self._leases: dict[object, Overdue] = {}  # by the publishers
-        self._deadline: Overdue | None = None
-        if profile.deadline_ms is not None:
-            self._deadline = Overdue(loop, profile.deadline_ms, on_deadline, repeats=True)
 
-    def target(self, publisher: object, profile: QosProfile) -> Target:
-        """Return what gets the messages of a publisher with this profile."""
-        targets: list[Target] = [] if self._deadline is None else [self._deadline]
-        # The middleware asserts the other kind of liveliness, as long as the process exists.
-        if self._lease_ms is not None and profile.liveliness is Liveliness.MANUAL_BY_TOPIC:
-            if publisher not in self._leases:
-                lease = Overdue(self._loop, self._lease_ms, self._on_lease, repeats=False)
-                self._leases[publisher] = lease
-            targets.append(self._leases[publisher])
-        return combined((*targets, self._receiver)) or self._receiver
+    def put(self, message: Any) -> None:
+        """Begin the period again, and pass the message on."""
+        super().put(message)
+        self._receiver.put(message)
+
+    def close(self) -> None:
+        """Receive nothing more."""
+        super().close()
+        self._receiver.close()
+
+
+class Leases:
+    """Monitors the liveliness of the publishers of one subscription."""
+
+    def __init__(self, loop: BaseLoop, lease_ms: float, on_overdue: OnOverdue) -> None:
+        self._loop = loop
+        self._lease_ms = lease_ms
+        self._on_overdue = on_overdue
+        self._leases: dict[object, Overdue] = {}  # by the publishers
+
+    def target(self, publisher: object, profile: QosProfile, target: Target) -> Target:
+        """Return what gets the messages of a publisher with this profile, before ``target``."""
+        if profile.liveliness is not Liveliness.MANUAL_BY_TOPIC:
+            return target  # the middleware asserts it, as long as the process exists
+        if publisher not in self._leases:
+            lease = Overdue(self._loop, self._lease_ms, self._on_overdue, repeats=False)
+            self._leases[publisher] = lease
+        return FanOut((self._leases[publisher], target))
 
     def forget(self, publisher: object) -> None:
         """Watch the lease of a publisher no more: it is destroyed."""
@@ -107,5 +124,5 @@ class SubscriptionLimits:
 
     def close(self) -> None:
         """Call back no more."""
-        for limit in filter(None, (self._deadline, *self._leases.values())):
-            limit.close()
+        for lease in self._leases.values():
+            lease.close()

@@ -10,7 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from math import inf
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.publisher import Publisher
 
@@ -25,34 +25,27 @@ from composer.runtime.intra_process.publisher import (
     combined,
     copy_of,
 )
-from composer.runtime.intra_process.time_limits import SubscriptionLimits
-
-
-class Receiver(Target, Protocol):
-    """The receiving side of a subscription."""
-
-    def close(self) -> None:
-        """Receive nothing more."""
+from composer.runtime.intra_process.time_limits import Leases, Receiver
 
 
 class LocalSubscription:
     """A subscription, as publishers of its topic see it."""
 
-    __slots__ = ("isolated", "limits", "message_type", "profile", "receiver")
+    __slots__ = ("isolated", "leases", "message_type", "profile", "receiver")
 
     def __init__(
         self,
         message_type: Any,
         port: Port,
         receiver: Receiver,
-        limits: SubscriptionLimits | None = None,
+        leases: Leases | None = None,
     ) -> None:
-        """``limits`` are given in virtual time."""
+        """``leases`` are those of its publishers, if the runtime monitors them."""
         self.message_type = message_type
         self.profile = port.qos.profile
         self.isolated = port.isolation is Isolation.COPY
         self.receiver = receiver
-        self.limits = limits
+        self.leases = leases
 
 
 class CopyingTarget:
@@ -132,8 +125,8 @@ class LocalPublisher(GatedPublisher):
         """Release the match listener. Call it before the publisher is destroyed."""
         self._match_listener.close()
         for subscription in self._subscriptions:
-            if subscription.limits is not None:
-                subscription.limits.forget(self)
+            if subscription.leases is not None:
+                subscription.leases.forget(self)
 
     def _matches(self, subscription: LocalSubscription) -> bool:
         has_type = subscription.message_type is self.message_type
@@ -146,8 +139,8 @@ class LocalPublisher(GatedPublisher):
 
     def _target_of(self, subscription: LocalSubscription) -> Target:
         target: Target = subscription.receiver
-        if subscription.limits is not None:
-            target = subscription.limits.target(self, self.profile)
+        if subscription.leases is not None:
+            target = subscription.leases.target(self, self.profile, target)
         return CopyingTarget(target) if self._isolated or subscription.isolated else target
 
     def _check_external(self) -> None:

@@ -26,7 +26,13 @@ from composer.model.qos import Liveliness, incompatibilities
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import RepeatedWarning
 from composer.runtime.intra_process.publisher import Target
-from composer.runtime.intra_process.time_limits import OnOverdue, Overdue, SubscriptionLimits
+from composer.runtime.intra_process.time_limits import (
+    Leases,
+    MonitoredReceiver,
+    OnOverdue,
+    Overdue,
+    Receiver,
+)
 from composer.runtime.ros_graph.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
@@ -189,21 +195,23 @@ class QosEvents:
         self._stop_watching += [limit.close for limit in limits]
         return tuple(limits)
 
-    def subscription_limits(self, receiver: Target) -> SubscriptionLimits | None:
-        """Return the time limits of a subscription whose messages go to ``receiver``.
+    def monitored(self, receiver: Receiver) -> tuple[Receiver, Leases | None]:
+        """Return what receives the messages of a subscription, and the leases of its publishers.
 
-        They are None in real time.
+        In real time that is ``receiver`` itself, and None.
         """
         if not self._is_virtual:
-            return None
-        events = {event.name: self._on_overdue(event) for event in self._subscription_events()}
-        limits = SubscriptionLimits(
-            *(self._context.loop, self._port.qos.profile, receiver),
-            on_deadline=events.get(_DEADLINE_MISSED, _ignore),
-            on_lease=events.get(_LIVELINESS_CHANGED, _ignore),
-        )
-        self._stop_watching.append(limits.close)
-        return limits
+            return receiver, None
+        loop, leases = self._context.loop, None
+        lease_ms = self._port.qos.profile.liveliness_lease_duration_ms
+        for event in self._subscription_events():
+            on_overdue = self._on_overdue(event)
+            if event.name == _DEADLINE_MISSED:
+                receiver = MonitoredReceiver(loop, 1000.0 * event.period_s, on_overdue, receiver)
+            elif event.name == _LIVELINESS_CHANGED and lease_ms is not None:
+                leases = Leases(loop, lease_ms, on_overdue)
+                self._stop_watching.append(leases.close)
+        return receiver, leases
 
     def close(self) -> None:
         """Stop watching. Call it before the endpoint is destroyed."""
@@ -313,7 +321,3 @@ class QosEvents:
     def _on_incompatible(self) -> None:
         self._context.statistics.qos_events["incompatible"] += 1
         self._incompatible.check()
-
-
-def _ignore(_: float) -> None:
-    """Do nothing: there is no such limit."""

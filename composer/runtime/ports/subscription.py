@@ -129,8 +129,8 @@ class SubscriptionPort(RunningPort):
     def _receive(self, port: Port) -> Callable[[], None]:
         """Receive messages from now on; return a function that stops local ones."""
         context = self._context
-        limits = self._qos_events.subscription_limits(self._mailbox)
-        remove = context.router.add_subscription(port, self._subscription, self._mailbox, limits)
+        receiver, leases = self._qos_events.monitored(self._mailbox)
+        remove = context.router.add_subscription(port, self._subscription, receiver, leases)
         context.loop.add_subscription(self._subscription, self._mailbox.receive)
         return remove
 
