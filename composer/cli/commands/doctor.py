@@ -121,7 +121,6 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
     from composer.client.doctor import Level, note
     from composer.client.doctor.installation import (
         check_environment,
-        check_security,
         check_versions,
         discovery_range,
     )
@@ -152,7 +151,6 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
     else:
         with _started_server(system):
             yield from _check_live_graph(timeout)
-        yield check_security(variables)
 
 
 def _started_server(system: System | None) -> AbstractContextManager[None]:

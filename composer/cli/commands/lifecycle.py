@@ -10,7 +10,7 @@ import typer
 
 from composer.cli.commands.nodes import NodeName
 from composer.cli.commands.system_commands import add_system_commands
-from composer.cli.support.completion import complete_node, complete_running_system
+from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, command_group, examples
 from composer.cli.support.results import as_json, say_none_found
@@ -127,7 +127,6 @@ class GoalState(StrEnum):
         "compose lifecycle set '/perception/*' deactivate           all nodes that match",
         "compose lifecycle set planner --to active                  as many transitions as needed",
         "compose lifecycle set planner deactivate --dependents",
-        "compose lifecycle set --system pipeline --to inactive",
     ),
 )
 def set_state(
@@ -149,15 +148,6 @@ def set_state(
             help="Go to this state: unconfigured, inactive, active or finalized.",
         ),
     ] = None,
-    system: Annotated[
-        str | None,
-        typer.Option(
-            "--system",
-            metavar="SYSTEM",
-            help="Change all nodes of a running system, in order.",
-            autocompletion=complete_running_system,
-        ),
-    ] = None,
     dependents: Annotated[
         bool,
         typer.Option(
@@ -170,24 +160,21 @@ def set_state(
 ) -> None:
     """Change the lifecycle state of nodes.
 
-    Only the given nodes are moved: nodes that depend on them stay active, and are named. The nodes
-    of a system are brought up in its bring-up order and taken down in reverse order. A transition
-    that is not available in the state of a node is not requested; the command continues with the
-    other nodes.
+    Only the given nodes are moved: nodes that depend on them stay active, and are named. A
+    transition that is not available in the state of a node is not requested; the command continues
+    with the other nodes. To move all nodes of a system, use startup, pause, resume or reset.
 
     Exit code 1 if a transition is not available or fails.
     """
-    targets, transition = _split(list(words or ()), to, system)
+    targets, transition = _split(list(words or ()), to)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
         from composer.client.systems.lifecycle_batch import (
             LifecycleBatch,
             LifecycleRequest,
-            nodes_of_system,
         )
 
         request = LifecycleRequest(transition, None if to is None else to.value)
-        nodes = None if system is None else nodes_of_system(session, deadline, system, request)
-        batch = LifecycleBatch(session, deadline, targets if nodes is None else nodes, request)
+        batch = LifecycleBatch(session, deadline, targets, request)
         _check_dependents(batch, dependents=dependents)
         failed = False
         for outcome in batch.run(dependents=dependents):
@@ -213,21 +200,17 @@ def _check_dependents(batch: LifecycleBatch, *, dependents: bool) -> None:
         say(f"note: active nodes depend on this: {names}; --dependents deactivates them first")
 
 
-def _split(
-    words: list[str], to: GoalState | None, system: str | None
-) -> tuple[list[str], str | None]:
+def _split(words: list[str], to: GoalState | None) -> tuple[list[str], str | None]:
     """Return targets and transition. Raises UsageError."""
     transition = None
     if to is None:
         if not words:
             raise UsageError("specify a transition, or a state with --to", hint=_EXAMPLE)
         transition = words.pop()
-    if system is None and not words:
+    if not words:
         if transition is None or transition in _TRANSITIONS:
-            raise UsageError("specify nodes, or a system with --system", hint=_EXAMPLE)
+            raise UsageError("specify nodes", hint=_EXAMPLE)
         raise UsageError(f"specify a transition of '{transition}'", hint=_EXAMPLE)
-    if system is not None and words:
-        raise UsageError(f"specify nodes or --system, not both (got '{words[0]}')", hint=_EXAMPLE)
     return words, transition
 
 

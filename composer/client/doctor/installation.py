@@ -1,16 +1,14 @@
-"""What is installed and set on this computer: versions, variables, interfaces, security."""
+"""What is installed and set on this computer: versions, variables, interfaces."""
 
 from __future__ import annotations
 
 import os
 import platform
-import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from composer import version
 from composer.client.doctor import CheckResult, error, note, ok, warning
@@ -22,7 +20,6 @@ from composer.runtime.middleware.environment import refusals
 _VERSIONS = "versions"
 _ENVIRONMENT = "environment"
 _INTERFACES = "interfaces"
-_SECURITY = "security"
 
 #: Jazzy's rclpy, see https://github.com/ros2/rclpy/tree/jazzy.
 _RCLPY_MAJOR = "7"
@@ -34,30 +31,6 @@ _ROS_DISTRIBUTION = "jazzy"
 _SAFE_DOMAIN_IDS = (range(102), range(215, 233))
 _PROFILE_VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 _INTERFACE_KINDS = ("msg", "srv", "action")
-#: The files of an enclave. Empty ones are enough: a middleware with security reads them and refuses
-#: them, one without it fails first.
-_ENCLAVE_FILES = (
-    "cert.pem",
-    "governance.p7s",
-    "identity_ca.cert.pem",
-    "key.pem",
-    "permissions.p7s",
-    "permissions_ca.cert.pem",
-)
-_SECURED_NODE = """
-import rclpy
-rclpy.init(args=["--ros-args", "--enclave", "/"])
-try:
-    rclpy.create_node("_compose_doctor_security")
-except Exception as error:
-    print(error)
-else:
-    print("STARTED")
-"""
-_STARTED = "STARTED"
-#: What rmw_fastrtps says if Fast DDS was built without security.
-_WITHOUT_SECURITY = "security libraries"
-_SECURED_NODE_S = 20.0
 
 
 def check_versions() -> Iterator[CheckResult]:
@@ -229,56 +202,3 @@ def _changed(package: str, sources: Interfaces, built: Interfaces) -> list[str]:
         for name in sources.names(kind)
         if name.startswith(f"{package}/") and sources.find(name) != built.find(name)
     ]
-
-
-def check_security(environment: Mapping[str, str]) -> CheckResult:
-    """Start a secured node with an enclave that is not valid, which has to fail."""
-    output = _output_of_secured_node(environment)
-    if output is None:
-        return note(
-            _SECURITY, "not checked: a secured node did not start or fail in time", "try again"
-        )
-    if _WITHOUT_SECURITY in output:
-        return note(
-            _SECURITY,
-            "this build of Fast DDS has no security: it cannot enforce policies of SROS2"
-            " ('compose export sros2')",
-            "use one that has, such as that of ROS 2 Jazzy from packages.ros.org",
-        )
-    if _STARTED in output:
-        return warning(
-            _SECURITY,
-            "the middleware ignores security: a secured node started without valid keys",
-            "use rmw_fastrtps_cpp or rmw_cyclonedds_cpp, built with security",
-        )
-    return ok(
-        _SECURITY, "the middleware refuses nodes without valid keys: it can enforce SROS2 policies"
-    )
-
-
-def _output_of_secured_node(environment: Mapping[str, str]) -> str | None:
-    """Return what a secured node prints; None if it takes too long."""
-    with TemporaryDirectory(prefix="compose-") as folder:
-        enclaves = Path(folder, "enclaves")
-        enclaves.mkdir()
-        for name in _ENCLAVE_FILES:
-            (enclaves / name).touch()
-        secured = {
-            "ROS_SECURITY_ENABLE": "true",
-            "ROS_SECURITY_STRATEGY": "Enforce",
-            "ROS_SECURITY_KEYSTORE": folder,
-            "ROS_LOG_DIR": folder,
-        }
-        try:
-            done = subprocess.run(  # noqa: S603 - this very Python
-                [sys.executable, "-P", "-c", _SECURED_NODE],
-                check=False,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=_SECURED_NODE_S,
-                env={**os.environ, **environment, **secured},
-            )
-        except (subprocess.TimeoutExpired, OSError):
-            return None
-    return done.stdout + done.stderr

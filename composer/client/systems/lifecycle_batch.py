@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Protocol
 
 from composer.base.fast_dataclass import dataclass
 from composer.client.lifecycle import CompletedTransition, LifecycleClient
@@ -13,7 +12,6 @@ from composer.client.systems.managers import Systems
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 
-_UPWARD = ("configure", "activate")
 #: The goal of each transition, by the state in which it is available.
 _GOALS = {
     "configure": {"unconfigured": "inactive"},
@@ -24,7 +22,7 @@ _GOALS = {
 }
 #: Managers publish their last report to each new subscription, and again every second.
 _REPORT_WITHIN_S = 2.0
-_RANK = {"unconfigured": 0, "inactive": 1, "active": 2}
+_RANK = {"finalized": -1, "unconfigured": 0, "inactive": 1, "active": 2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,24 +45,6 @@ class NodeOutcome:
 
     result: CompletedTransition | None
     error: RosError | None
-
-
-def nodes_of_system(
-    session: Session, deadline: Deadline, name: str, request: LifecycleRequest
-) -> tuple[str, ...]:
-    """Return the nodes of a running system in the order of the request.
-
-    First the nodes to take down, in the reverse order of the bring-up, then the nodes to bring up,
-    in its order. Raises NotFoundError, NoResponseError.
-    """
-    systems = Systems(session, deadline)
-    nodes = systems.report(systems.find(name)).nodes
-    names = [node.node for node in nodes]
-    if request.state is None:
-        return tuple(names if request.transition in _UPWARD else names[::-1])
-    goal = _RANK.get(request.state, -1)
-    going_down = [node.node for node in nodes if _RANK.get(node.state, 0) > goal]
-    return (*going_down[::-1], *(node for node in names if node not in going_down))
 
 
 class LifecycleBatch:
@@ -145,26 +125,7 @@ def _system_reports(session: Session, deadline: Deadline) -> dict[str, SystemRep
     return systems.reports({*systems.discover(), *local_systems()}, limit)
 
 
-_RANK = {"finalized": -1, "unconfigured": 0, "inactive": 1, "active": 2}
-
-
-class ReportedNode(Protocol):
-    """What is needed of a :class:`composer.client.systems.system_reports.NodeReport`."""
-
-    @property
-    def node(self) -> str:
-        """The full name."""
-
-    @property
-    def state(self) -> str:
-        """The label of the lifecycle state."""
-
-    @property
-    def depends_on(self) -> Mapping[str, str]:
-        """The states that the nodes it depends on must have, by their full names."""
-
-
-def lowered(nodes: Iterable[ReportedNode], goals: Mapping[str, str]) -> dict[str, str]:
+def lowered(nodes: Iterable[NodeReport], goals: Mapping[str, str]) -> dict[str, str]:
     """Return the goals that are below the states of their nodes."""
     return {
         node.node: goals[node.node]
@@ -173,7 +134,7 @@ def lowered(nodes: Iterable[ReportedNode], goals: Mapping[str, str]) -> dict[str
     }
 
 
-def active_dependents(nodes: Sequence[ReportedNode], goals: Mapping[str, str]) -> tuple[str, ...]:
+def active_dependents(nodes: Sequence[NodeReport], goals: Mapping[str, str]) -> tuple[str, ...]:
     """Return the active nodes that cannot do without the nodes with ``goals``, if those reach them.
 
     ``nodes`` are in the order of the bring-up, the result is in the reverse order.
@@ -187,7 +148,7 @@ def active_dependents(nodes: Sequence[ReportedNode], goals: Mapping[str, str]) -
     return tuple(reversed(found))
 
 
-def inactive_dependents(nodes: Sequence[ReportedNode], goals: Mapping[str, str]) -> tuple[str, ...]:
+def inactive_dependents(nodes: Sequence[NodeReport], goals: Mapping[str, str]) -> tuple[str, ...]:
     """Return the inactive nodes that can be active once the nodes with ``goals`` have reached them.
 
     Only nodes that depend on one of those are included, directly or indirectly. ``nodes`` and the
@@ -207,7 +168,7 @@ def inactive_dependents(nodes: Sequence[ReportedNode], goals: Mapping[str, str])
     return tuple(found)
 
 
-def _lacks_any(node: ReportedNode, states: Mapping[str, str]) -> bool:
+def _lacks_any(node: NodeReport, states: Mapping[str, str]) -> bool:
     """Return whether a dependency of the node is below the state that it must have."""
     return any(
         _rank(states[on]) < _rank(state) for on, state in node.depends_on.items() if on in states

@@ -63,7 +63,7 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
         ("topic pub /x std_msgs/msg/String {} --stdin", "not both"),
         ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
         ("lifecycle set planner", "specify a transition of 'planner'"),
-        ("lifecycle set activate", "specify nodes, or a system with --system"),
+        ("lifecycle set activate", "specify nodes"),
         ("top --sort name", "cannot sort by 'name'"),
     ],
 )

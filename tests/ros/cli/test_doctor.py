@@ -60,8 +60,6 @@ def test_problems_have_remedies_and_other_results_are_reported(
 ) -> None:
     assert all(item["remedy"] for item in found if item["level"] != "ok")
     assert messages(found, "middleware", "ok") == ["rmw_fastrtps_cpp"]
-    (security,) = messages(found, "security", "note")  # of the wheels from PyPI
-    assert "this build of Fast DDS has no security" in security
     (discovered,) = messages(found, "discovery", "ok")
     assert discovered.startswith("two participants discovered each other within")
     assert messages(found, "interfaces", "warning") == []

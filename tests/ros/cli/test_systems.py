@@ -224,23 +224,12 @@ def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> Non
     assert "no line of" not in output_of("logs", "-n", 3, "motor", "--since", "10m")
 
 
-def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> None:
+def test_lifecycle_set_with_several_nodes_and_patterns(robot: Robot) -> None:
     text = moved("motor", "planner", "deactivate")
     assert text == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
     text = moved("/fleet/[mp]*", "--to", "active")
     assert text == "/fleet/motor: inactive -> active\n/fleet/planner: inactive -> active\n"
-    text = moved("--system", "robot", "--to", "unconfigured")
-    assert text.splitlines() == [
-        "/fleet/camera: inactive -> unconfigured",
-        "/fleet/motor: active -> unconfigured",
-        "/fleet/planner: active -> unconfigured",
-    ]
-    text = moved("--system", "robot", "configure")
-    assert [line.partition(":")[0] for line in text.splitlines()] == [
-        "/fleet/planner",
-        "/fleet/motor",
-        "/fleet/camera",
-    ]
+    moved("/fleet/[mp]*", "--to", "inactive")
     done = lifecycle_set("camera", "planner", "cleanup")
     assert done.returncode == 0
     done = lifecycle_set("camera", "motor", "cleanup")
@@ -252,7 +241,7 @@ def test_lifecycle_set_with_several_nodes_patterns_and_systems(robot: Robot) -> 
     moved("camera", "--to", "finalized")
     final = "'active' cannot be reached: /fleet/camera is finalized"
     expect_error(final, "lifecycle", "set", "camera", "--to", "active")
-    for arguments in (["motor"], ["--to", "active"], ["--system", "robot", "motor", "activate"]):
+    for arguments in (["motor"], ["--to", "active"]):
         assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
 
 
@@ -306,16 +295,14 @@ def test_a_killed_system_is_not_running(robot: Robot) -> None:
     none = "there is no running system 'robot'"
     verbs = [("lifecycle", verb) for verb in ("startup", "pause", "resume", "reset")]
     expect_errors(*((none, *words, "robot") for words in (("ps",), ("down",), *verbs)))
-    by_path, misspelled, by_name, in_a_system, get = errors(
+    by_path, misspelled, by_name, get = errors(
         ("ps", robot.path),
         ("ps", robot.path.with_name("robt.yaml")),
         ("lifecycle", "set", "planner", "deactivate"),
-        ("lifecycle", "set", "--system", "robot", "cleanup"),
         ("lifecycle", "get", "/fleet/planner"),
     )
     assert "no system is running: start one with" in by_path
     assert "did you mean" in misspelled
-    assert "there is no running system" in in_a_system
     for text in (by_name, get):
         assert "there is no lifecycle node " in text
 

@@ -200,7 +200,7 @@ def test_commands_work_the_same_with_such_nodes(system: RunningSystem) -> None:
     (reported,) = json.loads(listed((TALKER,), "ps", "--json"))["systems"]
     states = {node["node"]: node["state"] for node in reported["nodes"]}
     assert states == {TALKER: "inactive", "/whole": "active"}
-    output_of("lifecycle", "set", "--system", "lean", "--to", "active", *patiently)
+    output_of("lifecycle", "set", "talker", "--to", "active", *patiently)
     assert listed(("3.5",), "param", "set", "talker", "speed", "3.5")
     assert "3.5" in listed(("3.5",), "param", "get", "talker", "speed")
     assert system.node("talker").state == "active"

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-
 from composer.client.systems.lifecycle_batch import active_dependents, inactive_dependents, lowered
+from composer.runtime.protocol.reports import NodeReport
 
 
-@dataclass
-class Reported:
-    node: str
-    state: str
-    depends_on: Mapping[str, str] = field(default_factory=dict)
-
-
-def robot(states: str) -> list[Reported]:
+def robot(states: str) -> list[NodeReport]:
     """Return nodes in the order of the bring-up; ``states`` has a letter for each."""
     names = {"u": "unconfigured", "i": "inactive", "a": "active", "f": "finalized"}
     sensor, planner, logger, motor, camera = (names[letter] for letter in states)
     return [
-        Reported("/sensor", sensor),
-        Reported("/planner", planner, {"/sensor": "active"}),
-        Reported("/logger", logger, {"/planner": "inactive"}),
-        Reported("/motor", motor, {"/planner": "active"}),
-        Reported("/camera", camera),
+        NodeReport("/sensor", sensor, state=sensor),
+        NodeReport("/planner", planner, depends_on={"/sensor": "active"}, state=planner),
+        NodeReport("/logger", logger, depends_on={"/planner": "inactive"}, state=logger),
+        NodeReport("/motor", motor, depends_on={"/planner": "active"}, state=motor),
+        NodeReport("/camera", camera, state=camera),
     ]
 
 
