@@ -191,7 +191,7 @@ class System:
         """Return ``function(self)``, which is computed once: a system does not change."""
         if function not in self._computed:
             self._computed[function] = function(self)
-        return cast(T, self._computed[function])
+        return cast("T", self._computed[function])
 
     def node(self, name: str) -> Node | None:
         """Return the node with the given key in ``nodes``, or None."""

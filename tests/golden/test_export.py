@@ -9,9 +9,8 @@ from pathlib import Path, PurePosixPath
 import pytest
 import yaml
 
-from composer.bridges.export.container_image import Contents, containerfile
+from composer.bridges.export.container_image import Contents, compose_file, containerfile
 from composer.bridges.export.deployment import Service
-from composer.bridges.export.docker_compose import compose_file
 from composer.bridges.export.kubernetes import manifests
 from composer.bridges.export.sros2 import policy
 from composer.bridges.export.systemd import Installation, units

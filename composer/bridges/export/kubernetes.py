@@ -16,8 +16,9 @@ from composer.bridges.export.deployment import (
     is_restarted,
     ros_variables,
     services,
+    without_variables,
+    yaml_text,
 )
-from composer.bridges.export.yaml_text import without_variables, yaml_text
 from composer.model import System
 from composer.model.discovery import is_loopback
 

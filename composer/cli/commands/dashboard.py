@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.dashboard_process import (
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import Autostart, AutostartTo, Namespace, Settings, examples
+from composer.cli.support.process import (
+    end_now,
     follow_parent,
     foxglove_line,
     report_address,
     require_dashboard,
 )
-from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import Autostart, AutostartTo, Namespace, Settings, examples
-from composer.cli.support.process import end_now
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
     Arguments,

@@ -95,7 +95,7 @@ def export_docker_compose(
     declares, and the variables of ROS that are set now. All of them use one image with the project.
     On stdout, there is only the compose file.
     """
-    from composer.bridges.export.docker_compose import compose_file
+    from composer.bridges.export.container_image import compose_file
 
     declared, path, result = exported_system(system, arguments)
     if list_files:

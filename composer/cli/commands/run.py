@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.commands.export_stubs import update_typings
-from composer.cli.support.dashboard_process import require_dashboard
 from composer.cli.support.errors import CONFIG, CommandError, UsageError
 from composer.cli.support.options import (
     START_OPTIONS,
@@ -32,6 +31,7 @@ from composer.cli.support.options import (
     finite,
     given_options,
 )
+from composer.cli.support.process import require_dashboard
 from composer.cli.support.ros import (
     announce_discovery,
     require_interfaces,
@@ -328,11 +328,9 @@ def _run(
     """Run the system, with its plans up and down, and a dashboard if its arguments are given."""
     gc.disable()  # until the host has its nodes
     from composer.cli.support.console import queued_output
-    from composer.cli.support.dashboard_process import shown_address
     from composer.cli.support.line_format import console_format
-    from composer.cli.support.process import end_now
-    from composer.cli.support.progress import Progress, severity_of, summary
-    from composer.cli.support.run_logging import run_log
+    from composer.cli.support.process import end_now, shown_address
+    from composer.cli.support.progress import Progress, run_log, severity_of, summary
     from composer.model.names import join
     from composer.runtime.host import Host
     from composer.runtime.process import StartRefused

@@ -98,7 +98,7 @@ def check_workspaces(hosts: list[Host]) -> None:
 @contextmanager
 def reported_problems() -> Iterator[None]:
     """Print what is wrong with hosts, and end the command."""
-    from composer.client.hosts.check import HostsDiffer
+    from composer.client.hosts.start import HostsDiffer
 
     try:
         yield
@@ -113,7 +113,7 @@ def process_logs(
     system: System, processes: Sequence[RemoteProcess]
 ) -> Iterator[Callable[[RemoteProcess, LogLevel, str, str], None]]:
     """Keep the lines of processes on other computers in log files here, for 'compose logs'."""
-    from composer.cli.support.run_logging import run_log
+    from composer.cli.support.progress import run_log
     from composer.model.names import join
     from composer.runtime.supervision.events import Logged
 

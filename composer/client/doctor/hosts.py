@@ -12,9 +12,9 @@ from pathlib import Path
 import asyncssh
 
 from composer.client.doctor import CheckResult, Level, error
-from composer.client.hosts.check import connect_all
 from composer.client.hosts.connection import HostError, failure_of, run_command, shown
 from composer.client.hosts.remote_command import python_command
+from composer.client.hosts.start import connect_all
 from composer.model import Host
 
 AREA = "host"

@@ -10,8 +10,7 @@
 See docs/decisions/0012-output-never-blocks.md.
 """
 
-from composer.client.run_log.reading import SystemLog, last_records
-from composer.client.run_log.record import Record, Selection, parse_since
+from composer.client.run_log.reading import Record, Selection, SystemLog, last_records, parse_since
 from composer.client.run_log.runs import (
     RotatingFile,
     Run,

@@ -18,7 +18,7 @@ from composer.base.characters import visible
 from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.requests import call_once
 from composer.client.session import Deadline, NoResponseError, Session
-from composer.client.systems.system_reports import parse_state, with_processes
+from composer.client.systems.local_queries import parse_state, with_processes
 from composer.runtime.process.instance_lock import is_held, local_systems
 from composer.runtime.protocol.codec import OtherVersionError, ProtocolError, decode
 from composer.runtime.protocol.reports import SystemReport, TimingReport

@@ -2,7 +2,7 @@
 
 A node whose ``introspection`` disables them leaves them to the manager of its system. Requests to
 them are sent to the manager, those to many nodes of a system as one: see
-:mod:`composer.runtime.manager.node_services`.
+:mod:`composer.runtime.manager.member_service`.
 """
 
 from __future__ import annotations

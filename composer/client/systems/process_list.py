@@ -10,8 +10,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.lifecycle import LifecycleClient
 from composer.client.session import Deadline, NoResponseError, Session
+from composer.client.systems.local_queries import with_callbacks_of_processes
 from composer.client.systems.managers import DISCOVERY_S, Systems, without_members
-from composer.client.systems.system_reports import with_callbacks_of_processes
 from composer.plan.drift import ObservedProcess
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.codec import OtherVersionError

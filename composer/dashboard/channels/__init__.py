@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from composer.dashboard.channels.graph import LiveFeed, PictureFeed
-from composer.dashboard.channels.log import LogFeed
-from composer.dashboard.channels.messages import EchoFeed, ImageFeed, PlotFeed
-from composer.dashboard.channels.nodes import NodesFeed, TimingFeed
-from composer.dashboard.channels.parameters import ParametersFeed
+from composer.dashboard.channels.messages import EchoFeed, ImageFeed, LogFeed, PlotFeed
+from composer.dashboard.channels.nodes import NodesFeed, ParametersFeed, TimingFeed
 from composer.dashboard.channels.sending import GoalFeed, PublishingFeed
 from composer.dashboard.channels.topics import ServicesFeed, TopicsFeed
 from composer.dashboard.declared import Declared

@@ -135,7 +135,7 @@ class LiveFeed(Feed):
 
     def poll(self) -> Iterator[Update]:
         """Yield all states and rates."""
-        from composer.client.systems.system_reports import of_whole_systems
+        from composer.client.systems.local_queries import of_whole_systems
 
         # Sorted: what other processes of a system report of their nodes is newer, and comes later.
         current = sorted(self.ros.reports.current().items())

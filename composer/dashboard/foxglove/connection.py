@@ -30,8 +30,13 @@ from composer.dashboard.foxglove.encoding import (
     service_response,
     time_frame,
 )
-from composer.dashboard.foxglove.link import Link, error_text
-from composer.dashboard.foxglove.messages import ClockFeed, Publications, Subscriptions
+from composer.dashboard.foxglove.messages import (
+    ClockFeed,
+    Link,
+    Publications,
+    Subscriptions,
+    error_text,
+)
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, unknown
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
 from composer.dashboard.web.client import Running

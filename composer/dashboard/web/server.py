@@ -180,7 +180,7 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
 
     def connection_made(self, transport: Any) -> None:
         """Begin a connection."""
-        super().connection_made(cast(asyncio.Transport, _Transport(transport, self.loop)))
+        super().connection_made(cast("asyncio.Transport", _Transport(transport, self.loop)))
 
     async def send(self, message: Any) -> None:
         """Send a message. The last one is not sent if earlier ones are not read in time."""

@@ -278,4 +278,4 @@ class CrossThreadCall(Generic[T]):
             raise TimeoutError(f"'{name}' {status} after {timeout_s:g} s{at}")
         if self._error is not None:
             raise self._error
-        return cast(T, self._value)
+        return cast("T", self._value)

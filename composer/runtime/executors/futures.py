@@ -83,7 +83,7 @@ class Future(Generic[T]):
             raise failure.retrieve()
         if is_cancelled:
             raise Cancelled
-        return cast(T, value)
+        return cast("T", value)
 
     def add_done_callback(self, callback: Callable[[Future[T]], object]) -> None:
         """Call ``callback(self)`` on the thread that ends the future; at once if it is done."""

@@ -39,7 +39,7 @@ from composer.runtime.hosting.ports.topics import (
     HostedSubscription,
     PendingQosEvents,
 )
-from composer.runtime.node.logger_services import LoggerServices
+from composer.runtime.node.parameter_services import LoggerServices
 from composer.runtime.ros.messages import load_type_support
 
 #: Arguments of ``Node.__init__`` that have no effect on a hosted node or are taken over.

@@ -14,12 +14,12 @@ from composer.runtime.hosting.adopted_node import AdoptedNode
 from composer.runtime.hosting.declared_ports import DeclaredPorts, report_undeclared
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import (
+    HostedLogger,
     Instance,
     InstanceSettings,
     SharedState,
     changed_parameters,
 )
-from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.ports import PortSet
 

@@ -33,12 +33,12 @@ from composer.runtime.hosting.declared_ports import (
 )
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import (
+    HostedLogger,
     Instance,
     InstanceSettings,
     SharedState,
     changed_parameters,
 )
-from composer.runtime.hosting.logger import HostedLogger
 from composer.runtime.hosting.user_code import ThreadedCall, end_callbacks
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class, plain_name
@@ -72,7 +72,7 @@ class HostedNode(LocalNode):
     ) -> None:
         """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
         install()
-        self._hosted = cast(HostedClass, model.hosted_class)
+        self._hosted = cast("HostedClass", model.hosted_class)
         super().__init__(model, loop, options, listener, statistics)
         self._entities = PortSet()
         self._instance: Instance | None = None
@@ -103,7 +103,7 @@ class HostedNode(LocalNode):
 
     def _make_ros_node(self) -> RosNode:
         node = make_ros_node(self.model, remapping_arguments(self.model))
-        node.__class__ = shared_class(cast(Any, type(node)))
+        node.__class__ = shared_class(cast("Any", type(node)))
         return node
 
     def _make_strand(self) -> Strand:

@@ -212,7 +212,7 @@ def running_callbacks(
 def _function_of(frame: FrameType) -> UserFunction | None:
     """Return the function of a class that a frame calls, or a coroutine of which it runs."""
     if frame.f_code is UserFunction.__call__.__code__:
-        return cast(UserFunction, frame.f_locals["self"])
+        return cast("UserFunction", frame.f_locals["self"])
     scope = scope_of(frame)
     return scope.function if isinstance(scope, _Steps) else None
 

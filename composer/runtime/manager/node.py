@@ -26,16 +26,13 @@ from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
-from composer.runtime.manager.graph_view import GraphObserver
-from composer.runtime.manager.member_service import MemberCallbacks, MemberService
-from composer.runtime.manager.node_services import answer_calls
+from composer.runtime.manager.graph_view import GraphObserver, ManagerQueries
+from composer.runtime.manager.member_service import MemberCallbacks, MemberService, answer_calls
 from composer.runtime.manager.other_instances import OtherInstances
 from composer.runtime.manager.publishing import ReportPublisher, ReportSources
-from composer.runtime.manager.queries import ManagerQueries
-from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import InProcessNode, ManagedNode
 from composer.runtime.node.options import ProcessContext
-from composer.runtime.node.parameter_services import ParameterServices
+from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.node_time.sim_time import SimTimeSource
 from composer.runtime.process.query_socket import QuerySocket

@@ -28,8 +28,13 @@ from composer.runtime.members.context import (
     MemberContext,
     ProcessUnavailable,
 )
-from composer.runtime.members.lives import REPORTS_WITHIN_S, MemberLife, MemberLives, NodeFigures
-from composer.runtime.members.reports import MemberReports
+from composer.runtime.members.lives import (
+    REPORTS_WITHIN_S,
+    MemberLife,
+    MemberLives,
+    MemberReports,
+    NodeFigures,
+)
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held

@@ -26,10 +26,9 @@ from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
-from composer.runtime.node.logger_services import LoggerServices
 from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node
-from composer.runtime.node.parameter_services import ParameterServices
+from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.ports import PortSet, RunningPort
 

@@ -1,4 +1,4 @@
-"""The standard parameter services (rcl_interfaces) of a node.
+"""The standard parameter and logger services (rcl_interfaces) of a node.
 
 They respond as rclpy's do, except that a large request does not keep the node's loop from its other
 callbacks: it is handled in slices, or refused above the limits of
@@ -11,21 +11,26 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import partial
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import (
+    LoggerLevel,
     ParameterDescriptor,
     ParameterValue,
+    SetLoggerLevelsResult,
     SetParametersResult,
 )
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import (
     DescribeParameters,
+    GetLoggerLevels,
     GetParameters,
     GetParameterTypes,
     ListParameters,
+    SetLoggerLevels,
     SetParameters,
     SetParametersAtomically,
 )
 from rclpy.exceptions import ParameterNotDeclaredException, ParameterUninitializedException
+from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
@@ -217,3 +222,42 @@ def _refusal(reason: str) -> SetParametersResult:
 
 
 _TYPES = frozenset(kind.value for kind in Parameter.Type)
+
+
+class LoggerServices:
+    """The two services of one node. Create it before the node is added to its loop."""
+
+    def __init__(self, node: Node, clock: Clock, warn: Callable[[str], None]) -> None:
+        """``warn`` logs requests that are refused."""
+        self._warn = warn
+        self._repeats = RepeatLimit(clock)
+        self._add(node, GetLoggerLevels, "get_logger_levels", _get)
+        self._add(node, SetLoggerLevels, "set_logger_levels", _set)
+
+    def _add(self, node: Node, kind: Any, name: str, answer: Callable[[Any, Any], None]) -> None:
+        def respond(request: Any, response: Any) -> Any:
+            if not isinstance(request, TooLarge):
+                answer(request, response)
+            elif (admission := self._repeats.admit(name)) is not None:
+                self._warn(f"refused a request of '{name}': {request.reason}{admission.suffix}")
+            return response
+
+        node.create_service(limited(kind), f"~/{name}", respond)
+
+
+def _get(request: Any, response: Any) -> None:
+    response.levels = [
+        LoggerLevel(name=name, level=int(get_logger_level(name))) for name in request.names
+    ]
+
+
+def _set(request: Any, response: Any) -> None:
+    response.results = [_result(item) for item in request.levels]
+
+
+def _result(item: Any) -> SetLoggerLevelsResult:
+    try:
+        set_logger_level(item.name, item.level, detailed_error=True)
+    except (ValueError, RuntimeError) as error:
+        return SetLoggerLevelsResult(successful=False, reason=str(error))
+    return SetLoggerLevelsResult(successful=True)

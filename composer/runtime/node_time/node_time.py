@@ -39,7 +39,7 @@ class NodeTime:
         self._sim_timers = SimTimers(loop)
         self._delayed_calls: set[_DelayedCall] = set()
         self.is_simulated = False
-        self._ros = cast(ROSClock, node.get_clock())
+        self._ros = cast("ROSClock", node.get_clock())
         # rclpy's time source still follows the parameter and switches the clock, but without its
         # node it does not subscribe.
         node._time_source.detach_node()

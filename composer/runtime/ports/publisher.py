@@ -71,7 +71,7 @@ class PublisherPort(RunningPort):
             port.full_name,
             rclpy_profile(port.qos.profile),
             callback_group=self._context.group,
-            event_callbacks=cast(PublisherEventCallbacks, self._qos_events),
+            event_callbacks=cast("PublisherEventCallbacks", self._qos_events),
         )
 
     def _destroy_publisher(self) -> None:

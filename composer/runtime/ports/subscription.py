@@ -123,7 +123,7 @@ class SubscriptionPort(RunningPort):
             self._mailbox.receive,
             rclpy_profile(port.qos.profile),
             callback_group=self._context.group_of(port),
-            event_callbacks=cast(SubscriptionEventCallbacks, self._qos_events),
+            event_callbacks=cast("SubscriptionEventCallbacks", self._qos_events),
         )
 
     def _receive(self, port: Port) -> Callable[[], None]:

@@ -40,7 +40,7 @@ def visible_names(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
     return tuple(item for item in names if not is_hidden(item[0]))
 
 
-# --- queries of commands on this computer: see composer.runtime.manager.queries
+# --- queries of commands on this computer: see composer.runtime.manager.graph_view
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +219,7 @@ class NodeResponses:
 
 @dataclass(frozen=True, slots=True)
 class CallNodes:
-    """Calls services of ROS that nodes leave to their manager, see ``manager/node_services.py``."""
+    """Calls services of ROS that nodes leave to their manager: ``manager/member_service.py``."""
 
     calls: tuple[NodeCall, ...]
     Answer: ClassVar = NodeResponses

@@ -11,7 +11,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from composer.client.systems.system_reports import parse_state
+from composer.client.systems.local_queries import parse_state
 from composer.runtime.protocol.codec import VERSION, encode
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from composer.client.systems.system_reports import of_system, of_whole_systems
+from composer.client.systems.local_queries import of_system, of_whole_systems
 from composer.dashboard.channels.nodes import ProcessMonitor, total
 from composer.dashboard.protocol.messages import to_json
 from composer.runtime.protocol.reports import NodeReport, SystemReport

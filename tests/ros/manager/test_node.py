@@ -17,7 +17,7 @@ from composer.plan import bring_up, tear_down
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
-from composer.runtime.manager.diagnostics import diagnostic_array
+from composer.runtime.manager.publishing import diagnostic_array
 from composer.runtime.process import StartRefused
 from composer.runtime.protocol.codec import decode
 from composer.runtime.protocol.reports import CallbackFigures, NodeReport, SystemReport

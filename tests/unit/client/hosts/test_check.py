@@ -22,8 +22,7 @@ from composer.client.hosts.inventory import (
 from composer.loading import load
 
 pytest.importorskip("asyncssh", reason="asyncssh is not installed")
-from composer.client.hosts.check import differences
-from composer.client.hosts.start import question_about
+from composer.client.hosts.start import differences, question_about
 
 HERE = Inventory(
     python="3.11",

@@ -20,10 +20,10 @@ from composer.model import Host, LogLevel, Process
 asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 from composer.client.hosts import connection as host_connection  # noqa: E402
 from composer.client.hosts import sync  # noqa: E402
-from composer.client.hosts.check import HostsDiffer, compare_all, connect_all  # noqa: E402
 from composer.client.hosts.connection import HostError  # noqa: E402
 from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess  # noqa: E402
 from composer.client.hosts.inventory import Inventory, Question  # noqa: E402
+from composer.client.hosts.start import HostsDiffer, compare_all, connect_all  # noqa: E402
 
 SPAN = Span(SourceFile("robot.yaml"), 1, 1)
 EVIL = "\x1b[2J\x07evil\u202e\r\n[FATAL] [compose] forged "

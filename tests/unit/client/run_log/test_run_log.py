@@ -22,7 +22,7 @@ from composer.client.run_log import (
     find_runs,
     parse_since,
 )
-from composer.client.run_log.record import parse_line
+from composer.client.run_log.reading import parse_line
 from composer.client.run_log.runs import FOLDER, MAX_RUNS, log_files
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)

@@ -55,7 +55,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def pending(clock: Clock) -> PendingFutures:
-    return PendingFutures(cast(BaseLoop, clock))
+    return PendingFutures(cast("BaseLoop", clock))
 
 
 def hold(pending: PendingFutures, until_s: float) -> Future[str]:
@@ -150,7 +150,7 @@ def test_a_passed_deadline_ends_it_at_the_next_poll(clock: Clock, pending: Pendi
 def test_no_future_is_lost_while_threads_add_and_the_timer_checks() -> None:
     due: list[Callable[[], object]] = []
     loop = SimpleNamespace(clock=COMPUTER, call_later=lambda _, look: due.append(look))
-    pending = PendingFutures(cast(BaseLoop, loop))
+    pending = PendingFutures(cast("BaseLoop", loop))
 
     def hold_some(_: int) -> list[Future[str]]:
         return [hold(pending, monotonic()) for _ in range(200)]

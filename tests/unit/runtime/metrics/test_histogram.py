@@ -17,7 +17,7 @@ from composer.cli.support.callback_tables import (
     top_data,
     top_table,
 )
-from composer.client.systems.system_reports import with_processes
+from composer.client.systems.local_queries import with_processes
 from composer.runtime.metrics.figures import CallbackMeter, CallbackRates, figures
 from composer.runtime.metrics.statistics import (
     CallbackStatistics,
