@@ -13,18 +13,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from math import inf
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 from weakref import ref
 
 from composer.base.source import Located
-from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import Log
-from composer.runtime.callbacks.mutation_check import MutationCheck
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import BATCH_SIZE, CallbackStatistics
+
+if TYPE_CHECKING:
+    from composer.runtime.callbacks.context import NodeContext
+    from composer.runtime.callbacks.log import Log
+    from composer.runtime.callbacks.mutation_check import MutationCheck
 
 T = TypeVar("T")
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Coroutine
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from composer.runtime.callbacks.callback import CallbackTimer
-from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.callbacks.user_code import UserCode
 from composer.runtime.executors.strand import InlineStrand, Work
+
+if TYPE_CHECKING:
+    from composer.runtime.callbacks.callback import CallbackTimer
 
 T = TypeVar("T")
 
 
 def queue_for(
-    context: NodeContext,
+    context: UserCode,
     work: Work[T],
     timer: CallbackTimer | None,
     *,
@@ -40,7 +42,7 @@ class CallbackQueue(Generic[T]):
     __slots__ = ("_busy", "_context", "_depth", "_lock", "_waiting", "_work")
 
     def __init__(
-        self, context: NodeContext, work: Work[T], timer: CallbackTimer | None, depth: int | None
+        self, context: UserCode, work: Work[T], timer: CallbackTimer | None, depth: int | None
     ) -> None:
         self._context = context
         self._work = work if timer is None else timer.wrap(work)

@@ -21,15 +21,17 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from composer.behavior import CallCancelled
 from composer.model import BehaviorReference
-from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.exceptions import BEHAVIOR_PACKAGE
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.stacks import calls_user_code, interruptible
 from composer.runtime.executors.tasks import sleep
+
+if TYPE_CHECKING:
+    from composer.runtime.callbacks.context import NodeContext
 
 #: Held during imports: another loop must not see a module that is only half executed.
 _LOCK = threading.RLock()
@@ -252,6 +254,30 @@ def _ports_type(names: tuple[str, ...]) -> type[Named]:
     return type("Ports", (Named,), {"__slots__": names})
 
 
+class ParameterValues:
+    """``self.parameters`` of a behavior: the current values by name, read-only."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        # The dict itself, which is updated in place: reading a parameter calls no Python code.
+        object.__setattr__(self, "__dict__", values)
+
+    def __getattr__(self, name: str) -> Any:
+        known = ", ".join(sorted(vars(self))) or "none"
+        raise AttributeError(f"no parameter '{name}'; available: {known}")
+
+    def __setattr__(self, name: str, _: object) -> None:
+        raise AttributeError(f"parameter '{name}' cannot be assigned: use 'compose param set'")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"parameter '{name}' cannot be deleted")
+
+    def __getitem__(self, name: str) -> Any:
+        return vars(self)[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted(vars(self))
+
+
 class NodeClock:
     """A behavior's ``clock``; see :class:`composer.behavior.Clock`."""
 
@@ -265,7 +291,7 @@ class NodeClock:
 
     def stamp(self) -> Any:
         """Return the time as a builtin_interfaces/msg/Time."""
-        return self._context.node.get_clock().now().to_msg()
+        return self._context.stamp()
 
     def sleep(self, seconds: float) -> Future[None]:
         """Let other callbacks run for ``seconds``.

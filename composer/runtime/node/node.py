@@ -21,6 +21,7 @@ from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import (
     NodeClock,
+    ParameterValues,
     behavior_class,
     method,
     named_ports,
@@ -29,7 +30,7 @@ from composer.runtime.node.entities import NodeEntities
 from composer.runtime.node.local_node import LibraryNode, LocalNode
 from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions
-from composer.runtime.node.parameters import NodeParameters, ParameterValues
+from composer.runtime.node.parameters import NodeParameters
 from composer.runtime.ports.timer import TimerPort
 
 _EVENTS = {

@@ -88,30 +88,6 @@ class NodeParameters:
             self._changed(values)
 
 
-class ParameterValues:
-    """``self.parameters`` of a behavior: the current values by name, read-only."""
-
-    def __init__(self, values: dict[str, Any]) -> None:
-        # The dict itself, which is updated in place: reading a parameter calls no Python code.
-        object.__setattr__(self, "__dict__", values)
-
-    def __getattr__(self, name: str) -> Any:
-        known = ", ".join(sorted(vars(self))) or "none"
-        raise AttributeError(f"no parameter '{name}'; available: {known}")
-
-    def __setattr__(self, name: str, _: object) -> None:
-        raise AttributeError(f"parameter '{name}' cannot be assigned: use 'compose param set'")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"parameter '{name}' cannot be deleted")
-
-    def __getitem__(self, name: str) -> Any:
-        return vars(self)[name]
-
-    def __dir__(self) -> list[str]:
-        return sorted(vars(self))
-
-
 def declare(node: Node, parameter: Parameter) -> Any:
     """Declare a parameter with its value, and return it. Raises ParameterError."""
     name = parameter.name.value

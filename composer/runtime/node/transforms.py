@@ -5,8 +5,8 @@ See :class:`composer.behavior.Transforms`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TypeAlias
 
 from builtin_interfaces.msg import Time
 
@@ -40,6 +40,8 @@ from composer.runtime.transforms.messages import (
     transform_of,
 )
 
+MakePublisher: TypeAlias = Callable[[NodeContext, Port], PublisherPort]
+
 
 class Broadcaster:
     """Publishes the transforms of a node on /tf and /tf_static, while the node is active.
@@ -47,13 +49,15 @@ class Broadcaster:
     As in tf2, each message on /tf_static has all static transforms of the node.
     """
 
-    def __init__(self, context: NodeContext, transforms: Transforms) -> None:
+    def __init__(
+        self, context: NodeContext, transforms: Transforms, make_publisher: MakePublisher
+    ) -> None:
         """Create the publishers. Raises MessageError if tf2_msgs is not installed."""
         self._context = context
         self._message_type = interface_class(TF_TYPE)
         self._declared = {item.child.value: item for item in transforms.broadcasts}
         self._publishers = {
-            port.name.value: PublisherPort(context, port) for port in transforms.publishers
+            port.name.value: make_publisher(context, port) for port in transforms.publishers
         }
         self._static: dict[str, Any] = {}
 
@@ -64,7 +68,7 @@ class Broadcaster:
 
     def begin(self) -> None:
         """Publish the static transforms of the declaration: the node is being activated."""
-        stamp = self._now()
+        stamp = self._context.stamp()
         for child, declared in self._declared.items():
             if isinstance(declared, StaticTransform) and not declared.from_code:
                 values = transform_message(declared.values.value if declared.values else IDENTITY)
@@ -81,7 +85,7 @@ class Broadcaster:
         check_transform(transform)
         own = transform_message(transform_of(transform))  # the caller may change the other one
         message = stamped(
-            declared.parent.value, child, self._now() if stamp is None else stamp, own
+            declared.parent.value, child, self._context.stamp() if stamp is None else stamp, own
         )
         if isinstance(declared, DynamicTransform):
             self._publish(TF_TOPIC, [message])
@@ -101,9 +105,6 @@ class Broadcaster:
 
     def _publish(self, topic: str, transforms: list[Any]) -> None:
         self._publishers[topic].gated.publish(self._message_type(transforms=transforms))
-
-    def _now(self) -> Any:
-        return self._context.node.get_clock().now().to_msg()
 
 
 class PoseBroadcast:
@@ -153,13 +154,17 @@ class NodeTransforms(RunningPort):
     """
 
     def __init__(
-        self, context: NodeContext, transforms: Transforms, listeners: TransformListeners
+        self,
+        context: NodeContext,
+        transforms: Transforms,
+        listeners: TransformListeners,
+        make_publisher: MakePublisher = PublisherPort,
     ) -> None:
         """Create the publishers. Raises MessageError if tf2_msgs is not installed."""
         self._context = context
         self._listener = listeners.listener(transforms, context.router)
         self._buffer: TransformBuffer | None = None
-        self.broadcaster = Broadcaster(context, transforms)
+        self.broadcaster = Broadcaster(context, transforms, make_publisher)
 
     def begin(self) -> None:
         """Broadcast what is static, and listen: the node is being activated."""

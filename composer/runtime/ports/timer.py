@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from composer.model import Timer, TimerClock
 from composer.runtime.callbacks.callback import EMPTY, Callback, mutation_checked
-from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
-from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.tasks import TimerHandle
 from composer.runtime.ports import RunningPort
+
+if TYPE_CHECKING:
+    from composer.runtime.callbacks.context import NodeContext
+    from composer.runtime.callbacks.reactions import RunningReaction
 
 
 class TimerPort(Callback, RunningPort):

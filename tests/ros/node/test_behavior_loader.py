@@ -13,8 +13,7 @@ import pytest
 from composer.base.source import Located, SourceFile, Span
 from composer.model import BehaviorReference
 from composer.runtime.executors.exceptions import report_of
-from composer.runtime.node.behavior_loader import behavior_class
-from composer.runtime.node.parameters import ParameterValues
+from composer.runtime.node.behavior_loader import ParameterValues, behavior_class
 
 
 def test_threads_that_import_a_module_at_the_same_time_share_it(tmp_path: Path) -> None:
