@@ -108,7 +108,7 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
         case kinds.SYSTEM:
             return _merge_system(tree, document.source, definitions, arguments)
         case kinds.NODE:
-            return _merge_node_type(tree, document.source, definitions)
+            return _merge_node_type(tree, document.source, definitions, arguments)
         case _:
             problem = check_kind(tree, document.source)
             return Merged(diagnostics=[] if problem is None else [problem])
@@ -149,11 +149,13 @@ def _surplus_entry(tree: Mapping) -> Diagnostic | None:
     return None
 
 
-def _merge_node_type(tree: Mapping, source: SourceFile, definitions: Definitions) -> Merged:
+def _merge_node_type(
+    tree: Mapping, source: SourceFile, definitions: Definitions, arguments: Map[str, Entry]
+) -> Merged:
     file = NodeTypeFile(definitions.folder / Path(source.path).name, source, tree)
     inherited = inherit(file)
     if inherited.tree is None:
         return Merged(diagnostics=inherited.diagnostics)
-    expanded, found, _ = expand(inherited.tree, {})
+    expanded, found, _ = expand(inherited.tree, arguments)
     diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
     return Merged(inherited.tree, expanded, diagnostics, inherited.folders)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
+from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
+from composer.model.ports import LogLevel
 
 #: The events that a failure shows, and those that are kept.
 SHOWN = 20
@@ -19,10 +21,30 @@ class TestFailure(AssertionError):
     __test__ = False  # no class of tests
 
     def __init__(self, text: str, timeline: list[str] | None = None) -> None:
-        last = "".join(f"\n  {line}" for line in (timeline or [])[-SHOWN:])
+        #: The last events, if they are known.
+        self.timeline = timeline or []
+        last = "".join(f"\n  {line}" for line in self.timeline[-SHOWN:])
         super().__init__(f"{text}\nthe last events:{last}" if last else text)
         #: What was expected, and what happened instead.
         self.text = text
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message of a topic, or a request; ``time_s`` are the seconds since the start of the run."""
+
+    time_s: float
+    message: Any
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """A line of the log; ``node`` is the full name of a node, or empty for the system itself."""
+
+    time_s: float
+    level: LogLevel
+    node: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +67,12 @@ class Timeline:
         """Return the last events, the oldest first, each with its time in seconds."""
         entries = sorted(self._entries, key=lambda entry: entry.time_s)[-count:]
         return [f"{entry.time_s:9.3f}  {entry.text()}" for entry in entries]
+
+
+def unknown(text: str, name: str, names: Iterable[str]) -> TestFailure:
+    """Return the failure for a name that does not exist, with the nearest one that does."""
+    hint = suggestion(name, list(names))
+    return TestFailure(text if hint is None else f"{text}; {hint}")
 
 
 _LENGTH = 120

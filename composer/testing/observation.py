@@ -7,31 +7,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.ros.messages import to_plain
 from composer.runtime.supervision.events import BroughtUp, Event, Logged
-from composer.testing.failures import Timeline, short
+from composer.testing.failures import LogLine, Received, Timeline, short
 from composer.testing.tester import TESTER
-
-
-@dataclass(frozen=True, slots=True)
-class Received:
-    """A message of a topic; ``time_s`` are the seconds since the start of the run."""
-
-    time_s: float
-    message: Any
-
-
-@dataclass(frozen=True, slots=True)
-class LogLine:
-    """A line of the log; ``node`` is the full name of a node, or empty for the system itself."""
-
-    time_s: float
-    level: LogLevel
-    node: str
-    text: str
 
 
 class Observation:

@@ -10,19 +10,15 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from composer.base.diagnostics import has_errors
-from composer.language.tree_values import word
-from composer.loading import load_models
 from composer.model import System
-from composer.model.resolve import OverrideOptions
 from composer.plan import bring_up, tear_down
-from composer.report.text import render
 from composer.runtime.clock.clock import Clock
 from composer.runtime.clock.virtual import VirtualClock
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import Outcome, Report
 from composer.runtime.supervision.virtual_time import ISOLATION
+from composer.testing.declarations import load_file
 from composer.testing.failures import TestFailure
 
 #: The limit of the bring-up, in the time of the system.
@@ -116,11 +112,4 @@ def load_system(path: Path, arguments: Mapping[str, Any], settings: Mapping[str,
 
     Raises TestFailure with the diagnostics if the file has errors; the rules do not check it.
     """
-    overrides = OverrideOptions(
-        arguments=tuple(f"{name}={word(value)}" for name, value in arguments.items()),
-        settings=tuple(f"{name}={word(value)}" for name, value in settings.items()),
-    )
-    [result] = load_models([path], overrides)
-    if result.system is None or has_errors(result.diagnostics):
-        raise TestFailure(f"{path} has errors:\n{render(result.diagnostics)}")
-    return result.system
+    return load_file(path, arguments, settings)[0]

@@ -36,10 +36,10 @@ from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.supervision.events import Event, Outcome
 from composer.testing import faults
-from composer.testing.failures import TestFailure, short
+from composer.testing.failures import LogLine, Received, TestFailure, short
 from composer.testing.faults import Faults, TopicFault
 from composer.testing.goal import Goal
-from composer.testing.observation import LogLine, Observation, Received
+from composer.testing.observation import Observation
 from composer.testing.system_run import SystemRun, load_system
 from composer.testing.tester import TESTER, Tester, port_name, with_tester
 
