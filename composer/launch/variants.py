@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import product
 from math import prod
 from typing import Any
@@ -143,35 +144,72 @@ class Differs(Exception):
     """Several descriptions of a node cannot be one description with references."""
 
 
-def unified(trees: Sequence[Any], values: Sequence[Mapping[str, str]]) -> Any:
+def _unified(
+    trees: Sequence[Any], values: Sequence[Mapping[str, str]], switches: Collection[str]
+) -> Any:
     """Return one tree for several, with marks where they have the values of an argument.
 
-    Raises Differs.
+    ``switches`` are the arguments that are true or false. Raises Differs.
     """
     first = trees[0]
-    if all(tree == first and type(tree) is type(first) for tree in trees):
+    if any(type(tree) is not type(first) for tree in trees):
+        raise Differs
+    if all(tree == first for tree in trees):
         return first
     if all(isinstance(tree, dict) and tree.keys() == first.keys() for tree in trees):
-        return {key: unified([tree[key] for tree in trees], values) for key in first}
+        return {key: _unified([tree[key] for tree in trees], values, switches) for key in first}
     if all(isinstance(tree, list) and len(tree) == len(first) for tree in trees):
-        return [unified(items, values) for items in zip(*trees, strict=True)]
+        return [_unified(items, values, switches) for items in zip(*trees, strict=True)]
     for name in values[0]:
         texts = [item[name] for item in values]
-        if all(_is_value(tree, text) for tree, text in zip(trees, texts, strict=True)):
+        if _are_values(trees, texts, is_switch=name in switches):
             return mark(name)
-        if all(isinstance(tree, str) for tree in trees) and all(texts):
-            marked = {
-                tree.replace(text, mark(name)) for tree, text in zip(trees, texts, strict=True)
-            }
+        if isinstance(first, str) and all(texts):
+            pairs = zip(trees, texts, strict=True)
+            marked = {tree.replace(text, mark(name)) for tree, text in pairs}
             if len(marked) == 1:
                 return marked.pop()
     raise Differs
 
 
-def _is_value(value: Any, text: str) -> bool:
-    if isinstance(value, bool):
-        return text.lower() == str(value).lower()
-    return bool(value == text)
+def _are_values(trees: Sequence[Any], texts: Sequence[str], *, is_switch: bool) -> bool:
+    if isinstance(trees[0], bool):
+        return is_switch and [str(tree).lower() for tree in trees] == [t.lower() for t in texts]
+    return [*trees] == [*texts]
+
+
+def unified_groups(
+    trees: Mapping[int, Any], values: Sequence[Mapping[str, str]]
+) -> list[tuple[Any, list[int]]]:
+    """Return as few trees as possible for those of several visits, each with its visits.
+
+    ``values`` are those of all visits.
+    """
+    switches = _switches(values)
+
+    def together(numbers: Sequence[int]) -> Any:
+        return _unified([trees[n] for n in numbers], [values[n] for n in numbers], switches)
+
+    with suppress(Differs):
+        return [(together([*trees]), [*trees])]
+    groups: list[tuple[Any, list[int]]] = []
+    for number in trees:
+        for position, (_, numbers) in enumerate(groups):
+            with suppress(Differs):
+                groups[position] = together([*numbers, number]), [*numbers, number]
+                break
+        else:
+            groups.append((trees[number], [number]))
+    return groups
+
+
+def is_switch(texts: Iterable[str]) -> bool:
+    """Return whether an argument with these values is true or false."""
+    return all(text.lower() in ("true", "false") for text in texts)
+
+
+def _switches(values: Sequence[Mapping[str, str]]) -> frozenset[str]:
+    return frozenset(name for name in values[0] if is_switch(item[name] for item in values))
 
 
 def condition(visits: Sequence[Mapping[str, str]], present: Iterable[int]) -> dict[str, str]:
@@ -190,12 +228,18 @@ def condition(visits: Sequence[Mapping[str, str]], present: Iterable[int]) -> di
     groups = {tuple(item[name] for name in names): False for item in visits}
     for number in numbers:
         groups[tuple(visits[number][name] for name in names)] = True
+    switches = _switches(visits)
     there = [group for group, is_there in groups.items() if is_there]
     absent = [group for group, is_there in groups.items() if not is_there]
-    is_default = 0 in numbers
-    if len(there) < len(absent) or (len(there) == len(absent) and not is_default):
-        return {"if": " or ".join(_terms(names, there))}
-    return {"unless": " or ".join(_terms(names, absent))}
+    present_if = " or ".join(_terms(names, there, switches))
+    absent_if = " or ".join(_terms(names, absent, switches))
+    if len(there) != len(absent):
+        is_positive = len(there) < len(absent)
+    elif switches.issuperset(names):
+        is_positive = len(present_if) <= len(absent_if)
+    else:  # what other values choose is not known: they have what the default has
+        is_positive = 0 not in numbers
+    return {"if": present_if} if is_positive else {"unless": absent_if}
 
 
 def _are_enough(
@@ -210,14 +254,17 @@ def _are_enough(
     )
 
 
-def _terms(names: Sequence[str], groups: Iterable[Sequence[str]]) -> Iterator[str]:
+def _terms(
+    names: Sequence[str], groups: Iterable[Sequence[str]], switches: Collection[str]
+) -> Iterator[str]:
     for group in groups:
-        yield " and ".join(_term(*pair) for pair in zip(names, group, strict=True))
+        pairs = zip(names, group, strict=True)
+        yield " and ".join(_term(name, value, name in switches) for name, value in pairs)
 
 
-def _term(name: str, value: str) -> str:
+def _term(name: str, value: str, is_switch: bool) -> str:
     name = identifier(name)
-    if value in _OPPOSITES:
+    if is_switch:
         return name if value.lower() == "true" else f"not {name}"
     quote = '"' if "'" in value else "'"
     return f"{name} == {quote}{value}{quote}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -15,12 +14,12 @@ from composer.language.document.scalars import resolve_plain
 from composer.language.expressions import compile_expression
 from composer.language.tree import Plain
 from composer.launch.variants import (
-    Differs,
     condition,
     identifier,
+    is_switch,
     mark,
     marked_names,
-    unified,
+    unified_groups,
     with_references,
 )
 from composer.model import LogLevel
@@ -72,7 +71,7 @@ def describe_launch_file(
 
 
 def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the nodes of all visits, each with its condition; one for all visits if possible.
+    """Yield the nodes of all visits, each with its condition; as few as possible.
 
     ``present`` are the visits that have it, ``samples`` its parameters without references.
     """
@@ -91,25 +90,13 @@ def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
         samples = {
             name: value for item in present.values() for name, value in item.pop("samples").items()
         }
-        try:
-            groups = [(unified(list(present.values()), [values[n] for n in present]), [*present])]
-        except Differs:
-            groups = _equal(present)
-        for item, numbers in groups:
+        for item, numbers in unified_groups(present, values):
             yield {
                 **item,
                 "present": frozenset(numbers),
                 "condition": condition(values, numbers),
                 "samples": samples,
             }
-
-
-def _equal(present: Mapping[int, dict[str, Any]]) -> list[tuple[dict[str, Any], list[int]]]:
-    """Return the different descriptions of a node, each with its visits."""
-    groups: dict[str, tuple[dict[str, Any], list[int]]] = {}
-    for number, item in present.items():
-        groups.setdefault(json.dumps(item, sort_keys=True), (item, []))[1].append(number)
-    return list(groups.values())
 
 
 def _names_in_use(
@@ -127,19 +114,20 @@ def _names_in_use(
 def _argument(argument: Mapping[str, Any], items: Iterable[Mapping[str, Any]]) -> Plain:
     """Return the declaration of an argument: its default alone if there is nothing else."""
     reference, default = mark(argument["name"]), argument["default"]
-    typed = resolve_plain(default) if default else default
-    is_text = not isinstance(typed, bool) and not any(
+    value: Plain = default
+    choices = argument["choices"]
+    if is_switch([default, *choices, *argument["values"]]):
+        value, choices = default.lower() == "true", []
+    elif any(
         item["parameters"].get(name) == reference
         for item in items
-        for name, value in item["samples"].items()
-        if not isinstance(value, str)
-    )
-    if default.lower() in ("true", "false"):
-        is_text, typed = False, default.lower() == "true"
-    value = default if is_text else typed
+        for name, sample in item["samples"].items()
+        if not isinstance(sample, str)
+    ):
+        value = resolve_plain(default)
     declared: dict[str, Plain] = {"default": value}
-    if argument["choices"]:
-        declared["choices"] = argument["choices"]
+    if choices:
+        declared["choices"] = choices
     if argument["description"]:
         declared["description"] = escape_lines(argument["description"])
     return value if len(declared) == 1 else declared

@@ -108,6 +108,37 @@ def test_what_differs_in_another_way_has_a_condition_for_each() -> None:
     assert {first.get("name", "nav"), second["name"]} == {"nav"}
 
 
+@pytest.mark.parametrize(
+    ("choices", "declared", "is_fast"),
+    [
+        ((), False, "fast"),
+        (("true", "false"), False, "fast"),
+        (
+            ("true", "false", "auto"),
+            {"default": "false", "choices": ["true", "false", "auto"]},
+            "fast == 'true'",
+        ),
+    ],
+)
+def test_as_few_nodes_as_possible(
+    choices: tuple[str, ...], declared: object, is_fast: str, tmp_path: Path
+) -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        fast = values["fast"] == "true"
+        parameters = {"use_sim_time": values["sim"] == "true", "fast": fast}
+        arguments = ["-x"] if fast else ["-y", "-z"]
+        return [node("nav", arguments=arguments, parameters=parameters)]
+
+    system, _ = visited(nodes, argument("fast", "false", *choices), argument("sim", "false"))
+    assert system["arguments"] == {"fast": declared, "sim": False}
+    slow, fast = system["nodes"].values()
+    assert (conditions(slow), conditions(fast)) == ({"unless": is_fast}, {"if": is_fast})
+    assert slow["parameters"]["use_sim_time"]["default"] == "${sim}"
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
+    [result] = load_files([tmp_path / "s.yaml"])
+    assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
+
+
 def test_what_cannot_be_kept_is_listed() -> None:
     def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
         return [node(f"robot_{number}") for number in range(int(values["robots"]))]
@@ -154,6 +185,7 @@ C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
         ([0, 1, 2, 3], {}),
         ([0, 1], {"unless": "a"}),
         ([2, 3], {"if": "a"}),
+        ([0, 2], {"unless": "b == 'y'"}),
         ([1, 3], {"if": "b == 'y'"}),
         ([1], {"if": "not a and b == 'y'"}),
         ([0, 1, 2], {"unless": "a and b == 'y'"}),
@@ -162,6 +194,12 @@ C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
 )
 def test_the_condition_is_short(present: list[int], expected: dict[str, str]) -> None:
     assert condition([A, B, C, D], present) == expected
+
+
+def test_a_condition_has_no_double_negation() -> None:
+    visits = [{"viewer": "true"}, {"viewer": "false"}]
+    assert condition(visits, [0]) == {"if": "viewer"}
+    assert condition(visits, [1]) == {"unless": "viewer"}
 
 
 LAUNCH = """\
