@@ -33,12 +33,8 @@ def listing(
     A definition without text, as in the snapshot or of OMG IDL, has no comments. A message that
     contains itself, ``above``, is not expanded again.
     """
-    text = interfaces.text(name)
-    found = interfaces.find(name)
-    if text is None and found is not None:
-        text = "\n".join(_generated(found))
     nested = ListingOptions(comments=False)
-    for line in (text or "").splitlines():
+    for line in definition_text(name, interfaces).splitlines():
         content = line.partition("#")[0].strip()
         if options.comments:
             yield line.rstrip()
@@ -50,6 +46,15 @@ def listing(
         if isinstance(field, Field) and field.type.name not in (name, *above):
             for inner in listing(field.type.name, interfaces, nested, (name, *above)):
                 yield f"{_INDENT}{inner}" if inner else ""
+
+
+def definition_text(name: str, interfaces: Interfaces) -> str:
+    """Return the text of a definition, made from its description if need be; empty if unknown."""
+    text = interfaces.text(name)
+    found = interfaces.find(name)
+    if text is None and found is not None:
+        return "\n".join(_generated(found))
+    return text or ""
 
 
 def _generated(interface: Interface) -> Iterator[str]:

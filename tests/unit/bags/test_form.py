@@ -1,0 +1,279 @@
+"""Bags as files: what we write, other libraries read; what is damaged is named."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+import yaml
+
+pytest.importorskip("mcap")
+pytest.importorskip("rosbags")
+
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.enums import StoragePlugin
+from rosbags.rosbag2.writer import Writer as RosbagsWriter
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from composer.bags import qos_yaml
+from composer.bags.bag import Attachment, Bag, BagError, BagMessage, BagTopic
+from composer.bags.definitions import full_definition
+from composer.bags.reader import open_bag
+from composer.bags.writer import BagWriter, SplitLimits
+from composer.interfaces import Interfaces
+from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPES = (
+    "std_msgs/msg/String",
+    "nav_msgs/msg/Odometry",
+    "sensor_msgs/msg/PointCloud2",
+    "tf2_msgs/msg/TFMessage",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+)
+ALL = (0, 2**62)
+START_NS = 1_700_000_000_000_000_000
+
+
+def text(content: str) -> bytes:
+    """Return a serialized std_msgs/String."""
+    type_name = "std_msgs/msg/String"
+    message = STORE.types[type_name](data=content)
+    return bytes(STORE.serialize_cdr(message, type_name))
+
+
+def write(
+    folder: Path, count: int = 100, limits: SplitLimits | None = None, padding: bytes = b""
+) -> list[BagMessage]:
+    """Write a bag with one topic, a message each 10 ms, and return the messages."""
+    type_name = "std_msgs/msg/String"
+    times = [START_NS + number * 10_000_000 for number in range(count)]
+    data = text("hello") + padding
+    messages = [BagMessage("/chat", at, at, b"%s%d" % (data, at)) for at in times]
+    attachment = Attachment("system.yaml", "application/yaml", b"system: demo\n")
+    writer = BagWriter(folder, limits or SplitLimits(), (attachment,))
+    definition = full_definition(type_name, Interfaces.load())
+    writer.add_topic(BagTopic("/chat", type_name, (PRESETS["state"],), definition))
+    for message in messages:
+        writer.write(message)
+    writer.close()
+    return messages
+
+
+def read(bag: Bag) -> list[BagMessage]:
+    """Return all messages of a bag."""
+    return list(bag.messages(frozenset(bag.summary.topics), *ALL))
+
+
+@pytest.mark.parametrize(
+    ("limits", "files"),
+    [
+        (SplitLimits(), 1),
+        (SplitLimits(duration_s=0.05), 4),
+        (SplitLimits(size_bytes=1), 20),
+    ],
+)
+def test_others_read_what_we_write(tmp_path: Path, limits: SplitLimits, files: int) -> None:
+    folder = tmp_path / "bag"
+    messages = write(folder, 20, limits)
+    found = open_bag(folder)
+    assert (len(found.files), found.warnings) == (files, [])
+    assert read(found) == messages
+    assert found.summary.counts == {"/chat": 20}
+    assert found.summary.topics["/chat"].qos == (PRESETS["state"],)
+    assert [item.data for item in found.attachments()] == [b"system: demo\n"]
+    with Reader(folder) as reader:
+        assert [data for _, _, data in reader.messages()] == [item.data for item in messages]
+        assert reader.message_count == 20
+        assert reader.duration == 19 * 10_000_000 + 1
+    by_mcap = []
+    for path in found.files:
+        with Path(path).open("rb") as stream:
+            by_mcap += [
+                (channel.topic, message.log_time, message.publish_time, message.data)
+                for _, channel, message in make_reader(stream, validate_crcs=True).iter_messages()
+            ]
+    assert sorted(by_mcap) == [tuple(item) for item in messages]
+    information = yaml.safe_load((folder / "metadata.yaml").read_text())
+    assert information["rosbag2_bagfile_information"]["version"] == 9
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_definitions_are_complete(type_name: str) -> None:
+    found = get_types_from_msg(full_definition(type_name, Interfaces.load()), type_name)
+    assert type_name in found
+    for name, (_, fields) in found.items():
+        assert fields == STORE.fielddefs[name][1], name
+    nested = {name for _, (_, fields) in found.items() for name in _messages_in(fields)}
+    assert nested == found.keys() - {type_name}
+
+
+def _messages_in(fields: object) -> set[str]:
+    return {name for name in STORE.fielddefs if f"'{name}'" in repr(fields)}
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [
+        *PRESETS.values(),
+        QosProfile(
+            history=History.KEEP_ALL,
+            durability=Durability.TRANSIENT_LOCAL,
+            deadline_ms=12.5,
+            lifespan_ms=2000.0,
+            liveliness=Liveliness.MANUAL_BY_TOPIC,
+            liveliness_lease_duration_ms=1e5,
+        ),
+    ],
+)
+def test_qos_profiles_survive(profile: QosProfile) -> None:
+    assert qos_yaml.from_text(qos_yaml.to_text([profile])) == (profile,)
+
+
+@pytest.mark.parametrize(
+    "damage", ["", "{", "3", "- 3", "[" * 5000, "- {history: 7, depth: x, deadline: 3}"]
+)
+def test_other_texts_are_no_qos_profiles(damage: str) -> None:
+    assert set(qos_yaml.from_text(damage)) <= {QosProfile()}
+
+
+def test_numbers_of_older_versions_are_read() -> None:
+    old = "- {history: 2, depth: 1, reliability: 2, durability: 1, liveliness: 3}"
+    [profile] = qos_yaml.from_text(old)
+    values = (profile.history, profile.reliability, profile.durability, profile.liveliness)
+    assert values == ("keep_all", "best_effort", "transient_local", "manual_by_topic")
+
+
+@pytest.mark.parametrize("plugin", list(StoragePlugin))
+def test_we_read_what_rosbags_writes(tmp_path: Path, plugin: StoragePlugin) -> None:
+    with RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=STORE)
+        for number in range(20):
+            writer.write(connection, START_NS + number, text(str(number)))
+    bag = open_bag(tmp_path / "bag")
+    assert [item.data for item in read(bag)] == [text(str(number)) for number in range(20)]
+    assert (bag.summary.start_ns, bag.summary.end_ns) == (START_NS, START_NS + 19)
+    assert bag.summary.topics["/chat"].type_name == "std_msgs/msg/String"
+    [part] = bag.messages(frozenset({"/chat"}), START_NS + 3, START_NS + 4)
+    assert part.recorded_ns == START_NS + 3
+
+
+_ENDLESS = """
+import sys, time
+from pathlib import Path
+from composer.bags.bag import BagMessage, BagTopic
+from composer.bags.writer import BagWriter
+writer = BagWriter(Path(sys.argv[1]))
+writer.add_topic(BagTopic("/chat", "std_msgs/msg/String"))
+number = 0
+while True:
+    number += 1
+    writer.write(BagMessage("/chat", number, number, b"0123456789"))
+    time.sleep(0.001)
+"""
+
+
+def test_what_a_killed_process_has_written_can_be_read(tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    with subprocess.Popen([sys.executable, "-c", _ENDLESS, str(folder)]) as process:
+        size = 0
+        until_s = time.monotonic() + 20.0
+        while size < 1000 and time.monotonic() < until_s:  # the first chunk, after a second
+            size = sum(path.stat().st_size for path in folder.glob("*.mcap"))
+            time.sleep(0.02)
+        os.kill(process.pid, signal.SIGKILL)
+    bag = open_bag(folder)
+    numbers = [item.recorded_ns for item in read(bag)]
+    assert len(numbers) > 100
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert "is not complete (its end is missing or damaged)" in bag.warnings[0]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.999])
+def test_a_truncated_file_is_read_up_to_there(tmp_path: Path, share: float) -> None:
+    messages = write(tmp_path / "bag", count=5000, padding=os.urandom(1000))
+    [path] = (tmp_path / "bag").glob("*.mcap")
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+    bag = open_bag(path)
+    found = read(bag)
+    assert found == messages[: len(found)]
+    assert len(found) == pytest.approx(5000 * share, abs=1100)
+    assert bag.warnings
+    assert [item.name for item in bag.attachments()] == ["system.yaml"]
+
+
+def _damage_chunk(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    data = content.index(b"zstd") + 100
+    content[data : data + 20] = b"x" * 20
+    path.write_bytes(content)
+
+
+def _as_if_compressed_otherwise(path: Path) -> None:
+    path.write_bytes(path.read_bytes().replace(b"zstd", b"zzzz"))
+
+
+def _as_text(path: Path) -> None:
+    path.write_text("system: demo")
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (_damage_chunk, "is corrupt or not supported"),
+        (_as_if_compressed_otherwise, "is corrupt or not supported: .*zzzz"),
+        (_as_text, "is no MCAP file"),
+        (lambda path: path.write_bytes(b""), "is empty"),
+        (Path.unlink, "is no bag: it has neither"),
+    ],
+)
+def test_damage_is_named(tmp_path: Path, damage: Callable[[Path], object], text: str) -> None:
+    write(tmp_path / "bag", count=1000)
+    [path] = (tmp_path / "bag").glob("*.mcap")
+    damage(path)
+    with pytest.raises(BagError, match=text):
+        read(open_bag(tmp_path / "bag"))
+
+
+def test_damaged_databases_are_named(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match="there is no bag"):
+        open_bag(tmp_path / "missing")
+    path = tmp_path / "bag.db3"
+    path.write_bytes(b"no database" * 100)
+    with pytest.raises(BagError, match="is corrupt or not supported"):
+        read(open_bag(path))
+    with closing(sqlite3.connect(tmp_path / "empty.db3")) as database:
+        database.execute("create table other (id integer)")
+    with pytest.raises(BagError, match="is corrupt or not supported"):
+        read(open_bag(tmp_path / "empty.db3"))
+
+
+def test_nothing_is_overwritten_and_a_full_disk_is_named(tmp_path: Path) -> None:
+    write(tmp_path / "bag")
+    with pytest.raises(BagError, match="exists already"):
+        BagWriter(tmp_path / "bag")
+    limit = """
+import resource, sys
+from tests.unit.bags.test_form import write
+from pathlib import Path
+import signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+write(Path(sys.argv[1]), 20_000, padding=bytes(range(256)) * 4)
+"""
+    command = [sys.executable, "-c", limit, str(tmp_path / "full")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "BagError: cannot write" in done.stderr
+    assert "File too large" in done.stderr
+    assert len(read(open_bag(tmp_path / "full"))) > 1000
