@@ -24,6 +24,8 @@ _NANOSECONDS = 1_000_000_000
 STANDSTILL_READS: Final = 2_999
 #: How often a system that has nothing to wait for looks for signals and other threads.
 _POLL_S = 0.001
+#: How long a thread that is interrupted waits for its turn, in real time.
+_INTERRUPTED_WITHIN_S = 1.0
 
 
 class _Waiting:
@@ -115,12 +117,7 @@ class VirtualClock(Clock):
         """Block until ``is_over()``, at most until ``until_s`` (monotonic); return its value."""
         self.monotonic()  # threads may wake each other without end
         if get_ident() in self._members:
-            waiting = _Waiting(is_over, until_s)
-            self._waiting.append(waiting)
-            chosen = self._next()
-            if chosen is not waiting:
-                chosen.turn.release()
-                waiting.turn.acquire()
+            self._wait_for_turn(_Waiting(is_over, until_s))
         else:
             while not is_over() and self._now_s < until_s:
                 COMPUTER.sleep(_POLL_S)
@@ -134,6 +131,19 @@ class VirtualClock(Clock):
     def unfollow(self, follower: Callable[[int], None]) -> None:
         """Stop calling a follower."""
         self._followers.remove(follower)
+
+    def _wait_for_turn(self, waiting: _Waiting) -> None:
+        self._waiting.append(waiting)
+        self._next().turn.release()
+        try:
+            waiting.turn.acquire()
+        except BaseException:
+            # A signal handler has raised it, such as KeyboardInterrupt. Another thread has the turn
+            # and passes it on, unless a callback does not return.
+            waiting.is_over = lambda: True
+            if not waiting.turn.acquire(timeout=_INTERRUPTED_WITHIN_S):
+                self._waiting.remove(waiting)
+            raise
 
     def _next(self) -> _Waiting:
         """Return the thread that has the next turn; it does not wait any more."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -142,3 +143,33 @@ def test_an_exception_ends_only_its_thread(monkeypatch: pytest.MonkeyPatch) -> N
 
     run(clock, fail, go_on)
     assert ended == [2.0]
+
+
+class _Interrupted(Exception):
+    """Raised by a signal handler, as KeyboardInterrupt is."""
+
+
+def _raise(*_: object) -> None:
+    raise _Interrupted
+
+
+def test_an_interrupted_thread_keeps_the_order_of_turns() -> None:
+    clock = VirtualClock()
+    ended = threading.Event()
+
+    def tick() -> None:
+        while not ended.is_set():
+            clock.sleep(1.0)
+
+    ticking = threading.Thread(target=tick)
+    clock.start(ticking)
+    before = signal.signal(signal.SIGALRM, _raise)
+    signal.setitimer(signal.ITIMER_REAL, 0.05)
+    try:
+        with pytest.raises(_Interrupted):
+            clock.sleep(1e9)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    ended.set()
+    clock.join(ticking, 5.0)
+    assert not ticking.is_alive()
