@@ -15,7 +15,7 @@ from composer.language.document import read_document
 from composer.language.tree import plain
 
 FOLDER = Path(__file__).resolve().parent
-NAMES = ("system", "node", "project")
+NAMES = ("system", "node", "project", "scenario")
 _DEFINITIONS = "#/definitions/"
 _CONDITIONS = ("for_each", "if", "unless")
 
@@ -24,6 +24,9 @@ def build(name: str) -> str:
     """Return the text of a schema."""
     schema = _read(name)
     definitions = {**_read("shared"), **schema.pop("definitions")}
+    if name == "scenario":  # it overrides entries of a system
+        definitions = {**_read("system")["definitions"], **definitions}
+        _add_keys(definitions["expectation"], definitions["condition"])
     if "executor" in definitions:
         definitions["overridden_executor"] = _unconditional(definitions["executor"])
     needed = sorted(_reachable(schema, definitions))
@@ -48,6 +51,11 @@ def _unconditional(part: dict[str, Any]) -> dict[str, Any]:
     """Return a map without the keys that decide whether it is there."""
     keys = {key: value for key, value in part["properties"].items() if key not in _CONDITIONS}
     return {**part, "properties": keys}
+
+
+def _add_keys(part: dict[str, Any], other: dict[str, Any]) -> None:
+    """Add the keys of another map to a map."""
+    part["properties"] = {**other["properties"], **part["properties"]}
 
 
 def _reachable(schema: dict[str, Any], definitions: dict[str, Any]) -> set[str]:

@@ -33,7 +33,12 @@ _HEADINGS = {
     "watch": "Watch of a node",
     "watch_all": "Watch of the system",
 }
-_FILES = {"system": "System", "node": "Node type", "project": "Project"}
+_FILES = {
+    "system": "System",
+    "node": "Node type",
+    "project": "Project",
+    "scenario": "Scenario",
+}
 #: The schema of a connection without a name lists the keys of all three kinds.
 _NOT_SHOWN = {"unnamed_connection"}
 #: Definitions that are described in the introduction or by a short phrase.

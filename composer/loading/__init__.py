@@ -46,6 +46,7 @@ from composer.model import System
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
 from composer.model.resolve.parameter_files import PARAMETER_SUBSTITUTION
+from composer.model.resolve.scenario import resolve_scenario
 from composer.project.settings import apply_rule_settings, check_rule_settings
 from composer.rules import Context, all_checks, reported, run_checks
 from composer.rules.analysis.subjects import joined, without_consequences
@@ -257,13 +258,17 @@ def _resolve_model(
         return
     system, found = resolve(
         merged.expanded,
-        source,
+        merged.source or source,
         definitions.node_types,
         folders=merged.folders,
         overrides=overrides,
     )
     variant.diagnostics += found
     if system is not None:
+        scenario = None
+        if merged.scenario is not None:
+            scenario, found = resolve_scenario(merged.scenario, source, system)
+            variant.diagnostics += found
         system = replace(system, left_out=merged.left_out)
         errors = tuple(
             item.primary
@@ -276,6 +281,7 @@ def _resolve_model(
             definitions.node_types,
             errors,
             is_partial=merged.is_partial,
+            scenario=scenario,
         )
 
 
@@ -369,6 +375,7 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
         first.merged.tree,
         frozenset(follow_ups),
         tuple(item.system for item in file.variants[1:] if item.system is not None),
+        None if first.context is None else first.context.scenario,
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping as Map
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, shown
@@ -15,11 +16,17 @@ from composer.language.document.limits import MAX_ENTRIES
 from composer.language.expand import expand
 from composer.language.rules import TOO_LARGE
 from composer.language.schema import check_schema, kind_of, kinds
-from composer.language.schema.kinds import check_kind
-from composer.language.tree import Entry, LeftOut, Mapping
+from composer.language.schema.kinds import check_kind, with_intended_sections
+from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree
 from composer.language.tree import Sequence as ListTree
-from composer.model.assembly import NodeTypeFile, assemble, inherit
-from composer.project import SETTINGS_FILE, Project
+from composer.model.assembly import (
+    AssembledSystem,
+    NodeTypeFile,
+    assemble,
+    assemble_included,
+    inherit,
+)
+from composer.project import SETTINGS_FILE, SYSTEMS, Project
 from composer.project.node_types import NodeTypes, interface_folders
 
 
@@ -69,6 +76,8 @@ class Merged:
     ``folders`` and ``included`` are the folders of all files and the places that include them, by
     file name. ``is_partial`` is true if nodes may be missing. ``left_out`` are entries that
     conditions leave out. ``values`` is the number of keys and values that were read and made.
+    ``scenario`` is the file itself if it is a scenario; then the rest is about its system, whose
+    file is ``source``.
     """
 
     tree: Mapping | None = None
@@ -79,6 +88,8 @@ class Merged:
     is_partial: bool = False
     left_out: tuple[LeftOut, ...] = ()
     values: int = 0
+    scenario: Mapping | None = None
+    source: SourceFile | None = None
 
 
 def read(path: Path, shown: str | None = None) -> Document:
@@ -109,6 +120,8 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
             return _merge_system(tree, document.source, definitions, arguments)
         case kinds.NODE:
             return _merge_node_type(tree, document.source, definitions, arguments)
+        case kinds.SCENARIO:
+            return _merge_scenario(tree, document.source, definitions)
         case _:
             problem = check_kind(tree, document.source)
             return Merged(diagnostics=[] if problem is None else [problem])
@@ -118,7 +131,10 @@ def _merge_system(
     tree: Mapping, source: SourceFile, definitions: Definitions, arguments: Map[str, Entry]
 ) -> Merged:
     # Each file is expanded and checked against the schema before it is merged.
-    assembly = assemble(tree, source, definitions.folder, definitions.project, arguments)
+    return _merged(assemble(tree, source, definitions.folder, definitions.project, arguments))
+
+
+def _merged(assembly: AssembledSystem) -> Merged:
     surplus = None if assembly.tree is None else _surplus_entry(assembly.tree)
     if surplus is not None:
         return Merged(diagnostics=[*assembly.diagnostics, surplus])
@@ -131,7 +147,34 @@ def _merge_system(
         assembly.is_partial,
         assembly.left_out,
         assembly.values,
+        source=assembly.source,
     )
+
+
+def _merge_scenario(tree: Mapping, source: SourceFile, definitions: Definitions) -> Merged:
+    """Return the system of a scenario, with its arguments and overrides, as if it included it."""
+    tree, diagnostics = with_intended_sections(tree, kinds.SCENARIO)
+    tree, found, _ = expand(tree, {})
+    diagnostics += [*found, *check_schema(tree, kinds.SCENARIO)]
+    project, folder = definitions.project, definitions.folder
+    keys = [entry for entry in tree if entry.name in ("arguments", "overrides")]
+    file = tree.entry(kinds.SYSTEM)
+    if file is None:
+        return Merged(diagnostics=diagnostics)
+    named = Entry(Scalar("file", file.key.span), _system_path(file.value, folder, project))
+    include = Mapping((named, *keys), tree.span)
+    merged = _merged(assemble_included(include, source, folder, project))
+    return replace(merged, diagnostics=[*diagnostics, *merged.diagnostics], scenario=tree)
+
+
+def _system_path(name: Tree, folder: Path, project: Project) -> Tree:
+    """Return the path of a system of the project that is given by its name."""
+    if not isinstance(name, Scalar) or not isinstance(name.value, str):
+        return name
+    if "/" in name.value or name.value.endswith((".yaml", ".yml")):
+        return name
+    path = project.root / SYSTEMS / f"{name.value}.yaml"
+    return Scalar(os.path.relpath(path, folder), name.span, verbatim=False)
 
 
 def _surplus_entry(tree: Mapping) -> Diagnostic | None:

@@ -17,6 +17,7 @@ from composer.interfaces import Interfaces
 from composer.language.document.limits import MAX_BYTES
 from composer.language.tree import Mapping
 from composer.model import System
+from composer.model.scenario import Scenario
 from composer.project import Project
 from composer.project.node_types import NodeTypes
 from composer.project.settings import apply_rule_settings
@@ -48,6 +49,8 @@ class LoadResult:
     follow_ups: frozenset[Identity] = frozenset()
     #: The models with the other combinations of arguments, if all of them were checked.
     other_systems: tuple[System, ...] = ()
+    #: The file itself if it is a scenario; ``system`` is its system, with its changes.
+    scenario: Scenario | None = None
 
     @property
     def is_valid(self) -> bool:

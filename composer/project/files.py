@@ -1,4 +1,4 @@
-"""Find systems and node types among the files of a folder."""
+"""Find systems, node types and scenarios among the files of a folder."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from composer.language.rules import UNREADABLE_FILE
 from composer.project import SETTINGS_FILE, Project
 
 _SUFFIXES = frozenset({".yaml", ".yml"})
-#: The first line with content in a system or node type.
-_MARKER = re.compile(r"""\{?\s*["']?(system|node)["']?\s*:(\s|$)""")
+#: The first line with content in a system, node type or scenario.
+_MARKER = re.compile(r"""\{?\s*["']?(system|node|scenario)["']?\s*:(\s|$)""")
 #: A later line with the same key and a name. In other files, these keys begin maps.
-_LATER_MARKER = re.compile(r"""^(system|node):[ \t]+["']?\w""", re.MULTILINE)
+_LATER_MARKER = re.compile(r"""^(system|node|scenario):[ \t]+["']?\w""", re.MULTILINE)
 #: The beginning of a ROS parameter file for a node named 'node' or 'system'.
 _PARAMETERS = re.compile(r"""["']?\w+["']?:\s*\{?\s*["']?ros__parameters\b""")
 #: What only systems and node types have together: a section of theirs, and the type of a port.

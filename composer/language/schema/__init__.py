@@ -18,16 +18,18 @@ from composer.language.tree import Mapping, plain
 
 __all__ = ["KINDS", "REPORT", "SCHEMAS", "check_schema", "kind_of", "schema"]
 
-#: The kinds of files, each with a schema of that name and marked by a key of that name.
-KINDS = ("system", "node")
-SCHEMAS = (*KINDS, "project")
+#: The kinds of files, each with a schema of that name and marked by a key of that name. A scenario
+#: has the key ``system`` as well.
+KINDS = ("scenario", "system", "node")
+SCHEMAS = ("system", "node", "project", "scenario")
 #: The schema of the output of ``compose validate --format json``.
 REPORT = "report"
 
 
 def kind_of(tree: Mapping) -> str | None:
-    """Return ``system`` or ``node``, whichever key comes first; None without either."""
-    return next((entry.name for entry in tree if entry.name in KINDS), None)
+    """Return the kind of a file: ``scenario``, or else the first of its keys that is a kind."""
+    names = [entry.name for entry in tree if entry.name in KINDS]
+    return "scenario" if "scenario" in names else next(iter(names), None)
 
 
 def check_schema(tree: Mapping, kind: str) -> list[Diagnostic]:

@@ -1,4 +1,4 @@
-"""The two kinds of files, diagnostics for a file of the wrong kind, and misspelled sections."""
+"""The kinds of files, diagnostics for a file of the wrong kind, and misspelled sections."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from composer.language.tree import Entry, Mapping, Scalar
 
 SYSTEM = "system"
 NODE = "node"
+SCENARIO = "scenario"
 
 RULE = error("RC040", "wrong-kind-of-file")
 
-_WORDS = {SYSTEM: "a system", NODE: "a node type"}
+_WORDS = {SYSTEM: "a system", NODE: "a node type", SCENARIO: "a scenario"}
 
 
 def check_kind(

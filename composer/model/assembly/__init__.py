@@ -5,6 +5,7 @@ Every key and value keeps the file and location where it was written.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Mapping as Map
 from dataclasses import field
 from pathlib import Path
@@ -24,7 +25,15 @@ from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit
 from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits
 from composer.project import Project
 
-__all__ = ["AssembledSystem", "Inherited", "NodeTypeFile", "assemble", "inherit", "read_node_type"]
+__all__ = [
+    "AssembledSystem",
+    "Inherited",
+    "NodeTypeFile",
+    "assemble",
+    "assemble_included",
+    "inherit",
+    "read_node_type",
+]
 
 
 #: Rules about nodes that are missing or have the wrong names.
@@ -38,7 +47,7 @@ class AssembledSystem:
     ``folders`` are the folders of all files and ``included`` the places that include them, by file
     name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
     ``diagnostics``. ``left_out`` are entries that conditions leave out, ``values`` the number of
-    keys and values of all files, as written and as merged.
+    keys and values of all files, as written and as merged. ``source`` is the file of the system.
     """
 
     tree: Mapping | None
@@ -48,6 +57,7 @@ class AssembledSystem:
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()
     values: int = 0
+    source: SourceFile | None = None
 
 
 def assemble(
@@ -62,14 +72,39 @@ def assemble(
     ``folder`` is the folder of its file; all included files must be in ``project``. Each file is
     checked against the schema.
     """
+    file = SystemFile(folder / Path(source.path).name, source, tree)
+    return _assembled(project, lambda resolver: (resolver.merge(file, dict(arguments)), source))
+
+
+def assemble_included(
+    include: Mapping, source: SourceFile, folder: Path, project: Project
+) -> AssembledSystem:
+    """Return the system that an entry of ``include`` in the file ``source`` names.
+
+    It has the arguments and overrides of the entry, and its own namespace.
+    """
+    file = SystemFile(folder / Path(source.path).name, source, include)
+
+    def merge(resolver: IncludeResolver) -> tuple[Mapping | None, SourceFile]:
+        resolver.folders[source.path] = folder
+        included = resolver.included_system(include, file)
+        return (None, source) if included is None else (included.tree, included.file.source)
+
+    return _assembled(project, merge)
+
+
+def _assembled(
+    project: Project, merge: Callable[[IncludeResolver], tuple[Mapping | None, SourceFile]]
+) -> AssembledSystem:
     diagnostics: list[Diagnostic] = []
     limits = IncludeLimits()
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
-        file = SystemFile(folder / Path(source.path).name, source, tree)
-        merged = resolver.merge(file, dict(arguments))
+        merged, source = merge(resolver)
     except Stopped as stopped:
         return AssembledSystem(None, [stopped.diagnostic])
+    if merged is None:
+        return AssembledSystem(None, diagnostics)
     is_partial = (
         resolver.is_partial
         or any(item.rule in _PARTIAL_RULES for item in diagnostics)
@@ -84,4 +119,5 @@ def assemble(
         included,
         resolver.left_out,
         resolver.values + measure(merged).values,
+        source,
     )

@@ -32,6 +32,15 @@ class _Frame:
     span: Span
 
 
+@dataclass(frozen=True, slots=True)
+class IncludedSystem:
+    """A system with the arguments and overrides of an include."""
+
+    tree: Mapping
+    include: Include
+    file: SystemFile
+
+
 @dataclass(slots=True)
 class IncludeResolver:
     """Merges systems with the files that they include.
@@ -91,6 +100,26 @@ class IncludeResolver:
         return expand_references(joined, self.left_out, self.limits)
 
     def _part(self, item: Tree, includer: SystemFile) -> Part | None:
+        included = self.included_system(item, includer)
+        if included is None:
+            return None
+        include, file = included.include, included.file
+        placed = add_namespace(
+            included.tree, include.placement, includer.path.parent, file.path.parent
+        )
+        prefix = include.placement.prefix
+        prefixed = (
+            replace(item, name=f"{prefix}{item.name}") if item.section in PREFIXED else item
+            for item in self.left_out
+        )
+        return Part(placed, include.naming, tuple(prefixed))
+
+    def included_system(self, item: Tree, includer: SystemFile) -> IncludedSystem | None:
+        """Return the system that an entry of ``include`` names, with its arguments and overrides.
+
+        It is not placed in a namespace. None if it is unavailable; the reason is reported. Raises
+        Stopped.
+        """
         include = read_include(item, self.diagnostics)
         if include is None:
             self.is_partial = True
@@ -102,7 +131,9 @@ class IncludeResolver:
             return None
         self._stack.append(_Frame(includer, include.file.span))
         try:
-            return None if self._is_cycle(file) else self._merge_included(file, include)
+            if self._is_cycle(file):
+                return None
+            return IncludedSystem(self._merge_included(file, include), include, file)
         finally:
             self._stack.pop()
 
@@ -117,28 +148,20 @@ class IncludeResolver:
                 yield replace(absent, section="nodes", name=node.name, include=None)
             yield from part.left_out
 
-    def _merge_included(self, file: SystemFile, include: Include) -> Part:
+    def _merge_included(self, file: SystemFile, include: Include) -> Mapping:
         span = include.file.span
         if len(self._stack) > MAX_INCLUDE_DEPTH:
             message = f"files include each other more than {MAX_INCLUDE_DEPTH} deep"
             raise exceeded(message, span, "include the file directly")
         self.included.setdefault(file.source.path, {}).setdefault(str(span), span)
         tree = self.merge(file, include.arguments)
-        left_out = self.left_out
         if include.overrides is not None:
             # In a partial tree, an unknown name is not known to be an error.
             diagnostics: list[Diagnostic] = [] if self.is_partial else self.diagnostics
-            overrides = without_left_out(include.overrides, left_out)
+            overrides = without_left_out(include.overrides, self.left_out)
             tree = apply_overrides(tree, overrides, file.source, diagnostics)
             diagnostics += check_schema(tree, SYSTEM)
-        includer = self._stack[-1].file.path.parent
-        merged = add_namespace(tree, include.placement, includer, file.path.parent)
-        prefix = include.placement.prefix
-        prefixed = (
-            replace(item, name=f"{prefix}{item.name}") if item.section in PREFIXED else item
-            for item in left_out
-        )
-        return Part(merged, include.naming, tuple(prefixed))
+        return tree
 
     def _is_cycle(self, file: SystemFile) -> bool:
         """Return whether ``file`` is being merged already, and report the cycle."""

@@ -18,12 +18,17 @@ from composer.language.tree import (
     Tree,
     plain,
 )
-from composer.language.tree_values import entries, is_opaque
+from composer.language.tree_values import changed_at, entries, is_opaque
 from composer.model.assembly.limits import INVALID_INCLUDE, UNKNOWN_OVERRIDE
 
 PARAMETERS = "parameters"
 #: Keys that exclude each other: one replaces the other.
 _ALTERNATIVES = frozenset({"period_ms", "rate_hz"})
+#: What a node loses that an override gives another type: its implementation, and values for it.
+_OF_TYPE = frozenset(
+    {"behavior", "class", "executable", "component", "external", "container", "arguments"}
+    | {"parameters", "variables", "only_declared", "state"}
+)
 #: Sections whose entries an include can override.
 _OVERRIDABLE = ("nodes", "qos_profiles", "executors", "chains")
 INCLUDE = "include"
@@ -110,7 +115,18 @@ def apply_overrides(
         )
         if kept:
             known.append(Entry(section.key, Mapping(kept, section.value.span)))
+        for entry in kept if section.name == "nodes" else ():
+            if any(change.name == "type" for change in entries(entry.value)):
+                tree = changed_at(tree, ("nodes", entry.name), _without_type)
     return merge_maps(tree, Mapping(tuple(known), overrides.span)) if known else tree
+
+
+def _without_type(node: Tree) -> Tree:
+    """Return a node without what belongs to its type."""
+    if not isinstance(node, Mapping):
+        return node
+    kept = (entry for entry in node if entry.name not in _OF_TYPE)
+    return Mapping(tuple(kept), node.span)
 
 
 def _unknown(section: Entry, names: list[str], source: SourceFile) -> Iterator[Diagnostic]:

@@ -11,6 +11,7 @@ from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.language.expressions import Expression, FieldPath
 from composer.model import Channel, ChannelKind, Port, System, channels
+from composer.model.scenario import Scenario
 from composer.project.node_types import NodeTypes
 from composer.python_code.nodes import ClassOfNode, NodeClass, node_classes, use_of
 
@@ -29,7 +30,8 @@ class Context:
 
     ``refused`` are the spans of the errors that earlier stages reported. What contains them is
     missing from the model, entirely or in part. If ``is_partial``, whole nodes, profiles and
-    executors may be missing, so an unknown name may not be an error.
+    executors may be missing, so an unknown name may not be an error. ``scenario`` is the file that
+    was loaded, if it is a scenario of the system.
     """
 
     system: System
@@ -37,6 +39,7 @@ class Context:
     node_types: NodeTypes
     refused: tuple[Span, ...] = ()
     is_partial: bool = False
+    scenario: Scenario | None = None
     _cache: dict[Callable[[Context], Any], Any] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
