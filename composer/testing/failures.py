@@ -35,6 +35,7 @@ class Received:
 
     time_s: float
     message: Any
+    topic: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,25 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from composer.base.fast_dataclass import dataclass
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.ros.messages import to_plain
 from composer.runtime.supervision.events import BroughtUp, Event, Logged
 from composer.testing.failures import LogLine, Received, Timeline, short
 from composer.testing.tester import TESTER
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The response of a service, or the result of an action, to what the test has sent.
+
+    ``status`` is "succeeded", or what went wrong; ``message`` is None if there is no answer.
+    """
+
+    time_s: float
+    name: str
+    status: str
+    message: Any
 
 
 class Observation:
@@ -23,14 +37,17 @@ class Observation:
         self.messages: dict[str, list[Received]] = {}
         self.log: list[LogLine] = []
         self.events: list[Event] = []
+        #: All of these, in the order in which they were reported.
+        self.history: list[Received | Answer | LogLine | Event] = []
         self.timeline = Timeline()
         #: Whether the bring-up is over.
         self.is_up = False
 
     def on_message(self, topic: str, message: Any) -> None:
         """Receive a message of a topic."""
-        received = Received(self._now_s(), message)
+        received = Received(self._now_s(), message, topic)
         self.messages.setdefault(topic, []).append(received)
+        self.history.append(received)
         self.timeline.add(received.time_s, lambda: f"{topic}: {short(to_plain(message))}")
 
     def on_event(self, event: Event) -> None:
@@ -40,13 +57,23 @@ class Observation:
             return
         if isinstance(event, Logged):
             node = "" if event.logger == PROGRAM_LOGGER else f"/{event.logger.replace('.', '/')}"
-            self.log.append(LogLine(event.elapsed_s, event.level, node, event.message))
+            line = LogLine(event.elapsed_s, event.level, node, event.message)
+            self.log.append(line)
+            self.history.append(line)
         else:
             if isinstance(event, BroughtUp):
                 event = replace(event, active=event.active - 1, nodes=event.nodes - 1)
                 self.is_up = True
             self.events.append(event)
+            self.history.append(event)
         self.timeline.add(event.elapsed_s, partial(_text, event))
+
+    def on_answer(self, name: str, status: str, message: Any) -> None:
+        """Receive the response or the result to what the test has sent."""
+        answer = Answer(self._now_s(), name, status, message)
+        self.history.append(answer)
+        content = "" if message is None else f": {short(to_plain(message))}"
+        self.timeline.add(answer.time_s, lambda: f"{name} {status}{content}")
 
     def on_action(self, text: str) -> None:
         """Note what the test does."""

@@ -39,7 +39,7 @@ from composer.testing import faults
 from composer.testing.failures import LogLine, Received, TestFailure, short
 from composer.testing.faults import Faults, TopicFault
 from composer.testing.goal import Goal
-from composer.testing.observation import Observation
+from composer.testing.observation import Answer, Observation
 from composer.testing.system_run import SystemRun, load_system
 from composer.testing.tester import TESTER, Tester, port_name, with_tester
 
@@ -140,6 +140,11 @@ class SystemTest:
         return tuple(self._observation.events)
 
     @property
+    def history(self) -> Sequence[Received | Answer | LogLine | Event]:
+        """Everything so far in one order: messages, answers to the test, log lines and events."""
+        return self._observation.history
+
+    @property
     def latencies(self) -> Mapping[str, ChainFigures]:
         """The latencies of the chains so far, by their names."""
         return {figures.chain: figures for figures in self._run.host.chains()}
@@ -188,6 +193,7 @@ class SystemTest:
         converted = _converted(request or {}, client.service_type.Request, service)
         self._observation.on_action(f"called {service} with {short(to_plain(converted))}")
         called: Future[Any] = client.call(converted, timeout_ms=timeout_s * 1000.0)
+        called.add_done_callback(partial(self._on_response, service))
         return called
 
     def send_goal(self, action: str, goal: Any = None) -> Goal:
@@ -200,6 +206,7 @@ class SystemTest:
         self._observation.on_action(f"sent {short(to_plain(converted))} to {action}")
         feedback: list[Any] = []
         sent = client.send_goal(converted, on_feedback=feedback.append)
+        sent.add_done_callback(partial(self._on_goal_answer, action))
         return Goal(self.wait_for, action, sent, feedback)
 
     def set_parameter(self, node: str, name: str, value: Any) -> None:
@@ -229,6 +236,23 @@ class SystemTest:
         outcome = self._run_on(found, found.lifecycle.change(transition), timeout_s, what)
         if not outcome.success:
             raise self._failure(f"{what} failed: {outcome.reason}")
+
+    def _on_response(self, service: str, response: Future[Any]) -> None:
+        error = _error(response)
+        message = None if error else response.result()
+        self._observation.on_answer(service, error or "responded", message)
+
+    def _on_goal_answer(self, action: str, sent: Future[Any]) -> None:
+        error = _error(sent)
+        if error:
+            self._observation.on_answer(action, error, None)
+        else:
+            sent.result().result().add_done_callback(partial(self._on_result, action))
+
+    def _on_result(self, action: str, outcome: Future[Any]) -> None:
+        error = _error(outcome)
+        status = error or outcome.result().status
+        self._observation.on_answer(action, status, None if error else outcome.result().result)
 
     # --- faults
 
@@ -356,6 +380,12 @@ _OTHER_ENDS = {
     PortKind.CLIENT: "service",
     PortKind.ACTION_CLIENT: "action server",
 }
+
+
+def _error(future: Future[Any]) -> str:
+    """Return why a call has failed; empty if it has not."""
+    error = future.exception()
+    return "was cancelled" if future.cancelled() else "" if error is None else f"failed: {error}"
 
 
 def _converted(content: Any, kind: Any, where: str) -> Any:
