@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable
+from math import inf
 from typing import Any
 
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.model.ports import LogLevel
 
-#: The events that a failure shows, and those that are kept.
+#: The events that a failure shows.
 SHOWN = 20
-_KEPT = 1000
 
 
 class TestFailure(AssertionError):
@@ -55,18 +54,19 @@ class _Entry:
 
 
 class Timeline:
-    """The last events of a test, as text. Texts are made when they are needed."""
+    """The events of a test, as text. Texts are made when they are needed."""
 
     def __init__(self) -> None:
-        self._entries: deque[_Entry] = deque(maxlen=_KEPT)
+        self._entries: list[_Entry] = []
 
     def add(self, time_s: float, text: Callable[[], str]) -> None:
         """Add an event."""
         self._entries.append(_Entry(time_s, text))
 
-    def lines(self, count: int = SHOWN) -> list[str]:
-        """Return the last events, the oldest first, each with its time in seconds."""
-        entries = sorted(self._entries, key=lambda entry: entry.time_s)[-count:]
+    def lines(self, until_s: float = inf, count: int = SHOWN) -> list[str]:
+        """Return the last events until a time, the oldest first, each with its time in seconds."""
+        entries = [entry for entry in self._entries if entry.time_s <= until_s]
+        entries = sorted(entries, key=lambda entry: entry.time_s)[-count:]
         return [f"{entry.time_s:9.3f}  {entry.text()}" for entry in entries]
 
 

@@ -162,9 +162,9 @@ class SystemTest:
         self._port(PortKind.SUBSCRIPTION, topic)
         return tuple(self._observation.messages.get(topic, ()))
 
-    def timeline(self) -> list[str]:
-        """Return the last events, messages and lines of the log, each with its time."""
-        return self._observation.timeline.lines()
+    def timeline(self, until_s: float = inf) -> list[str]:
+        """Return the last events, messages and log lines until a time, each with its time."""
+        return self._observation.timeline.lines(until_s)
 
     # --- what the test does
 

@@ -1,0 +1,228 @@
+"""Runs one scenario in this process."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import field, replace
+from math import inf
+from typing import Any
+
+from composer.base.fast_dataclass import dataclass
+from composer.language.expressions import EvaluationError
+from composer.language.templates import evaluate
+from composer.model import LogLevel, System
+from composer.model.scenario import Action, Condition, EventKind, Expectation, Scenario, Verb
+from composer.runtime.process import StartRefused
+from composer.runtime.ros.messages import MessageError, convert_message, to_plain
+from composer.scenarios.events import Matcher
+from composer.scenarios.expectations import Failure, Record, check, described
+from composer.testing.failures import TestFailure, short
+from composer.testing.goal import Goal
+from composer.testing.observation import LogLine
+from composer.testing.system_test import SystemTest
+
+#: Times may differ in the last digits: they are sums.
+_EPSILON_S = 1e-6
+_ERRORS = (LogLevel.ERROR, LogLevel.FATAL)
+
+
+@dataclass(slots=True)
+class Result:
+    """How a scenario went. ``timeline`` are the last events of a run that failed."""
+
+    failures: list[Failure] = field(default_factory=list)
+    timeline: list[str] = field(default_factory=list)
+    took_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How scenarios are run. ``seed`` takes precedence over those of the scenarios."""
+
+    real_time: bool = False
+    seed: int | None = None
+
+
+def run_scenario(scenario: Scenario, system: System, options: Options) -> Result:
+    """Run a scenario with its system, once."""
+    started_s = time.monotonic()
+    random.seed(scenario.seed if options.seed is None else options.seed)
+    test = SystemTest(in_one_process(system), real_time=options.real_time)
+    run = _Run(scenario, system, test)
+    result = Result()
+    try:
+        with test:
+            result.failures += run.run()
+        result.failures += run.end()
+        if result.failures:
+            result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
+    except (StartRefused, TestFailure) as error:
+        result.failures.append(Failure(scenario.name.span, "a run of the system", str(error)))
+    result.took_s = time.monotonic() - started_s
+    return result
+
+
+def in_one_process(system: System) -> System:
+    """Return a system whose nodes all run in this process."""
+    nodes = tuple(replace(node, process=None) for node in system.nodes)
+    return replace(system, nodes=nodes, processes=(), hosts=(), discovery=None)
+
+
+class _Stopped(Exception):
+    """A step failed: those after it cannot be made."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(failure.seen)
+        self.failure = failure
+
+
+class _Run:
+    def __init__(self, scenario: Scenario, system: System, test: SystemTest) -> None:
+        self._scenario = scenario
+        self._test = test
+        self._keys = {node.full_name: node.name.value for node in system.nodes}
+        self._goals: dict[str, Goal] = {}
+        self._start_s = 0.0
+
+    def run(self) -> Iterator[Failure]:
+        """Make the steps, run to the end, and yield what was not met."""
+        test, scenario = self._test, self._scenario
+        self._start_s = test.now_s
+        waiting: list[tuple[Expectation, int, float]] = []
+        stopped: Failure | None = None
+        try:
+            for step in scenario.steps:
+                if step.at_s is not None:
+                    self._advance_to(step.at_s.value)
+                if step.when is not None:
+                    self._wait_for(step.when)
+                self._advance_to(test.now_s - self._start_s + step.after_s)
+                first, now_s = len(test.history), test.now_s
+                waiting += [(item, first, now_s) for item in step.expectations]
+                for action in step.actions:
+                    self._act(action)
+        except _Stopped as error:
+            stopped = error.failure
+        else:
+            self._advance_to(scenario.for_s.value)
+        # What is reported after the end belongs to the tear-down.
+        history, end_s = list(test.history), self._start_s + scenario.for_s.value
+        record = Record(history, self._keys, self._start_s, end_s, test.latencies)
+        if stopped is not None:
+            yield stopped
+            return
+        waiting += [(item, 0, self._start_s) for item in scenario.expectations]
+        for expectation, first, now_s in waiting:
+            failure = check(expectation, record, first, now_s)
+            if failure is not None:
+                yield failure
+
+    def end(self) -> Iterator[Failure]:
+        """Yield what was wrong with the end of the run, after it."""
+        scenario, outcome = self._scenario, self._test.outcome
+        span = scenario.name.span
+        if outcome is not None and outcome.exit_code != scenario.exit_code:
+            seen = f"{outcome.exit_code}: {outcome.reason}"
+            yield Failure(span, f"exit code {scenario.exit_code}", seen)
+        expected = [event for event in scenario.conditions if event.kind is EventKind.LOG]
+        matchers = [Matcher(event, self._keys, self._start_s) for event in expected]
+        errors = [
+            line
+            for line in self._test.log
+            if line.level in _ERRORS and not any(item.matches(line) for item in matchers)
+        ]
+        if errors and not scenario.allow_errors:
+            yield Failure(span, "no errors in the log", _errors(errors, self._start_s))
+
+    def _advance_to(self, time_s: float) -> None:
+        missing_s = self._start_s + time_s - self._test.now_s
+        if missing_s > 0:
+            self._test.advance(missing_s)
+
+    def _wait_for(self, event: Condition) -> None:
+        matcher = Matcher(event, self._keys, self._start_s)
+        history = self._test.history
+        first, read = len(history), 0
+
+        def has_happened() -> bool:
+            nonlocal read
+            while read < len(history):
+                is_old, entry = read < first, history[read]
+                read += 1
+                if matcher.matches(entry) and not is_old:
+                    return True
+            return matcher.holds
+
+        end_s = self._start_s + self._scenario.for_s.value
+        with suppress(TestFailure):
+            self._test.run_until(has_happened, end_s - self._test.now_s)
+            return
+        seen = "none until the end of the run"
+        if matcher.other is not None:
+            time_s = matcher.other.time_s - self._start_s
+            seen = f"{seen}; the last {event.kind}, at {time_s:.3f} s: {matcher.difference}"
+        wanted = f"{described(event)}, for the next step"
+        raise _Stopped(Failure(event.span, wanted, seen, end_s))
+
+    def _act(self, action: Action) -> None:
+        try:
+            self._do(action)
+        except (TestFailure, MessageError, EvaluationError) as error:
+            text = error.text if isinstance(error, TestFailure) else str(error)
+            failure = Failure(action.name.span, f"'{action.verb}' to work", text, self._test.now_s)
+            raise _Stopped(failure) from error
+
+    def _do(self, action: Action) -> None:
+        test, name = self._test, action.name.value
+        content: Any = None
+        if action.content is not None and action.verb is not Verb.CORRUPT:
+            content = evaluate(action.content, {"now": test.now_s - self._start_s})
+        value = None if action.value is None else action.value.value
+        options: dict[str, Any] = {key: item.value for key, item in action.options.items()}
+        match action.verb:
+            case Verb.PUBLISH:
+                test.publish(name, content)
+            case Verb.CALL:
+                test.call_soon(name, content, inf)
+            case Verb.SEND_GOAL:
+                self._goals[name] = test.send_goal(name, content)
+            case Verb.CANCEL:
+                self._goals[name].cancel()
+            case Verb.SET_PARAMETER:
+                node, _, parameter = name.partition(".")
+                test.set_parameter(node, parameter, value)
+            case Verb.TRANSITION:
+                test.transition(name, str(value))
+            case Verb.DELAY:
+                test.delay(name, options.pop("by_s"), **options)
+            case Verb.CORRUPT:
+                test.corrupt(name, lambda message: self._corrupted(action, message), **options)
+            case Verb.HANG:
+                test.hang(name, options["for_s"], options.get("handler"))
+            case Verb.DROP | Verb.DUPLICATE | Verb.REORDER | Verb.RAISE_IN | Verb.KILL:
+                getattr(test, action.verb)(name, **options)
+
+    def _corrupted(self, action: Action, message: Any) -> Any:
+        """Return a message with other values of the fields that a step sets."""
+        scope = {"message": message, "now": self._test.now_s - self._start_s}
+        values = {} if action.content is None else evaluate(action.content, scope)
+        changed = _updated(to_plain(message), values)
+        return convert_message(changed, type(message), action.name.value)
+
+
+def _updated(content: Any, values: Any) -> Any:
+    """Return the content of a message with other values of some fields."""
+    if not isinstance(content, dict) or not isinstance(values, dict):
+        return values
+    inner = {name: _updated(content.get(name), value) for name, value in values.items()}
+    return {**content, **inner}
+
+
+def _errors(lines: list[LogLine], start_s: float) -> str:
+    """Return the first of some lines of the log, and how many there are."""
+    first = lines[0]
+    text = f"at {first.time_s - start_s:.3f} s, {first.node}: {short(first.text)}"
+    return text if len(lines) == 1 else f"{len(lines)}, the first {text}"
