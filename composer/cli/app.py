@@ -19,7 +19,7 @@ from composer.cli.support.terminal import write
 #: ``EPILOG``.
 COMMANDS = {
     "Commands for systems": ("run", "down", "ps", "top", "logs", "dashboard", "hosts"),
-    "Commands for files": ("validate", "config", "graph", "diff", "new", "import", "export"),
+    "Commands for files": ("validate", "test", "config", "graph", "diff", "new", "import", "export"),
     "Commands for ROS 2": (
         "lifecycle",
         "node",
@@ -37,6 +37,7 @@ _OTHER_MODULES = {
     "down": "system_commands",
     "import": "import_nodes",
     "node": "nodes",
+    "test": "scenarios",
     "service": "calls",
     "action": "calls",
 }

@@ -71,6 +71,12 @@ def render(
     return "\n\n".join([*blocks, total]) + "\n"
 
 
+def excerpt(span: Span, *, color: bool = False) -> list[str]:
+    """Return the lines that show a place: its source line with a caret under the value."""
+    mark = _Mark(span, "^", (_BOLD, _COLORS[Severity.ERROR]))
+    return _source_line([mark], "-->", _Style(color), len(str(span.line)))
+
+
 def _most_severe(diagnostics: Sequence[Diagnostic], maximum: int | None) -> Sequence[Diagnostic]:
     if maximum is None or len(diagnostics) <= maximum:
         return diagnostics

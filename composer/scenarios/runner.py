@@ -31,11 +31,16 @@ _ERRORS = (LogLevel.ERROR, LogLevel.FATAL)
 
 @dataclass(slots=True)
 class Result:
-    """How a scenario went. ``timeline`` are the last events of a run that failed."""
+    """How a scenario went.
+
+    ``timeline`` are the last events before the first failure, ``output`` is what the process of a
+    run that failed has printed.
+    """
 
     failures: list[Failure] = field(default_factory=list)
     timeline: list[str] = field(default_factory=list)
     took_s: float = 0.0
+    output: str = ""
 
 
 @dataclass(frozen=True, slots=True)
