@@ -19,7 +19,16 @@ from composer.cli.support.terminal import write
 #: ``EPILOG``.
 COMMANDS = {
     "Commands for systems": ("run", "down", "ps", "top", "logs", "dashboard", "hosts"),
-    "Commands for files": ("validate", "test", "config", "graph", "diff", "new", "import", "export"),
+    "Commands for files": (
+        "validate",
+        "test",
+        "config",
+        "graph",
+        "diff",
+        "new",
+        "import",
+        "export",
+    ),
     "Commands for ROS 2": (
         "lifecycle",
         "node",

@@ -154,7 +154,10 @@ def _merged(assembly: AssembledSystem) -> Merged:
 def _merge_scenario(tree: Mapping, source: SourceFile, definitions: Definitions) -> Merged:
     """Return the system of a scenario, with its arguments and overrides, as if it included it."""
     tree, diagnostics = with_intended_sections(tree, kinds.SCENARIO)
-    tree, found, _ = expand(tree, {})
+    arguments = tuple(entry for entry in tree if entry.name == "arguments")
+    others = tuple(entry for entry in tree if entry.name != "arguments")
+    expanded, found, _ = expand(Mapping(others, tree.span), {})  # a scenario declares no names
+    tree = Mapping((*expanded, *arguments), tree.span)
     diagnostics += [*found, *check_schema(tree, kinds.SCENARIO)]
     project, folder = definitions.project, definitions.folder
     keys = [entry for entry in tree if entry.name in ("arguments", "overrides")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 from composer.base.diagnostics import Diagnostic, Label, suggestion
@@ -50,7 +51,9 @@ _KEYS: dict[str, frozenset[str]] = {
     ExpectationKind.END_STATE: frozenset(),
 }
 #: What a step or an expectation needs in the system: the end of a channel.
-_SINKS = frozenset({Verb.PUBLISH, Verb.DROP, Verb.DELAY, Verb.DUPLICATE, Verb.REORDER, Verb.CORRUPT})
+_SINKS = frozenset(
+    {Verb.PUBLISH, Verb.DROP, Verb.DELAY, Verb.DUPLICATE, Verb.REORDER, Verb.CORRUPT}
+)
 _LACKS = {
     ChannelKind.TOPIC: "no node publishes",
     ChannelKind.SERVICE: "no node serves",
@@ -71,7 +74,9 @@ def check_keys(context: Context) -> Iterator[Diagnostic]:
         return
     events = [step.when for step in scenario.steps if step.when is not None]
     orders = (item for item in scenario.all_expectations if item.kind is ExpectationKind.ORDER)
-    for item in (*scenario.all_expectations, *events, *(e for o in orders for e in o.events)):
+    items: list[Expectation | Condition] = [*scenario.all_expectations, *events]
+    items += (event for order in orders for event in order.events)
+    for item in items:
         kinds = [key for key in item.given if key.value in _KINDS]
         for first, second in pairwise(kinds):
             message = f"this has both '{first}' and '{second}'"
@@ -228,6 +233,8 @@ def check_values(context: Context) -> Iterator[Diagnostic]:
 
 
 _NOW: dict[str, ValueType] = {"now": NUMBER}
+#: How a goal ends, also one that is not accepted.
+_STATUS = replace(STATUS, words=(*STATUS.words, "rejected"))
 
 
 def _sent(context: Context, channel: Channel) -> Message | None:
@@ -251,7 +258,7 @@ def _event(context: Context, event: Condition, channel: Channel) -> Iterator[Dia
         case Service(response=received):
             scope["response"] = received
         case ActionDefinition(result=received):
-            scope |= {"result": received, "status": STATUS}
+            scope |= {"result": received, "status": _STATUS}
         case _:
             return
     if event.where is not None:
@@ -277,9 +284,7 @@ def _template(
         yield from _reported(FieldChecker(context.interfaces, scope).template(content, message))
 
 
-def _names(
-    expression: Expression, span: Span, scope: dict[str, ValueType]
-) -> Iterator[Diagnostic]:
+def _names(expression: Expression, span: Span, scope: dict[str, ValueType]) -> Iterator[Diagnostic]:
     for path in expression.paths:
         if path.root not in scope:
             place = part_of_path(span, expression, path)

@@ -34,8 +34,8 @@ class Matcher:
         self._keys = keys
         self._start_s = start_s
         self._states = dict.fromkeys(keys.values(), str(PrimaryState.UNCONFIGURED))
-        #: The last message or answer of the right name that is not such an event.
-        self.other: Received | Answer | None = None
+        #: The last message, answer or log line of the right name or node that is not such an event.
+        self.other: Received | Answer | LogLine | None = None
         self._explain: Callable[[], str] = str
 
     @property
@@ -67,16 +67,20 @@ class Matcher:
     def _is_line(self, line: LogLine) -> bool:
         condition = self._condition
         is_of_node = condition.node is None or self._keys.get(line.node) == condition.node.value
-        is_of_level = condition.level in (None, line.level)
-        return is_of_node and is_of_level and condition.name.value in line.text
+        is_right = condition.level in (None, line.level) and condition.name.value in line.text
+        if is_of_node and not is_right:
+            return self._differs(line, lambda: f"[{line.level.upper()}] {short(line.text)}")
+        return is_of_node
 
     def _is_answer(self, answer: Answer) -> bool:
-        message = answer.message
-        if self._condition.kind not in (EventKind.RESPONSE, EventKind.RESULT):
-            return False
-        if message is None:
-            return self._differs(answer, lambda: f"it {answer.status}")
-        scope = {"response": message, "result": message, "status": answer.status}
+        message, kind = answer.message, self._condition.kind
+        if kind is EventKind.RESULT:
+            scope = {"result": message, "status": answer.status}
+        elif kind is EventKind.RESPONSE and message is not None:
+            scope = {"response": message}
+        else:
+            is_awaited = kind is EventKind.RESPONSE
+            return is_awaited and self._differs(answer, lambda: f"it {answer.status}")
         return self._is_right(scope, message, answer)
 
     def _is_right(self, scope: dict[str, Any], message: Any, entry: Received | Answer) -> bool:
@@ -98,7 +102,7 @@ class Matcher:
             return wrong is None or self._differs(entry, lambda: wrong)
         return True
 
-    def _differs(self, entry: Received | Answer, explain: Callable[[], str]) -> bool:
+    def _differs(self, entry: Received | Answer | LogLine, explain: Callable[[], str]) -> bool:
         self.other, self._explain = entry, explain
         return False
 

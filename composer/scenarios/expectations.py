@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-
 from math import inf
 
 from composer.base.fast_dataclass import dataclass
@@ -71,7 +70,7 @@ def check(
     until_s = expectation.until_s
     window = Window(
         first,
-        base_s + expectation.after_s if expectation.after_s or first else 0.0,
+        base_s + expectation.after_s if expectation.after_s else 0.0,
         record.end_s if until_s is None else base_s + until_s.value,
     )
     match expectation.kind:
@@ -94,9 +93,7 @@ def check(
 Difference = tuple[str, str] | None
 
 
-def _matches(
-    matcher: Matcher, record: Record, window: Window
-) -> Iterator[tuple[int, float]]:
+def _matches(matcher: Matcher, record: Record, window: Window) -> Iterator[tuple[int, float]]:
     """Yield the entries in the window that match, with their times.
 
     States that nodes have at its beginning match at once.
@@ -110,11 +107,11 @@ def _matches(
         if is_in and not has_begun:
             has_begun = True
             if matcher.holds:
-                yield index - 1, window.start_s
+                yield index - 1, max(window.start_s, record.start_s)
         if (is_in or isinstance(entry, StateChanged)) and matcher.matches(entry) and is_in:
             yield index, time_s
     if matcher.holds and not has_begun:
-        yield len(record.history), window.start_s
+        yield len(record.history), max(window.start_s, record.start_s)
 
 
 def _count(expectation: Expectation, record: Record, window: Window) -> Difference:
@@ -143,14 +140,13 @@ def _seen(
         seen = f"{seen} at {_since(window.end_s, record)} s"
     elif matcher.other is not None:
         time_s = _since(matcher.other.time_s, record)
-        seen = f"the last {event.kind}, at {time_s} s: {matcher.difference}"
+        what = "line" if event.kind is EventKind.LOG else event.kind
+        seen = f"the last {what}, at {time_s} s: {matcher.difference}"
     later = next(_matches(record.matcher(event), record, Window(0, window.end_s, inf)), None)
     return seen if later is None else f"{seen}; the next one at {_since(later[1], record)} s"
 
 
-def _rate(
-    expectation: Expectation, record: Record, window: Window, base_s: float
-) -> Difference:
+def _rate(expectation: Expectation, record: Record, window: Window, base_s: float) -> Difference:
     [event] = expectation.events
     start_s = base_s + expectation.after_s
     lasting_s = window.end_s - start_s
@@ -247,6 +243,8 @@ def _states_text(states: Mapping[str, str]) -> str:
 
 
 def _limits(least: float | None, most: float | None) -> str:
+    if least == most and least is not None:
+        return f"exactly {least:g}"
     limits = (("at least", least), ("at most", most))
     return " and ".join(f"{word} {value:g}" for word, value in limits if value is not None)
 

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field
+from functools import partial
 from selectors import EVENT_READ, DefaultSelector
 from tempfile import TemporaryFile
 from typing import IO
@@ -97,7 +98,8 @@ def _start(number: int, job: Job, options: Options, timeout_s: float) -> _Proces
     sys.stderr.flush()
     pid = os.fork()
     if pid == 0:
-        _run_and_exit(writing, output.fileno(), lambda: run_scenario(job.scenario, job.system, options))
+        run = partial(run_scenario, job.scenario, job.system, options)
+        _run_and_exit(writing, output.fileno(), run)
     os.close(writing)
     lasting_s = job.scenario.for_s.value if options.real_time else 0.0
     until_s = time.monotonic() + timeout_s + lasting_s

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import field, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -61,8 +62,10 @@ def run_scenario(scenario: Scenario, system: System, options: Options) -> Result
     try:
         with test:
             result.failures += run.run()
+            if result.failures:
+                result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
         result.failures += run.end()
-        if result.failures:
+        if result.failures and not result.timeline:
             result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
     except (StartRefused, TestFailure) as error:
         result.failures.append(Failure(scenario.name.span, "a run of the system", str(error)))
@@ -130,7 +133,7 @@ class _Run:
         scenario, outcome = self._scenario, self._test.outcome
         span = scenario.name.span
         if outcome is not None and outcome.exit_code != scenario.exit_code:
-            seen = f"{outcome.exit_code}: {outcome.reason}"
+            seen = ", ".join([f"{outcome.exit_code}: {outcome.reason}", *outcome.remarks])
             yield Failure(span, f"exit code {scenario.exit_code}", seen)
         expected = [event for event in scenario.conditions if event.kind is EventKind.LOG]
         matchers = [Matcher(event, self._keys, self._start_s) for event in expected]
@@ -140,7 +143,8 @@ class _Run:
             if line.level in _ERRORS and not any(item.matches(line) for item in matchers)
         ]
         if errors and not scenario.allow_errors:
-            yield Failure(span, "no errors in the log", _errors(errors, self._start_s))
+            seen = _errors(errors, self._start_s)
+            yield Failure(span, "no errors in the log", seen, errors[0].time_s)
 
     def _advance_to(self, time_s: float) -> None:
         missing_s = self._start_s + time_s - self._test.now_s
@@ -150,16 +154,16 @@ class _Run:
     def _wait_for(self, event: Condition) -> None:
         matcher = Matcher(event, self._keys, self._start_s)
         history = self._test.history
-        first, read = len(history), 0
+        for entry in history:  # as for the states of the nodes
+            matcher.matches(entry)
+        read, is_done = len(history), matcher.holds
 
         def has_happened() -> bool:
-            nonlocal read
-            while read < len(history):
-                is_old, entry = read < first, history[read]
+            nonlocal read, is_done
+            while read < len(history) and not is_done:
+                is_done = matcher.matches(history[read])
                 read += 1
-                if matcher.matches(entry) and not is_old:
-                    return True
-            return matcher.holds
+            return is_done
 
         end_s = self._start_s + self._scenario.for_s.value
         with suppress(TestFailure):
@@ -182,18 +186,11 @@ class _Run:
 
     def _do(self, action: Action) -> None:
         test, name = self._test, action.name.value
-        content: Any = None
-        if action.content is not None and action.verb is not Verb.CORRUPT:
-            content = evaluate(action.content, {"now": test.now_s - self._start_s})
         value = None if action.value is None else action.value.value
         options: dict[str, Any] = {key: item.value for key, item in action.options.items()}
         match action.verb:
-            case Verb.PUBLISH:
-                test.publish(name, content)
-            case Verb.CALL:
-                test.call_soon(name, content, inf)
-            case Verb.SEND_GOAL:
-                self._goals[name] = test.send_goal(name, content)
+            case Verb.PUBLISH | Verb.CALL | Verb.SEND_GOAL:
+                self._send(action)
             case Verb.CANCEL:
                 self._goals[name].cancel()
             case Verb.SET_PARAMETER:
@@ -204,11 +201,22 @@ class _Run:
             case Verb.DELAY:
                 test.delay(name, options.pop("by_s"), **options)
             case Verb.CORRUPT:
-                test.corrupt(name, lambda message: self._corrupted(action, message), **options)
+                test.corrupt(name, partial(self._corrupted, action), **options)
             case Verb.HANG:
                 test.hang(name, options["for_s"], options.get("handler"))
-            case Verb.DROP | Verb.DUPLICATE | Verb.REORDER | Verb.RAISE_IN | Verb.KILL:
+            case _:  # drop, duplicate, reorder, raise_in, kill
                 getattr(test, action.verb)(name, **options)
+
+    def _send(self, action: Action) -> None:
+        test, name = self._test, action.name.value
+        scope = {"now": test.now_s - self._start_s}
+        content = {} if action.content is None else evaluate(action.content, scope)
+        if action.verb is Verb.PUBLISH:
+            test.publish(name, content)
+        elif action.verb is Verb.CALL:
+            test.call_soon(name, content, inf)
+        else:
+            self._goals[name] = test.send_goal(name, content)
 
     def _corrupted(self, action: Action, message: Any) -> Any:
         """Return a message with other values of the fields that a step sets."""

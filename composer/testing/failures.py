@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from math import inf
 from typing import Any
@@ -10,8 +11,9 @@ from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.model.ports import LogLevel
 
-#: The events that a failure shows.
+#: The events that a failure shows, and the messages of one topic among them.
 SHOWN = 20
+_OF_TOPIC = 3
 
 
 class TestFailure(AssertionError):
@@ -51,6 +53,7 @@ class LogLine:
 class _Entry:
     time_s: float
     text: Callable[[], str]
+    topic: str
 
 
 class Timeline:
@@ -59,15 +62,25 @@ class Timeline:
     def __init__(self) -> None:
         self._entries: list[_Entry] = []
 
-    def add(self, time_s: float, text: Callable[[], str]) -> None:
-        """Add an event."""
-        self._entries.append(_Entry(time_s, text))
+    def add(self, time_s: float, text: Callable[[], str], topic: str = "") -> None:
+        """Add an event, or a message of a topic."""
+        self._entries.append(_Entry(time_s, text, topic))
 
     def lines(self, until_s: float = inf, count: int = SHOWN) -> list[str]:
-        """Return the last events until a time, the oldest first, each with its time in seconds."""
+        """Return the last events until a time, the oldest first, each with its time in seconds.
+
+        Of the messages of a topic, only the last few are shown.
+        """
+        shown: list[_Entry] = []
+        topics: Counter[str] = Counter()
         entries = [entry for entry in self._entries if entry.time_s <= until_s]
-        entries = sorted(entries, key=lambda entry: entry.time_s)[-count:]
-        return [f"{entry.time_s:9.3f}  {entry.text()}" for entry in entries]
+        for entry in sorted(entries, key=lambda entry: entry.time_s)[::-1]:
+            topics[entry.topic] += 1
+            if not entry.topic or topics[entry.topic] <= _OF_TOPIC:
+                shown.append(entry)
+            if len(shown) == count:
+                break
+        return [f"{entry.time_s:9.3f}  {entry.text()}" for entry in reversed(shown)]
 
 
 def unknown(text: str, name: str, names: Iterable[str]) -> TestFailure:

@@ -48,7 +48,7 @@ class Observation:
         received = Received(self._now_s(), message, topic)
         self.messages.setdefault(topic, []).append(received)
         self.history.append(received)
-        self.timeline.add(received.time_s, lambda: f"{topic}: {short(to_plain(message))}")
+        self.timeline.add(received.time_s, lambda: f"{topic}: {short(to_plain(message))}", topic)
 
     def on_event(self, event: Event) -> None:
         """Receive an event of the host. Those of the test's own node are left out."""

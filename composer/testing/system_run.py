@@ -40,7 +40,7 @@ class SystemRun:
     def __init__(self, system: System, options: HostOptions, report: Report) -> None:
         self.clock: Clock = options.clock
         self._start_s = self.clock.monotonic()
-        options = replace(options, bring_up_within_s=_UP_WITHIN_S)
+        options = replace(options, bring_up_within_s=_UP_WITHIN_S, started_at_s=self._start_s)
         self.host = Host(system, bring_up(system), tear_down(system), options, report)
         #: How the run has ended; None while it lasts.
         self.outcome: Outcome | None = None

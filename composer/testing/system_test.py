@@ -25,6 +25,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
 from composer.base.diagnostics import suggestion
+from composer.behavior import GoalRejected
 from composer.model import LogLevel, ParameterType, PortKind, System
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.clock.virtual import VirtualClock
@@ -245,7 +246,8 @@ class SystemTest:
     def _on_goal_answer(self, action: str, sent: Future[Any]) -> None:
         error = _error(sent)
         if error:
-            self._observation.on_answer(action, error, None)
+            is_rejected = isinstance(sent.exception(), GoalRejected)
+            self._observation.on_answer(action, "rejected" if is_rejected else error, None)
         else:
             sent.result().result().add_done_callback(partial(self._on_result, action))
 
@@ -385,7 +387,7 @@ _OTHER_ENDS = {
 def _error(future: Future[Any]) -> str:
     """Return why a call has failed; empty if it has not."""
     error = future.exception()
-    return "was cancelled" if future.cancelled() else "" if error is None else f"failed: {error}"
+    return "was canceled" if future.cancelled() else "" if error is None else f"failed: {error}"
 
 
 def _converted(content: Any, kind: Any, where: str) -> Any:
