@@ -85,9 +85,9 @@ def check_keys(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(KEYS_EXCLUDE_EACH_OTHER, message, second.span, labels, hint)
         for key in item.given if len(kinds) == 1 else ():
             if key.value not in (item.kind, *_KEYS[item.kind]):
-                hint = suggestion(key.value, _KEYS[item.kind])
+                valid = suggestion(key.value, _KEYS[item.kind])
                 message = f"'{key}' has no meaning with '{item.kind}'"
-                yield Diagnostic(UNKNOWN_KEY, message, key.span, hint=hint)
+                yield Diagnostic(UNKNOWN_KEY, message, key.span, hint=valid)
 
 
 def check_times(context: Context) -> Iterator[Diagnostic]:
