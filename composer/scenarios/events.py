@@ -53,8 +53,9 @@ class Matcher:
         """Return whether the next entry is such an event."""
         condition = self._condition
         if isinstance(entry, StateChanged):
+            has_held = self.holds
             self._states[self._keys.get(entry.node, entry.node)] = entry.state
-            return self.holds
+            return self.holds and not has_held
         if isinstance(entry, LogLine):
             return condition.kind is EventKind.LOG and self._is_line(entry)
         if isinstance(entry, Received):

@@ -93,10 +93,12 @@ def check(
 Difference = tuple[str, str] | None
 
 
-def _matches(matcher: Matcher, record: Record, window: Window) -> Iterator[tuple[int, float]]:
+def _matches(
+    matcher: Matcher, record: Record, window: Window, *, at_start: bool = True
+) -> Iterator[tuple[int, float]]:
     """Yield the entries in the window that match, with their times.
 
-    States that nodes have at its beginning match at once.
+    With ``at_start``, states that nodes have at its beginning match at once.
     """
     has_begun = False
     for index, entry in enumerate(record.history):
@@ -106,11 +108,11 @@ def _matches(matcher: Matcher, record: Record, window: Window) -> Iterator[tuple
         is_in = index >= window.first and time_s >= window.start_s - _EPSILON_S
         if is_in and not has_begun:
             has_begun = True
-            if matcher.holds:
+            if matcher.holds and at_start:
                 yield index - 1, max(window.start_s, record.start_s)
         if (is_in or isinstance(entry, StateChanged)) and matcher.matches(entry) and is_in:
             yield index, time_s
-    if matcher.holds and not has_begun:
+    if matcher.holds and at_start and not has_begun:
         yield len(record.history), max(window.start_s, record.start_s)
 
 
@@ -139,11 +141,25 @@ def _seen(
         seen = _states_text({name.value: matcher.states[name.value] for name, _ in event.states})
         seen = f"{seen} at {_since(window.end_s, record)} s"
     elif matcher.other is not None:
-        time_s = _since(matcher.other.time_s, record)
-        what = "line" if event.kind is EventKind.LOG else event.kind
-        seen = f"the last {what}, at {time_s} s: {matcher.difference}"
-    later = next(_matches(record.matcher(event), record, Window(0, window.end_s, inf)), None)
-    return seen if later is None else f"{seen}; the next one at {_since(later[1], record)} s"
+        seen = f"the last {_other(matcher, event, record)}"
+    after_s = window.end_s + 2 * _EPSILON_S
+    later = _matches(record.matcher(event), record, Window(0, after_s, inf), at_start=False)
+    match = next(later, None)
+    if match is not None:
+        return f"{seen}; the next one at {_since(match[1], record)} s"
+    if matcher.other is None:
+        for entry in record.history:
+            if time_of(entry) > after_s and not matcher.matches(entry) and matcher.other:
+                return f"{seen} in that time; the next {_other(matcher, event, record)}"
+    return seen
+
+
+def _other(matcher: Matcher, event: Condition, record: Record) -> str:
+    """Return the time of a similar event, and how it differs."""
+    if matcher.other is None:
+        return ""
+    what = "line" if event.kind is EventKind.LOG else event.kind
+    return f"{what}, at {_since(matcher.other.time_s, record)} s: {matcher.difference}"
 
 
 def _rate(expectation: Expectation, record: Record, window: Window, base_s: float) -> Difference:
@@ -177,7 +193,7 @@ def _order(expectation: Expectation, record: Record, window: Window) -> Differen
     done: list[str] = []
     for event in expectation.events:
         matcher = record.matcher(event)
-        found = next(_matches(matcher, record, window), None)
+        found = next(_matches(matcher, record, window, at_start=not done), None)
         if found is None:
             wanted = ", then ".join(described(item) for item in expectation.events)
             after = f"after {' and '.join(done)}, " if done else ""
