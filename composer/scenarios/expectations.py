@@ -166,7 +166,7 @@ def _rate(expectation: Expectation, record: Record, window: Window, base_s: floa
     [event] = expectation.events
     start_s = base_s + expectation.after_s
     lasting_s = window.end_s - start_s
-    window = Window(window.first, start_s, window.end_s)
+    window = Window(window.first, start_s + 2 * _EPSILON_S, window.end_s)  # without its start
     count = sum(1 for _ in _matches(record.matcher(event), record, window))
     rate_hz = count / lasting_s if lasting_s > 0 else 0.0
     least, most = expectation.limit("at_least_hz"), expectation.limit("at_most_hz")

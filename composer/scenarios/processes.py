@@ -7,6 +7,7 @@ within milliseconds.
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import pickle
 import signal
@@ -27,7 +28,8 @@ from composer.scenarios.expectations import Failure
 from composer.scenarios.runner import Options, Result, run_scenario
 
 _CHUNK = 1 << 16
-_MOST_OUTPUT = 4000  # characters of what a failed run has printed
+_MOST_OUTPUT = 20_000  # characters of what a failed run has printed
+_TO_PRINT_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ class _Process:
     output: IO[bytes]
     until_s: float
     content: bytearray = field(default_factory=bytearray)
+    is_late: bool = False
 
 
 def run_jobs(
@@ -72,8 +75,10 @@ def run_jobs(
                     running.remove(process)
                     results[process.number] = _result(process)
             for process in [item for item in running if item.until_s <= time.monotonic()]:
-                os.kill(process.pid, signal.SIGKILL)
-                process.until_s += timeout_s  # its pipe closes at once
+                # The first signal lets it print the stacks of its threads.
+                os.kill(process.pid, signal.SIGKILL if process.is_late else signal.SIGABRT)
+                process.is_late = True
+                process.until_s += _TO_PRINT_S
             while following in results:
                 yield results.pop(following)
                 following += 1
@@ -111,10 +116,10 @@ def _run_and_exit(pipe: int, output: int, run: Callable[[], Result]) -> None:
     try:
         os.dup2(output, 1)
         os.dup2(output, 2)
+        sys.stdout = sys.stderr = os.fdopen(1, "w", buffering=1)
+        faulthandler.enable()
         with os.fdopen(pipe, "wb") as stream:
             pickle.dump(run(), stream)
-        sys.stdout.flush()
-        sys.stderr.flush()
         os._exit(0)
     except BaseException:
         sys.excepthook(*sys.exc_info())
@@ -132,6 +137,8 @@ def _result(process: _Process) -> Result:
     except (EOFError, pickle.UnpicklingError):
         code = os.waitstatus_to_exitcode(status)
         seen = f"it ended with code {code}" if code >= 0 else f"signal {-code} has ended it"
+        if process.is_late:
+            seen = "it was still running at the time limit: the output shows where"
         failure = Failure(process.job.scenario.name.span, "the process of the run to end", seen)
         result = Result([failure])
     result.output = output if result.failures else ""

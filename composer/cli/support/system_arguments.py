@@ -314,6 +314,12 @@ def runnable_system(
         use_sim_time=use_sim_time,
         warnings=warnings,
     )
+    if result.scenario is not None:
+        raise CommandError(
+            f"'{text}' is a scenario, not a system",
+            hint=f"run it with: compose test {text}",
+            exit_code=exit_code,
+        )
     if result.system is not None and result.system.node_type:
         raise CommandError(
             f"'{text}' is a node type, not a system",

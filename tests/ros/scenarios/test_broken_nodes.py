@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from composer.loading import load
-from composer.scenarios.runner import Options, run_scenario
-
-ROOT = Path(__file__).parents[3]
+from tests.ros.scenarios.conftest import run
 
 
 class Mistake(NamedTuple):
@@ -102,19 +98,13 @@ SYSTEMS = {
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_fails_the_scenario(name: str, tmp_path: Path) -> None:
+def test_a_mistake_fails_the_scenario(name: str, project: Path) -> None:
     mistake = MISTAKES[name]
-    for folder in ("systems", "nodes", "interfaces", "scenarios"):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
-    shutil.copy(ROOT / "composer.yaml", tmp_path)
-    file = tmp_path / mistake.file
+    file = project / mistake.file
     text = file.read_text(encoding="utf-8")
     assert mistake.right in text
     file.write_text(text.replace(mistake.right, mistake.wrong), encoding="utf-8")
     system = SYSTEMS.get(mistake.file, file.stem)
-    loaded = load(tmp_path / "scenarios" / f"{system}.yaml")
-    assert loaded.scenario is not None
-    assert loaded.system is not None
-    result = run_scenario(loaded.scenario, loaded.system, Options())
+    result = run(project / "scenarios" / f"{system}.yaml")
     assert mistake.seen in "\n".join(failure.seen for failure in result.failures)
     assert result.timeline

@@ -1,0 +1,55 @@
+"""``compose test``: what it selects, and what is a usage error. Needs no ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.compose import compose
+
+SCENARIO = "scenario: starts\nsystem: ../minimal.yaml\nfor_s: 1\nexpect: [{log: started}]\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "composer.yaml").touch()
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "minimal.yaml").write_text(
+        "system: minimal\nnodes: {node: {on_activate: {log: started}}}\n"
+    )
+    (tmp_path / "scenarios" / "starts.yaml").write_text(SCENARIO)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["scenario"], "there is no file or folder 'scenario'\n  did you mean 'scenarios'?"),
+        (["minimal.yaml"], "'minimal.yaml' is not a scenario\n  a scenario begins with"),
+        (["empty"], "there is no scenario in empty"),
+        (["-k", "docking and not slow"], "-k 'docking and not slow' selects none of 1 scenarios"),
+        (["-k", "docking and"], "-k 'docking and': "),
+    ],
+)
+def test_usage_error(project: Path, arguments: list[str], message: str) -> None:
+    (project / "empty").mkdir()
+    done = compose("test", *arguments)
+    assert done.code == 2
+    assert message in done.err
+
+
+def test_run_of_a_scenario_names_the_command(project: Path) -> None:
+    done = compose("run", "scenarios/starts.yaml", "--dry-run")
+    assert done.code == 78
+    assert "'scenarios/starts.yaml' is a scenario, not a system" in done.err
+    assert "compose test scenarios/starts.yaml" in done.err
+
+
+def test_scenarios_of_a_folder_are_validated(project: Path) -> None:
+    (project / "scenarios" / "starts.yaml").write_text(SCENARIO.replace("log:", "message:"))
+    done = compose("validate", ".")
+    assert done.code == 1
+    assert "no node publishes '/started'" in done.out
+    assert "2 files checked" in done.err

@@ -1,0 +1,77 @@
+"""``compose test`` with processes: a run that hangs or crashes, repetitions, JUnit XML, pytest."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from junitparser import Failure, JUnitXml
+
+CRASHING = """\
+import os
+
+from composer.behavior import Behavior
+
+
+class Crashing(Behavior):
+    def on_tick(self) -> None:
+        print("going down")
+        os.abort()
+
+
+class Hanging(Behavior):
+    def on_tick(self) -> None:
+        while True:
+            pass
+"""
+SYSTEM = "system: s\nnodes: {bad: {behavior: 'bad:NAME', timers: {tick: {rate_hz: 10}}}}\n"
+
+
+def _command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", *arguments]
+    return subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+def _write(folder: Path, name: str, text: str) -> None:
+    (folder / "composer.yaml").touch()
+    path = folder / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
+    _write(tmp_path, "bad.py", CRASHING)
+    for name in ("Crashing", "Hanging"):
+        _write(tmp_path, f"{name}.yaml", SYSTEM.replace("NAME", name))
+        scenario = f"scenario: {name}\nsystem: ../{name}.yaml\nfor_s: 1\n"
+        _write(tmp_path, f"scenarios/{name}.yaml", scenario)
+    done = _command(tmp_path, "composer", "test", "--timeout", "3", "-j2", "--junit", "out/j.xml")
+    assert done.returncode == 1
+    [suite] = JUnitXml.fromfile(str(tmp_path / "out" / "j.xml"))
+    crashed, hung = (case.result[0] for case in suite)
+    assert isinstance(crashed, Failure)
+    assert "signal 6 has ended it" in crashed.message
+    assert "going down" in crashed.text
+    assert "still running at the time limit" in hung.message
+    assert "in on_tick" in hung.text
+    assert "2 failed" in done.stderr
+
+
+def test_repetitions_and_pytest(tmp_path: Path) -> None:
+    _write(tmp_path, "s.yaml", "system: s\nnodes: {a: {on_activate: {log: 'a< & é'}}}\n")
+    _write(tmp_path, "scenarios/a.yaml", "scenario: a\nsystem: ../s.yaml\nfor_s: 1\n")
+    wrong = "scenario: wrong\nsystem: ../s.yaml\nfor_s: 1\nexpect: [{log: 'b<'}]\n"
+    _write(tmp_path, "scenarios/wrong.yaml", wrong)
+    done = _command(tmp_path, "composer", "test", "--repeat", "3", "--junit", "j.xml")
+    assert done.stdout.count("passed  scenarios/a.yaml: a[") == 3
+    assert "scenarios/wrong.yaml:4:16" in done.stdout
+    [suite] = JUnitXml.fromfile(str(tmp_path / "j.xml"))
+    assert (suite.tests, suite.failures, suite.errors) == (6, 3, 0)
+    done = _command(
+        tmp_path, "pytest", "-p", "no:cacheprovider", "-p", "composer.scenarios.pytest_collector"
+    )
+    assert "1 failed, 1 passed" in done.stdout
+    assert "a line 'b<' in the log" in done.stdout
