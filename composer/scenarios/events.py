@@ -11,8 +11,8 @@ from composer.model import PrimaryState
 from composer.model.scenario import Condition, EventKind
 from composer.runtime.ros.messages import to_plain
 from composer.runtime.supervision.events import Event, StateChanged
-from composer.testing.failures import short
-from composer.testing.observation import Answer, LogLine, Received
+from composer.testing.failures import LogLine, Received, short
+from composer.testing.observation import Answer
 
 Entry: TypeAlias = "Received | Answer | LogLine | Event"
 

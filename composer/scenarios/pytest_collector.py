@@ -1,4 +1,4 @@
-"""Lets pytest collect scenarios: YAML files in folders called ``scenarios``.
+"""Lets pytest collect scenarios: YAML files in a folder ``scenarios`` of a project.
 
 Each runs in a process of its own, by ``compose test``.
 """
@@ -20,12 +20,19 @@ _FOLDER = "scenarios"
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Return the collector of a scenario; None for other files."""
-    if file_path.suffix not in (".yaml", ".yml") or _FOLDER not in file_path.parts:
-        return None
-    if _MARKER.search(file_path.read_bytes()) is None:
+    if file_path.suffix not in (".yaml", ".yml") or not _is_scenario(file_path):
         return None
     collector: pytest.Collector = ScenarioFile.from_parent(parent, path=file_path)
     return collector
+
+
+def _is_scenario(path: Path) -> bool:
+    if _MARKER.search(path.read_bytes()) is None:
+        return False
+    from composer.project import Project  # noqa: PLC0415 - only where there are scenarios
+
+    root = Project.at(path.parent).root
+    return _FOLDER in (path.parent.name, *path.resolve().relative_to(root).parent.parts)
 
 
 class ScenarioFile(pytest.File):

@@ -20,9 +20,8 @@ from composer.runtime.process import StartRefused
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.scenarios.events import Matcher
 from composer.scenarios.expectations import Failure, Record, check, described
-from composer.testing.failures import TestFailure, short
+from composer.testing.failures import LogLine, TestFailure, short
 from composer.testing.goal import Goal
-from composer.testing.observation import LogLine
 from composer.testing.system_test import SystemTest
 
 #: Times may differ in the last digits: they are sums.

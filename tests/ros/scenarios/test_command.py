@@ -70,8 +70,6 @@ def test_repetitions_and_pytest(tmp_path: Path) -> None:
     assert "scenarios/wrong.yaml:4:16" in done.stdout
     [suite] = JUnitXml.fromfile(str(tmp_path / "j.xml"))
     assert (suite.tests, suite.failures, suite.errors) == (6, 3, 0)
-    done = _command(
-        tmp_path, "pytest", "-p", "no:cacheprovider", "-p", "composer.scenarios.pytest_collector"
-    )
+    done = _command(tmp_path, "pytest", "-p", "no:cacheprovider")
     assert "1 failed, 1 passed" in done.stdout
     assert "a line 'b<' in the log" in done.stdout
