@@ -80,3 +80,18 @@ def test_an_invalid_option_exits_with_status_2(runner_temp: str) -> None:
             SARIF_FILE=sarif_file,
         )
         assert done.returncode == 2
+
+
+@pytest.mark.ros
+def test_scenarios_are_run(tmp_path: Path) -> None:
+    (tmp_path / "temp").mkdir()
+    (tmp_path / "temp" / "compose").symlink_to(sys.prefix)
+    (tmp_path / "s.yaml").write_text("system: s\nnodes: {a: {on_activate: {log: up}}}\n")
+    text = "scenario: a\nsystem: s.yaml\nfor_s: 1\nexpect: [{log: down}]\n"
+    (tmp_path / "a.yaml").write_text(text)
+    done = run(
+        "Test", tmp_path, RUNNER_TEMP="temp", SCENARIOS="a.yaml", JUNIT_FILE="out/my results.xml"
+    )
+    assert done.returncode == 1
+    assert "expected: a line 'down' in the log" in done.stdout
+    assert (tmp_path / "out" / "my results.xml").exists()

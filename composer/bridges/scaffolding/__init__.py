@@ -8,14 +8,14 @@ from composer.base.resources import schemas_folder
 from composer.bridges.templates import filled
 
 #: For editors; compose has its own.
-_SCHEMAS = ("system.schema.json", "node.schema.json", "project.schema.json")
+_SCHEMAS = tuple(f"{kind}.schema.json" for kind in ("system", "node", "project", "scenario"))
 
 #: The contents of files, by their paths in the project.
 NewFiles: TypeAlias = dict[str, str]
 
 
 def new_project(name: str) -> NewFiles:
-    """Return the files of a project with a system of two nodes and its tests."""
+    """Return the files of a project with a system of two nodes, a scenario and tests."""
     return {
         "README.md": _text("project/README.md", name),
         "composer.yaml": _text("project/composer.yaml", name),
@@ -26,6 +26,7 @@ def new_project(name: str) -> NewFiles:
         f"resource/{name}": "",
         f"resource/ros2_composer/{name}": "",
         f"systems/{name}.yaml": _text("project/system.yaml", name),
+        f"scenarios/{name}.yaml": _text("project/scenario.yaml", name),
         f"tests/test_{name}.py": _text("project/test_project.py", name),
         "interfaces/.gitkeep": "",
         **new_node("counter"),
@@ -34,9 +35,10 @@ def new_project(name: str) -> NewFiles:
 
 
 def new_system(name: str) -> NewFiles:
-    """Return a system of two nodes and its test."""
+    """Return a system of two nodes, its scenario and its test."""
     return {
         f"systems/{name}.yaml": _text("system/system.yaml", name),
+        f"scenarios/{name}.yaml": _text("system/scenario.yaml", name),
         f"tests/test_{name}.py": _text("system/test_system.py", name),
     }
 

@@ -88,7 +88,7 @@ def test(
         ),
     ] = 120.0,
 ) -> None:
-    """Run scenarios: what happens to a system in one run, and what it must do.
+    """Run scenarios, which say what systems must do.
 
     They run in virtual time, which jumps whenever nothing is left to do. A failure shows the
     expectation in the file, what was seen instead, and the last events before.

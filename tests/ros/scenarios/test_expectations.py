@@ -1,4 +1,4 @@
-"""What each kind of expectation accepts, and what it says otherwise; what each step does."""
+"""What each kind of expectation accepts and reports, and what each step does."""
 
 from __future__ import annotations
 
