@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import random
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import field, replace
 from functools import partial
+from itertools import zip_longest
 from math import inf
 from typing import Any
+from zlib import crc32
 
 from composer.base.fast_dataclass import dataclass
 from composer.language.expressions import EvaluationError
@@ -18,10 +19,11 @@ from composer.model import LogLevel, System
 from composer.model.scenario import Action, Condition, EventKind, Expectation, Scenario, Verb
 from composer.runtime.process import StartRefused
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
-from composer.scenarios.events import Matcher
+from composer.scenarios.events import Entry, Matcher, time_of
 from composer.scenarios.expectations import Failure, Record, check, described
-from composer.testing.failures import LogLine, TestFailure, short
+from composer.testing.failures import LogLine, Received, TestFailure, short
 from composer.testing.goal import Goal
+from composer.testing.observation import Answer
 from composer.testing.system_test import SystemTest
 
 #: Times may differ in the last digits: they are sums.
@@ -34,28 +36,33 @@ class Result:
     """How a scenario went.
 
     ``timeline`` are the last events before the first failure, ``output`` is what the process of a
-    run that failed has printed.
+    run that failed has printed. ``trace`` has the time and a checksum of all that the run reported.
     """
 
     failures: list[Failure] = field(default_factory=list)
     timeline: list[str] = field(default_factory=list)
     took_s: float = 0.0
     output: str = ""
+    trace: list[tuple[float, int]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How scenarios are run. ``seed`` takes precedence over those of the scenarios."""
+    """How scenarios are run. ``seed`` takes precedence over those of the scenarios.
+
+    With ``traced``, the results have a trace, by which runs can be compared.
+    """
 
     real_time: bool = False
     seed: int | None = None
+    traced: bool = False
 
 
 def run_scenario(scenario: Scenario, system: System, options: Options) -> Result:
     """Run a scenario with its system, once."""
     started_s = time.monotonic()
-    random.seed(scenario.seed if options.seed is None else options.seed)
-    test = SystemTest(in_one_process(system), real_time=options.real_time)
+    seed = scenario.seed if options.seed is None else options.seed
+    test = SystemTest(in_one_process(system), seed=seed, real_time=options.real_time)
     run = _Run(scenario, system, test)
     result = Result()
     try:
@@ -64,12 +71,31 @@ def run_scenario(scenario: Scenario, system: System, options: Options) -> Result
             if result.failures:
                 result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
         result.failures += run.end()
+        if options.traced:
+            result.trace = [(time_of(entry), crc32(_text(entry))) for entry in test.history]
         if result.failures and not result.timeline:
             result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
     except (StartRefused, TestFailure) as error:
         result.failures.append(Failure(scenario.name.span, "a run of the system", str(error)))
     result.took_s = time.monotonic() - started_s
     return result
+
+
+def difference(scenario: Scenario, first: Result, other: Result) -> Failure | None:
+    """Return where two runs with the same seed differ, or None."""
+    for pair in zip_longest(first.trace, other.trace):
+        if pair[0] != pair[1]:
+            since_s = min(entry[0] for entry in pair if entry is not None)
+            seen = f"other ones from {since_s:.3f} s on: something depends on more than the seed"
+            return Failure(scenario.name.span, "the events of the first run", seen)
+    return None
+
+
+def _text(entry: Entry) -> bytes:
+    """Return an entry as text, with the fields of its message."""
+    if isinstance(entry, Received | Answer):
+        entry = replace(entry, message=to_plain(entry.message))
+    return repr(entry).encode()
 
 
 def in_one_process(system: System) -> System:

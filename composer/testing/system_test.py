@@ -54,7 +54,7 @@ class SystemTest:
 
     ``system`` is a file, or a model that is already loaded. ``arguments`` are those of the system,
     ``settings`` values of parameters by ``node.parameter``. With ``real_time``, the system has the
-    time of the computer.
+    time of the computer. Runs with the same ``seed`` have the same random numbers.
     """
 
     __test__ = False  # no class of tests
@@ -65,6 +65,7 @@ class SystemTest:
         *,
         arguments: Mapping[str, Any] | None = None,
         settings: Mapping[str, Any] | None = None,
+        seed: int = 0,
         real_time: bool = False,
         log_level: LogLevel = LogLevel.INFO,
     ) -> None:
@@ -72,6 +73,7 @@ class SystemTest:
         if not isinstance(system, System):
             system = load_system(Path(system), arguments or {}, settings or {})
         self._system = with_tester(system)
+        self._seed = seed
         self._is_real = real_time
         self._log_level = log_level
         self._observation = Observation(lambda: self._run.now_s)
@@ -85,7 +87,9 @@ class SystemTest:
         tester = self._system.node(TESTER)
         ports = () if tester is None else tester.ports
         self._faults = Faults(clock, ports, self._on_tester)
-        options = HostOptions(log_level=self._log_level, clock=clock, instruments=self._faults)
+        options = HostOptions(
+            log_level=self._log_level, clock=clock, seed=self._seed, instruments=self._faults
+        )
         self._run = SystemRun(self._system, options, self._observation.on_event)
         self._run.start(lambda: self._observation.is_up)
         if self.outcome is not None:

@@ -52,7 +52,10 @@ def test(
         typer.Option("--seed", metavar="N", help="The seed of random numbers, for all scenarios."),
     ] = None,
     repeat: Annotated[
-        int, typer.Option("--repeat", metavar="N", min=1, help="Run each scenario N times.")
+        int,
+        typer.Option(
+            "--repeat", metavar="N", min=1, help="Run each scenario N times, and compare the runs."
+        ),
     ] = 1,
     expression: Annotated[
         str | None,
@@ -103,7 +106,8 @@ def test(
 
     workers = jobs or (1 if real_time else os.cpu_count() or 1)
     cases: list[Case] = []
-    for case in _run(results, Options(real_time, seed), workers, timeout, repeat):
+    options = Options(real_time, seed, traced=repeat > 1 and not real_time)
+    for case in _run(results, options, workers, timeout, repeat):
         cases.append(case)
         write(case.line)
     color = use_color(sys.stdout)
@@ -176,6 +180,7 @@ def _run(
     from composer.base.diagnostics import Severity
     from composer.scenarios.processes import Job, run_jobs
     from composer.scenarios.report import Case
+    from composer.scenarios.runner import difference
 
     jobs: list[Job] = []
     for result in results:
@@ -190,9 +195,14 @@ def _run(
             errors = [item for item in result.diagnostics if item.severity is Severity.ERROR]
             yield Case(path, _name(result), errors=errors)
             continue
+        first = None
         for number in range(1, repeat + 1):
             name = f"{scenario.name}[{number}]" if repeat > 1 else scenario.name.value
-            yield Case(path, name, scenario.for_s.value, next(outcomes))
+            outcome = next(outcomes)
+            first = first or outcome
+            differs = difference(scenario, first, outcome) if not outcome.failures else None
+            outcome.failures += [] if differs is None else [differs]
+            yield Case(path, name, scenario.for_s.value, outcome)
 
 
 def _write_junit(path: Path, cases: Sequence[Case], took_s: float) -> None:

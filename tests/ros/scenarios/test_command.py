@@ -25,6 +25,16 @@ class Hanging(Behavior):
         while True:
             pass
 """
+UNSEEDED = """\
+import os
+
+from composer.behavior import Behavior
+
+
+class Unseeded(Behavior):
+    def on_activate(self) -> None:
+        self.log.info(os.urandom(8).hex())
+"""
 SYSTEM = "system: s\nnodes: {bad: {behavior: 'bad:NAME', timers: {tick: {rate_hz: 10}}}}\n"
 
 
@@ -65,11 +75,15 @@ def test_repetitions_and_pytest(tmp_path: Path) -> None:
     _write(tmp_path, "scenarios/a.yaml", "scenario: a\nsystem: ../s.yaml\nfor_s: 1\n")
     wrong = "scenario: wrong\nsystem: ../s.yaml\nfor_s: 1\nexpect: [{log: 'b<'}]\n"
     _write(tmp_path, "scenarios/wrong.yaml", wrong)
+    _write(tmp_path, "bad.py", UNSEEDED)
+    _write(tmp_path, "u.yaml", "system: u\nnodes: {a: {behavior: 'bad:Unseeded'}}\n")
+    _write(tmp_path, "scenarios/unseeded.yaml", "scenario: u\nsystem: ../u.yaml\nfor_s: 1\n")
     done = _command(tmp_path, "composer", "test", "--repeat", "3", "--junit", "j.xml")
+    assert done.stdout.count("other ones from 0.000 s on: something depends on more than") == 2
     assert done.stdout.count("passed  scenarios/a.yaml: a[") == 3
     assert "scenarios/wrong.yaml:4:16" in done.stdout
     [suite] = JUnitXml.fromfile(str(tmp_path / "j.xml"))
-    assert (suite.tests, suite.failures, suite.errors) == (6, 3, 0)
+    assert (suite.tests, suite.failures, suite.errors) == (9, 5, 0)
     done = _command(tmp_path, "pytest", "-p", "no:cacheprovider")
-    assert "1 failed, 1 passed" in done.stdout
+    assert "1 failed, 2 passed" in done.stdout
     assert "a line 'b<' in the log" in done.stdout
