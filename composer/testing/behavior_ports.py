@@ -44,7 +44,7 @@ class PublisherPort(RunningPort):
             self._context.record(self._name, message)
         else:
             reason = self._context.gate.refusal
-            self._context.note(f"a message of '{self._name}' was dropped: {reason}")
+            self._context.log.warn(f"publisher '{self._name}' drops its messages: {reason}")
 
 
 class SubscriptionPort(RunningPort):
@@ -163,8 +163,7 @@ class ClientPort(RunningPort):
         self._label = f"{port.kind} '{self._name}'"
         limit = port.timeout_ms
         self._timeout_ms = _DEFAULT_TIMEOUT_MS if limit is None else limit.value
-        #: The limit of results; infinite unless YAML sets one.
-        self.result_timeout_ms = inf if (most := port.result_timeout_ms) is None else most.value
+        self._result_timeout_ms = inf if (most := port.result_timeout_ms) is None else most.value
         self.service_type = self.action_type = interface
         self._server: Future[Any] = Future()
         self._feedback = context.queue(self._handle_feedback, reentrant=port.reentrant)
@@ -179,6 +178,10 @@ class ClientPort(RunningPort):
     def call(self, request: Any, *, timeout_ms: float | None = None) -> Future[Any]:
         """Call the service. The future fails as in the runtime. Raises TypeError."""
         self._check_type(request, self.service_type.Request)
+        if self._server.done():
+            self._context.record(self._name, request)
+            server: ServicePort = self._server.result()
+            return self.limited(server.call(request), self._limit_ms(timeout_ms))
         called = self._context.spawn(self._send(request, timeout_ms, lambda s: s.call(request)))
         return wrap_future(called, self._report)
 
@@ -216,10 +219,18 @@ class ClientPort(RunningPort):
         text = f"{what.format(self._what)} within {timeout_ms:g} ms"
         return gate.pending.add(future, until_s, lambda: late(text))
 
+    async def result(self, goal: ServedGoal, timeout_ms: float | None) -> Outcome:
+        """Wait until a goal has ended."""
+        limit_ms = self._result_timeout_ms if timeout_ms is None else timeout_ms
+        return await self.limited(goal.result(), limit_ms)
+
+    def _limit_ms(self, timeout_ms: float | None) -> float:
+        return self._timeout_ms if timeout_ms is None else timeout_ms
+
     async def _send(
         self, content: Any, timeout_ms: float | None, send: Callable[[Any], Future[Any]]
     ) -> Any:
-        timeout_ms = self._timeout_ms if timeout_ms is None else timeout_ms
+        timeout_ms = self._limit_ms(timeout_ms)
         until_s = self._context.loop.clock.monotonic() + timeout_ms / 1000.0
         missing = "no server of {} was available"
         server = wrap_future(self._server, cancels=False)
@@ -237,7 +248,7 @@ class ClientPort(RunningPort):
         )
         self._goals[goal] = None
         goal.outcome.add_done_callback(lambda _: self._goals.pop(goal, None))
-        return ClientGoal(self, goal)
+        return ClientGoal(self._context, self, goal)
 
     def _check_type(self, content: Any, kind: Any) -> None:
         if not isinstance(content, kind):
@@ -261,14 +272,14 @@ class ClientPort(RunningPort):
 class ClientGoal:
     """A goal that the server accepted; see :class:`composer.behavior.SentGoal`."""
 
-    def __init__(self, port: ClientPort, goal: ServedGoal) -> None:
+    def __init__(self, context: TestContext, port: ClientPort, goal: ServedGoal) -> None:
+        self._context = context
         self._port = port
         self._goal = goal
 
     def result(self, *, timeout_ms: float | None = None) -> Future[Outcome]:
         """Wait until the goal has ended. Fails with CallTimeout or CallCancelled."""
-        limit_ms = self._port.result_timeout_ms if timeout_ms is None else timeout_ms
-        return self._port.limited(self._goal.result(), limit_ms)
+        return self._context.spawn(self._port.result(self._goal, timeout_ms))
 
     def cancel(self) -> Future[bool]:
         """Request cancellation; true if accepted."""

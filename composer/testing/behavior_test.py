@@ -229,7 +229,8 @@ class BehaviorTest:
         respond = partial(self._answer, declared, answer, after_s)
         gate = LifecycleGate(f"the server of '{port}'", PendingFutures(self._loop))
         gate.open()
-        context = replace(self._context, gate=gate)
+        log = _Log(lambda _, text: self._note(f"the server of '{port}': {text}"))
+        context = replace(self._context, gate=gate, log=cast(Logger, log))
         interface = self._messages.interface(declared.interface.value)
         if declared.kind is PortKind.CLIENT:
             server: Any = ServicePort(context, port, interface, respond, reentrant=True)
