@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from difflib import SequenceMatcher
 from functools import lru_cache
+from heapq import nlargest
 
 #: Minimum similarity of two names, from 0 to 1 (difflib's ratio).
 LEAST_LIKENESS = 0.6
@@ -20,6 +22,10 @@ LONGEST_NAME = 255
 
 _FEW = 60
 _NEIGHBORS = 12  # number of candidates on each side, of many names
+#: Letters of all candidates, of which there are at least two.
+_MAX_LETTERS = 2400
+#: Pairs of equal letters of a name and its candidates. Comparing takes time for each.
+_MAX_PAIRS = 4000
 
 
 #: Shortest word in which one wrong letter is a typo: camera_l and camera_r are two cameras.
@@ -93,15 +99,17 @@ class Vocabulary:
         if len(name) > LONGEST_NAME:
             return []
         folded = name.casefold()
-        alike = get_close_matches(folded, self._candidates(folded), count, LEAST_LIKENESS)
-        return [self._by_folded[match] for match in alike]
+        alike = nlargest(count, _ratios(folded, self._candidates(folded)))
+        return [self._by_folded[match] for _, match in alike]
 
     def _candidates(self, folded: str) -> list[str]:
-        if len(self._forwards) <= _FEW:
+        number = _MAX_LETTERS // max(len(folded), 1)
+        if len(self._forwards) <= min(_FEW, number):
             found: Iterable[str] = self._forwards
         else:
-            neighbors = _neighbors(folded, self._forwards)
-            neighbors += (name[::-1] for name in _neighbors(folded[::-1], self._backwards))
+            side = max(1, min(_NEIGHBORS, number // 4))
+            neighbors = _neighbors(folded, self._forwards, side)
+            neighbors += (name[::-1] for name in _neighbors(folded[::-1], self._backwards, side))
             found = dict.fromkeys(neighbors)
         return [candidate for candidate in found if len(candidate) <= LONGEST_NAME]
 
@@ -112,6 +120,26 @@ def vocabulary(names: tuple[str, ...]) -> Vocabulary:
     return Vocabulary(names)
 
 
-def _neighbors(name: str, ordered: Sequence[str]) -> list[str]:
+def _neighbors(name: str, ordered: Sequence[str], side: int) -> list[str]:
     place = bisect_left(ordered, name)
-    return list(ordered[max(place - _NEIGHBORS, 0) : place + _NEIGHBORS])
+    return list(ordered[max(place - side, 0) : place + side])
+
+
+def _ratios(name: str, candidates: Iterable[str]) -> list[tuple[float, str]]:
+    """Return the similarities of names like ``name``: first of those with its letters."""
+    matcher = SequenceMatcher(autojunk=False)
+    matcher.set_seq2(name)
+    likely: list[tuple[float, str]] = []
+    for candidate in candidates:
+        matcher.set_seq1(candidate)
+        if matcher.real_quick_ratio() >= LEAST_LIKENESS:
+            likely.append((matcher.quick_ratio(), candidate))
+    letters, pairs = Counter(name), 0
+    ratios: list[tuple[float, str]] = []
+    for quick, candidate in sorted(likely, reverse=True):
+        pairs += sum(map(letters.__getitem__, candidate))
+        if quick < LEAST_LIKENESS or pairs > _MAX_PAIRS:
+            break
+        matcher.set_seq1(candidate)
+        ratios.append((matcher.ratio(), candidate))
+    return [found for found in ratios if found[0] >= LEAST_LIKENESS]

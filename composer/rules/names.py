@@ -9,6 +9,7 @@ from composer.base.source import Located, Span
 from composer.language.rules import DUPLICATE_NAME
 from composer.model import Connection, Node, Port, System
 from composer.model.names import (
+    MAXIMUM_NAMESPACE_LENGTH,
     is_hidden,
     join,
     namespace_problem,
@@ -63,31 +64,31 @@ def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
         for namespace in namespaces
         if _is_invalid(namespace.value)
     }
-    invalid = {namespace.value for namespace in found.values()}
+    inside: dict[str, list[Node]] = {namespace.value: [] for namespace in found.values()}
+    for node in system.nodes:
+        for outer in (node.namespace.value, *_outer(node.namespace.value)):
+            inside.get(outer, []).append(node)
     for namespace in found.values():
-        if not any(outer in invalid for outer in _outer(namespace.value)):
+        if not any(outer in inside for outer in _outer(namespace.value)):
             problem = namespace_problem(namespace.value)
-            inside = [node for node in system.nodes if _is_inside(node, namespace.value)]
             yield Diagnostic(
                 INVALID_NAME,
                 f"namespace '{namespace}' {problem}",
                 namespace.span,
-                subjects=tuple(namespace_subjects(inside)),
+                subjects=tuple(namespace_subjects(inside[namespace.value])),
             )
+            inside[namespace.value] = []  # one diagnostic says which names are not known
 
 
 def _is_invalid(namespace: str) -> bool:
     return namespace_problem(namespace) is not None and not is_unresolved(namespace)
 
 
-def _is_inside(node: Node, outer: str) -> bool:
-    return f"{node.namespace.value}/".startswith(f"{outer.rstrip('/')}/")
-
-
 def _outer(namespace: str) -> Iterator[str]:
-    """Yield the namespaces around a namespace."""
-    while namespace := namespace.rpartition("/")[0]:
-        yield namespace
+    """Yield the namespaces around a namespace, those of a possible length."""
+    outer = namespace[: MAXIMUM_NAMESPACE_LENGTH + 1]
+    while outer := outer.rpartition("/")[0]:
+        yield outer
 
 
 def _invalid_system_name(system: System) -> Iterator[Diagnostic]:

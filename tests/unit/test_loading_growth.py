@@ -124,6 +124,14 @@ def test_many_included_nodes(tmp_path: Path) -> None:
 LARGE_FILES: dict[str, tuple[str, str, str]] = {
     "nodes in one line": ("nodes: {", "n#: {}, ", "}\n"),
     "unknown keys in one line": ("nodes: {", "a#: {b#: 1}, ", "}\n"),
+    "unknown sections": ("nodes: {x: {}}\n", "k#: 1\n", ""),
+    "QoS overrides": (
+        f"nodes:\n  x:\n    publishers: {{p: {{{STRING}}}}}\n    parameters:\n",
+        "      qos_overrides./t#.publisher.depth: 3\n",
+        "",
+    ),
+    "a deep namespace": ("nodes: {x: {namespace: '", "/a#", " !'}}\n"),
+    "one namespace": ("nodes:\n", "  n#: {namespace: a b}\n", ""),
     "keys without values": ("nodes: {", "a#, ", "}\n"),
     "maps of nothing": ("nodes: {x: {state: {a: [", "{a: }, ", "]}}}\n"),
     "braces": ("nodes: {x: {on_activate: {log: '", "} ", "'}}}\n"),

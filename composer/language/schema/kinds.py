@@ -7,6 +7,7 @@ from functools import cache
 from composer.base.diagnostics import Diagnostic, error, nearest, shown
 from composer.base.source import SourceFile
 from composer.language import rules
+from composer.language.document.limits import MAX_ERRORS
 from composer.language.schema import kind_of, schema
 from composer.language.schema.hints import intended_key
 from composer.language.tree import Entry, Mapping, Scalar
@@ -48,13 +49,15 @@ def with_intended_sections(tree: Mapping, kind: str) -> tuple[Mapping, list[Diag
     Unknown keys that resemble no section stay as they are: ``check_schema`` reports them.
     """
     title, sections = _sections(kind)
-    if all(entry.name in sections for entry in tree):
+    unknown = [entry.name for entry in tree if entry.name not in sections]
+    if not unknown:
         return tree, []
     missing = [name for name in sections if tree.entry(name) is None]
     diagnostics = []
     entries = []
+    compared = frozenset(unknown[:MAX_ERRORS])  # check_schema reports no more of them
     for entry in tree:
-        meant = nearest(entry.name, missing) if entry.name not in sections else None
+        meant = nearest(entry.name, missing) if entry.name in compared else None
         if meant is None or meant != intended_key(entry.name, missing):
             entries.append(entry)
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import field, replace
 from pathlib import Path
@@ -77,7 +78,8 @@ class IncludeResolver:
         found += _without_emptied(check_schema(expanded, SYSTEM), tree)
         self.diagnostics += found
         includes = expanded.get(INCLUDE)
-        if any(_is_in_section(item.primary, INCLUDE, expanded) for item in found):
+        lines = _section_lines(INCLUDE, expanded)
+        if any(item.primary.line in lines and item.primary.file == file.source for item in found):
             self.is_partial = True
         all_left_out = [*left_out]
         for absent in left_out:
@@ -216,12 +218,11 @@ def _lines(conflict: Diagnostic) -> set[tuple[str, int]]:
     return {(span.file.path, span.line) for span in spans}
 
 
-def _is_in_section(span: Span, name: str, tree: Mapping) -> bool:
-    """Return whether a span is in the section ``name`` of a file."""
-    starts = sorted(entry.key.span.line for entry in tree if entry.key.span.file == span.file)
+def _section_lines(name: str, tree: Mapping) -> range:
+    """Return the lines of the section ``name`` of a file; none if it is not there."""
     section = tree.entry(name)
-    if section is None or section.key.span.file != span.file:
-        return False
-    start = section.key.span.line
-    end = next((line for line in starts if line > start), span.line + 1)
-    return start <= span.line < end
+    if section is None:
+        return range(0)
+    start, file = section.key.span.line, section.key.span.file
+    starts = (entry.key.span.line for entry in tree if entry.key.span.file == file)
+    return range(start, min((line for line in starts if line > start), default=sys.maxsize))

@@ -246,7 +246,8 @@ def node_parameters(
     overrides = _qos_overrides(declared, values, given.overridable)
     others = [item for item in declared if item.name.value not in overrides]
     unusable = [] if gets_undeclared else list(filter(_overrides_qos, others))
-    parameters = with_use_sim_time(tuple(item for item in others if item not in unusable), values)
+    usable = others if gets_undeclared else [item for item in others if not _overrides_qos(item)]
+    parameters = with_use_sim_time(tuple(usable), values)
     named = given.files.named(names.full_name)
     overridden = {name: entry for name, entry in named.items() if name in given.own}
     replaced = (item for item in parameters if item.name.value in overridden)

@@ -65,8 +65,8 @@ def is_misspelled(context: Context, key: str, near: Span) -> bool:
     The keys of a map are on one line, or on lines that follow each other.
     """
     return any(
-        span.file == near.file
-        and abs(span.line - near.line) <= _NEARBY_LINES
+        abs(span.line - near.line) <= _NEARBY_LINES
+        and span.file == near.file
         and nearest(span.text, [key]) is not None
         for span in context.refused
     )

@@ -1,8 +1,8 @@
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from difflib import get_close_matches
-from typing import Any
+from difflib import SequenceMatcher
 
 import pytest
 
@@ -55,26 +55,43 @@ def test_the_same_names_are_sorted_once() -> None:
 
 
 def test_names_longer_than_any_in_ros_are_not_compared() -> None:
-    longest = "a" * LONGEST_NAME
+    longest = "abcdefghijklmnopqrstuvwxyz" * 10
+    longest = longest[:LONGEST_NAME]
     assert Vocabulary([longest]).close(longest[1:]) == [longest]
     assert Vocabulary([longest + "a"]).close(longest) == []
     assert Vocabulary([longest]).close(longest + "b") == []
 
 
-def test_no_more_names_are_compared_among_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    compared: list[int] = []
+@pytest.mark.parametrize("letters", ["", "a" * 40, "ab" * 90])
+def test_no_more_is_compared_among_many(monkeypatch: pytest.MonkeyPatch, letters: str) -> None:
+    """Also of names that consist of few letters."""
+    compared: Counter[str] = Counter()
 
-    def counted(word: str, candidates: Sequence[str], *limits: Any) -> list[str]:
-        compared.append(len(candidates))
-        return get_close_matches(word, candidates, *limits)
+    class Counted(SequenceMatcher[str]):
+        def set_seqs(self, a: Sequence[str], b: Sequence[str]) -> None:
+            self.words = a, b
+            super().set_seqs(a, b)
 
-    monkeypatch.setattr(spelling, "get_close_matches", counted)
+        def set_seq1(self, a: Sequence[str]) -> None:
+            self.words = a, self.words[1]
+            super().set_seq1(a)
+
+        def set_seq2(self, b: Sequence[str]) -> None:
+            self.words = self.words[0], b
+            super().set_seq2(b)
+
+        def ratio(self) -> float:
+            name, other = self.words
+            compared["".join(other)] += sum(map(Counter(name).__getitem__, other))
+            return super().ratio()
+
+    monkeypatch.setattr(spelling, "SequenceMatcher", Counted)
     for count in (200, 20_000):
-        names = Vocabulary(f"camera_{number}_driver" for number in range(count))
+        names = Vocabulary(f"camera_{number}_{letters}driver" for number in range(count))
         for number in range(100):
-            assert names.close(f"camera_{number}_drvier") == [f"camera_{number}_driver"]
-    assert len(compared) == 200
-    assert max(compared[100:]) <= max(compared[:100]) < 60
+            close = names.close(f"camera_{number}_{letters}drvier")
+            assert close == ([] if len(letters) > 100 else [f"camera_{number}_{letters}driver"])
+    assert max(compared.values(), default=0) <= 2 * 4000
 
 
 @pytest.mark.parametrize(

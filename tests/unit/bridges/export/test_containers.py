@@ -149,7 +149,7 @@ def test_the_image_has_no_secrets(project: Path) -> None:
     ]
 
 
-def test_a_home_folder_is_no_project(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_home_folder_is_not_copied(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (project / "link").symlink_to(project)
     monkeypatch.setenv("HOME", str(project / "link"))
     (project / "robot.yaml").write_text(SYSTEM.replace("LONG: LONG", "LONG: x"))
