@@ -16,6 +16,7 @@ from math import prod
 from typing import Any
 
 from composer.language.document.scalars import NumberRefused, resolve_plain
+from composer.model.names import join_node_name
 
 MAX_VISITS = 64
 _MARK = "COMPOSE_ARGUMENT_{}_END"
@@ -50,55 +51,115 @@ def all_visits(visit: Callable[[Mapping[str, str]], Visit], given: Mapping[str, 
     """Return the visits with the values of the arguments that matter.
 
     ``values`` of each visit are those of arguments with several values. ``resolved`` are arguments
-    that keep their values, because the launch file needs them before its nodes are known.
+    that keep their values, because the launch file needs them before its nodes are known, or fails
+    with others: the reason by the name, if it is known.
     """
     base = visit(given)
-    values = _alternatives(base)
-    for name, texts in tuple(values.items()):
-        for other in texts[1:]:  # a branch may compare other arguments
-            found = _attempted(visit, {**given, name: other})
-            for key, more in ({} if found is None else _alternatives(found, base)).items():
-                values[key] = list(dict.fromkeys([*values.get(key, ()), *more]))
+    values, problems = _values_that_work(visit, given, base)
     declared = {item["name"]: item for item in base["arguments"]}
-    resolved = [name for name in declared if declared[name]["default"] is None]
     while prod(map(len, values.values())) > MAX_VISITS:
-        resolved.append(values.popitem()[0])
+        values.popitem()
     marks = {}
     for name, item in declared.items():
-        if name not in values and name not in resolved:
+        if name not in {*values, *problems} and item["default"] is not None:
             found = _attempted(visit, {**given, name: mark(name)})
-            if found is not None and _is_kept(base, found, name, item["default"]):
-                marks[name] = mark(name)
+            if isinstance(found, str) or not _is_kept(base, found, name, item["default"]):
+                continue
+            if identifier(name) in marked_names(inner_sections(found["nodes"])):
+                problems[name] = "nodes inside a program have parameters that depend on it"
             else:
-                resolved.append(name)
-    visits = []
-    for chosen in product(*values.values()):
-        combination = dict(zip(values, chosen, strict=True))
-        found = _attempted(visit, {**given, **marks, **combination})
-        if found is None:  # the arguments depend on each other
-            resolved = list(declared)
-            visits, values, marks = [{"values": {}, **base}], {}, {}
-            break
-        visits.append({"values": combination, **found})
+                marks[name] = mark(name)
+    visits = _combined_visits(lambda chosen: visit({**given, **chosen}), values, marks)
     return {
         "arguments": [
             {**item, "values": values.get(item["name"], [])}
             for item in declared.values()
             if item["name"] in {*values, *marks}
         ],
-        "visits": visits,
+        "visits": visits or [{"values": {}, **base}],
         "base": base["nodes"],
-        "resolved": [name for name in resolved if declared[name]["default"]],
+        "resolved": {
+            name: problems.get(name, "")
+            for name, item in declared.items()
+            if item["default"] and name not in {*values, *marks}
+        },
     }
+
+
+def _values_that_work(
+    visit: Callable[[Mapping[str, str]], Visit], given: Mapping[str, str], base: Visit
+) -> tuple[dict[str, list[str]], dict[str, str]]:
+    """Return the arguments with several values, and why some values are left out."""
+    values, problems = _alternatives(base), {}
+    refused = set()
+    for name, texts in tuple(values.items()):
+        for other in texts[1:]:  # a branch may compare other arguments
+            found = _attempted(visit, {**given, name: other})
+            problem = found if isinstance(found, str) else _dependent_section(found, base)
+            if problem or isinstance(found, str):
+                refused.add((name, other))
+                problems[name] = f"with '{other}', {problem}"
+                continue
+            for key, more in _alternatives(found, base).items():
+                values[key] = list(dict.fromkeys([*values.get(key, ()), *more]))
+    for name in problems:
+        values[name] = [text for text in values[name] if (name, text) not in refused]
+    return {name: texts for name, texts in values.items() if len(texts) > 1}, problems
+
+
+def _dependent_section(found: Visit, base: Visit) -> str:
+    """Return that parameters of a node inside a program differ: they are in a file, as they are."""
+    others = inner_sections(base["nodes"])
+    for name, sections in inner_sections(found["nodes"]).items():
+        if name in others and sections != others[name]:
+            return f"{name} inside a program has other parameters"
+    return ""
+
+
+def inner_sections(nodes: Iterable[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """Return the different parameters that nodes which the launch file does not name are given."""
+    named = {join_node_name(item["namespace"], item["name"]) for item in nodes if item["name"]}
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for item in nodes:
+        for name, values in item["sections"].items():
+            if name not in named and values not in found.setdefault(name, []):
+                found[name].append(values)
+    return {name: sections for name, sections in found.items() if sections}
+
+
+def _combined_visits(
+    visit: Callable[[Mapping[str, str]], Visit], values: dict[str, list[str]], marks: dict[str, str]
+) -> list[Visit]:
+    """Return a visit for each combination of values; remove values and marks until all work."""
+    while values or marks:
+        visits = []
+        for chosen in product(*values.values()):
+            combination = dict(zip(values, chosen, strict=True))
+            found = _attempted(visit, marks | combination)
+            if not isinstance(found, dict):
+                break
+            visits.append({"values": combination, **found})
+        else:
+            return visits
+        others = [name for name, text in combination.items() if text != values[name][0]]
+        if others:
+            del values[others[-1]]
+        elif marks:
+            marks.clear()
+        else:
+            values.clear()
+    return []
 
 
 def _attempted(
     visit: Callable[[Mapping[str, str]], Visit], values: Mapping[str, str]
-) -> Visit | None:
+) -> Visit | str:
+    """Return a visit, or why it has failed."""
     try:
         return visit(values)
-    except Exception:  # whatever the code of the launch file raises for a value
-        return None
+    except Exception as error:  # whatever the code of the launch file raises for a value
+        text = error.args[0] if isinstance(error, KeyError) and error.args else error
+        return f"{type(error).__name__}: {text}".splitlines()[0]
 
 
 def _alternatives(visit: Visit, base: Visit | None = None) -> dict[str, list[str]]:

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import yaml
 from launch import LaunchContext, LaunchDescription, LaunchService
 from launch.actions import (
     DeclareLaunchArgument,
@@ -306,10 +307,13 @@ def _components(action: Any) -> Iterable[Any]:
 
 def main(report: Path, path: str, arguments: list[str]) -> None:
     """Visit a launch file, write the report, and end the process."""
+    # launch_ros reads each parameter file several times for each node, slowly.
+    yaml.SafeLoader = yaml.CSafeLoader  # type: ignore[misc, assignment]
     given = dict(text.split(":=", 1) for text in arguments)
     environment = dict(os.environ)
 
     def visit(values: Mapping[str, str]) -> dict[str, Any]:
+        report.with_name("progress").touch()
         os.environ.clear()  # the launch file may have set variables
         os.environ.update(environment)
         return _visited(path, values)

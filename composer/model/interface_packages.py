@@ -43,6 +43,21 @@ def _debian_name(package: str) -> str:
     return f"ros-jazzy-{package.replace('_', '-')}"
 
 
+#: Where PyPI has another name for a module that robots often import: another package, or none, has
+#: the name of the module.
+_DISTRIBUTIONS = {
+    "can": "python-can",
+    "cv2": "opencv-python",
+    "PIL": "pillow",
+    "RPi": "RPi.GPIO",
+    "serial": "pyserial",
+    "sklearn": "scikit-learn",
+    "usb": "pyusb",
+    "yaml": "pyyaml",
+    "zmq": "pyzmq",
+}
+
+
 def how_to_build(package: str, folder: Path | None) -> str:
     """Return the command that builds and installs ``package``; ``folder`` has its source, if known.
 
@@ -64,5 +79,7 @@ def how_to_get(module: str) -> str:
     package = module.partition(".")[0]
     if package in Bundle().packages():
         return how_to_build(package, None)
+    if package in _DISTRIBUTIONS:
+        return f"pip install {_DISTRIBUTIONS[package]}"
     by_apt = f"apt install {_debian_name(package)}, or build it in a workspace"
     return f"pip install {package}   or, if it is a package of ROS: {by_apt}"

@@ -10,12 +10,13 @@ from typing import Any
 from composer.base.characters import escape_lines
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
 from composer.bridges.importing.writing import free_name
-from composer.language.document.scalars import resolve_plain
+from composer.language.document.scalars import NumberRefused, resolve_plain
 from composer.language.expressions import compile_expression
 from composer.language.tree import Plain
 from composer.launch.variants import (
     condition,
     identifier,
+    inner_sections,
     is_switch,
     mark,
     marked_names,
@@ -40,11 +41,15 @@ def describe_launch_file(
 
     ``report`` are its visits, see :func:`composer.launch.variants.all_visits`.
     """
-    left_out = [text for visit in report["visits"] for text in visit["left_out"]]
+    visits = report["visits"]
+    left_out = [text for visit in visits for text in visit["left_out"]]
     left_out += (
         f"argument {argument}: the system has its value, and cannot change it"
-        for argument in report["resolved"]
+        + (f": {problem}" if problem else "")
+        for argument, problem in report["resolved"].items()
     )
+    lost: list[str] = []
+    sections = _sections([item for visit in visits for item in visit["nodes"]], lost)
     items = [*_items(report)]
     names_in_use = _names_in_use(report["arguments"], items)
     arguments = [item for item in report["arguments"] if item["name"] in names_in_use]
@@ -58,7 +63,7 @@ def describe_launch_file(
         _node(item, node_name, left_out) for item, node_name in zip(items, names, strict=True)
     )
     nodes += tuple(_external_containers(nodes))
-    sections = _sections(report["base"], left_out)
+    left_out += lost
     command = " ".join(["compose import launch", path, *given])
     return FoundSystem(
         name,
@@ -73,30 +78,46 @@ def describe_launch_file(
 def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the nodes of all visits, each with its condition; as few as possible.
 
-    ``present`` are the visits that have it, ``samples`` its parameters without references.
+    ``present`` are the visits that have it, ``samples`` values of its parameters, and
+    ``sections`` the names in its parameter files.
     """
     visits = report["visits"]
     values = [visit["values"] for visit in visits]
+    defaults = {mark(item["name"]): item["default"] for item in report["arguments"]}
     by_name: dict[tuple[str, ...], dict[int, dict[str, Any]]] = {}
     for number, visit in enumerate(visits):
         counts: Counter[tuple[str, ...]] = Counter()
         for position, item in enumerate(visit["nodes"]):
             name = tuple(str(item[key]) for key in ("namespace", "name", "package", "executable"))
             counts[name] += 1
-            samples = report["base"][position]["parameters"] if number == 0 else {}
+            given = item if number else report["base"][position]
+            item["samples"] = {
+                name: _sample(value, defaults) for name, value in given["parameters"].items()
+            }
             by_name.setdefault((*name, str(counts[name])), {})[number] = item
-            item["samples"] = samples
     for present in by_name.values():
-        samples = {
-            name: value for item in present.values() for name, value in item.pop("samples").items()
-        }
+        samples: dict[str, Any] = {}
+        for item in reversed(present.values()):
+            samples |= item.pop("samples")
+        sections = {name for item in present.values() for name in item.pop("sections")}
         for item, numbers in unified_groups(present, values):
             yield {
                 **item,
+                "sections": sections,
                 "present": frozenset(numbers),
                 "condition": condition(values, numbers),
                 "samples": samples,
             }
+
+
+def _sample(value: Any, defaults: Mapping[str, str]) -> Any:
+    """Return the value of a parameter; the default of an argument if it has the argument's."""
+    if not isinstance(value, str) or value not in defaults:
+        return value
+    try:
+        return resolve_plain(defaults[value])
+    except NumberRefused:
+        return defaults[value]
 
 
 def _names_in_use(
@@ -105,7 +126,7 @@ def _names_in_use(
     """Return the names of the arguments in the descriptions and conditions of nodes."""
     used: set[str] = set()
     for item in items:
-        used |= marked_names({**item, "present": None, "samples": None})
+        used |= marked_names({**item, "present": None, "samples": None, "sections": None})
         for text in item["condition"].values():
             used.update(path.root for path in compile_expression(text).paths)
     return {item["name"] for item in arguments if identifier(item["name"]) in used}
@@ -115,7 +136,7 @@ def _argument(argument: Mapping[str, Any], items: Iterable[Mapping[str, Any]]) -
     """Return the declaration of an argument: its default alone if there is nothing else."""
     reference, default = mark(argument["name"]), argument["default"]
     value: Plain = default
-    choices = argument["choices"]
+    choices = [text for text in argument["choices"] if text in argument["values"]]
     if is_switch([default, *choices, *argument["values"]]):
         value, choices = default.lower() == "true", []
     elif any(
@@ -278,14 +299,8 @@ def _sections(
     Programs may create them. A system has one set of parameters for each name, so what only some
     programs give to that name is left out.
     """
-    named = {join_node_name(item["namespace"], item["name"]) for item in items if item["name"]}
-    given: dict[str, list[Mapping[str, Plain]]] = {}
-    for item in items:
-        for name, values in item["sections"].items():
-            if name not in named:
-                given.setdefault(name, []).append(values)
     found: dict[str, dict[str, Plain]] = {}
-    for name, (first, *others) in given.items():
+    for name, (first, *others) in inner_sections(items).items():
         shared = {
             key: value
             for key, value in first.items()

@@ -268,7 +268,8 @@ def _run_user_process(what: str, module: str, arguments: Sequence[str], timeout_
     """Run a module of the composer; return what it writes to the file that is its first argument.
 
     ``what`` describes it, as in "constructing 'driver:Driver'". The user reads before it runs that
-    it will. Raises CommandError with the last line of its output if it fails or takes too long.
+    it will. The time limit begins again when the process touches the file ``progress`` next to its
+    report. Raises CommandError with the last line of its output if it fails or takes too long.
     """
     say(f"{what}: this runs its code, with all that you may do")
     with tempfile.TemporaryDirectory(prefix="compose-") as folder:
@@ -284,15 +285,21 @@ def _run_user_process(what: str, module: str, arguments: Sequence[str], timeout_
             text=True,
             errors="replace",
         )
-        try:
-            shown, _ = process.communicate(timeout=timeout_s)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.communicate()
-            raise CommandError(
-                f"{what} did not end within {timeout_s:g} s",
-                hint="its code must not wait or spin; --timeout sets another limit",
-            ) from None
+        progress = Path(folder, "progress")
+        while True:
+            touched = progress.stat().st_mtime_ns if progress.exists() else 0
+            try:
+                shown, _ = process.communicate(timeout=timeout_s)
+                break
+            except subprocess.TimeoutExpired:
+                if progress.exists() and progress.stat().st_mtime_ns != touched:
+                    continue
+                os.killpg(process.pid, signal.SIGKILL)
+                process.communicate()
+                raise CommandError(
+                    f"{what} did not end within {timeout_s:g} s",
+                    hint="its code must not wait or spin; --timeout sets another limit",
+                ) from None
         if process.returncode != 0 or not report.is_file():
             if os.environ.get("COMPOSE_DEBUG"):
                 say(shown.rstrip())

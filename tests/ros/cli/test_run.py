@@ -187,6 +187,7 @@ def test_a_missing_interface_package_is_reported_before_the_start(
             "interactive_markers",
             "pip install interactive_markers   or, if it is a package of ROS: apt",
         ),
+        ("can", "pip install python-can\n"),
         ("geographic_msgs.msg", "compose interface build geographic_msgs   or: apt install ros-"),
         ("arm_interfaces.msg", "compose interface build arm_interfaces   or: colcon build"),
     ],

@@ -94,6 +94,21 @@ def test_values_become_references() -> None:
     }
 
 
+def test_a_parameter_of_a_conditional_node_has_the_type_of_the_argument() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        rate = 5.0 if values["rate"] == "5.0" else values["rate"]
+        parameters = {"use_sim_time": values["sim"] == "True", "rate": rate}
+        return [node("view", parameters=parameters)] if values["gui"] == "False" else [node()]
+
+    names = {"gui": "True", "sim": "True", "rate": "5.0"}
+    system, _ = visited(nodes, *[argument(*item) for item in names.items()])
+    assert system["arguments"] == {"gui": True, "sim": True, "rate": 5.0}
+    assert system["nodes"]["view"]["parameters"] == {
+        "use_sim_time": {"type": "bool", "default": "${sim}"},
+        "rate": {"type": "double", "default": "${rate}"},
+    }
+
+
 def test_what_differs_in_another_way_has_a_condition_for_each() -> None:
     def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
         return [node("nav", arguments=["-x"] if values["fast"] == "True" else ["-y", "-z"])]
@@ -149,6 +164,53 @@ def test_what_cannot_be_kept_is_listed() -> None:
         "argument robots: the system has its value, and cannot change it",
         "argument unused: no node depends on it",
     )
+
+
+def test_values_and_combinations_that_fail_are_left_out() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        if values["slam"] == "True":
+            raise KeyError("package 'slam' not found")
+        if values["sim"] == values["gui"] == "true":
+            raise OSError
+        return [node(values["robot"]), *[node(name) for name in ("sim", "gui") if values[name]]]
+
+    def arguments(robot: str) -> list[dict[str, Any]]:
+        switches = [argument(name, "false") for name in ("sim", "gui")]
+        return [argument("slam", "False"), *switches, argument("robot", robot, "r1", "r2", "r3")]
+
+    system, left_out = visited(nodes, *arguments("r1"))
+    assert set(system["arguments"]) == {"robot"}
+    assert left_out == (
+        "argument slam: the system has its value, and cannot change it:"
+        " with 'True', KeyError: package 'slam' not found",
+        "argument gui: the system has its value, and cannot change it",
+        "argument sim: no node depends on it",
+    )
+
+
+@pytest.mark.parametrize("robot", ["r1", ""])
+def test_parameters_of_inner_nodes_do_not_depend_on_arguments(robot: str) -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        inner = {"sim": values["sim"] == "true", "frame": f"{robot and values['robot']}/odom"}
+        sections = {"/costmap": inner} | ({"/map": {}} if values["map"] == "true" else {})
+        return [node(f"base_{values['fast']}_{values['robot']}", sections=sections)]
+
+    names = ("sim", "fast", "map")
+    system, left_out = visited(
+        nodes, argument("robot", "r1"), *[argument(name, "false") for name in names]
+    )
+    kept = {"fast"} if robot else {"fast", "robot"}
+    assert set(system["arguments"]) == kept
+    fixed = "argument {}: the system has its value, and cannot change it: {}"
+    expected = [
+        fixed.format("sim", "with 'true', /costmap inside a program has other parameters"),
+        "argument map: no node depends on it",
+        "parameters of /costmap: with --output, a file has them",
+    ]
+    if robot:
+        dependent = "nodes inside a program have parameters that depend on it"
+        expected.insert(0, fixed.format("robot", dependent))
+    assert [text for text in left_out if text in expected] == expected[:-1]
 
 
 def test_constants_that_are_compared_and_choices_are_tried(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def node(name: str | None = "base", **changes: Any) -> dict[str, Any]:
 def report(*nodes: dict[str, Any], left_out: Sequence[str] = ()) -> dict[str, Any]:
     """Return the report of one visit."""
     visit = {"values": {}, "nodes": [dict(item) for item in nodes], "left_out": left_out}
-    return {"arguments": [], "visits": [visit], "base": list(nodes), "resolved": []}
+    return {"arguments": [], "visits": [visit], "base": list(nodes), "resolved": {}}
 
 
 def described(*nodes: dict[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
