@@ -112,12 +112,15 @@ def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _sample(value: Any, defaults: Mapping[str, str]) -> Any:
     """Return the value of a parameter; the default of an argument if it has the argument's."""
-    if not isinstance(value, str) or value not in defaults:
-        return value
+    default = defaults.get(value) if isinstance(value, str) else None
+    return value if default is None else _typed(default)
+
+
+def _typed(default: str) -> Plain:
     try:
-        return resolve_plain(defaults[value])
+        return resolve_plain(default) if default else default
     except NumberRefused:
-        return defaults[value]
+        return default
 
 
 def _names_in_use(
@@ -145,7 +148,7 @@ def _argument(argument: Mapping[str, Any], items: Iterable[Mapping[str, Any]]) -
         for name, sample in item["samples"].items()
         if not isinstance(sample, str)
     ):
-        value = resolve_plain(default)
+        value = _typed(default)
     declared: dict[str, Plain] = {"default": value}
     if choices:
         declared["choices"] = choices

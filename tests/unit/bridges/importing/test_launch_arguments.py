@@ -97,15 +97,16 @@ def test_values_become_references() -> None:
 def test_a_parameter_of_a_conditional_node_has_the_type_of_the_argument() -> None:
     def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
         rate = 5.0 if values["rate"] == "5.0" else values["rate"]
-        parameters = {"use_sim_time": values["sim"] == "True", "rate": rate}
+        parameters = {"use_sim_time": values["sim"] == "True", "rate": rate, "key": values["key"]}
         return [node("view", parameters=parameters)] if values["gui"] == "False" else [node()]
 
-    names = {"gui": "True", "sim": "True", "rate": "5.0"}
+    names = {"gui": "True", "sim": "True", "rate": "5.0", "key": ""}
     system, _ = visited(nodes, *[argument(*item) for item in names.items()])
-    assert system["arguments"] == {"gui": True, "sim": True, "rate": 5.0}
+    assert system["arguments"] == {"gui": True, "sim": True, "rate": 5.0, "key": ""}
     assert system["nodes"]["view"]["parameters"] == {
         "use_sim_time": {"type": "bool", "default": "${sim}"},
         "rate": {"type": "double", "default": "${rate}"},
+        "key": {"type": "string", "default": "${key}"},
     }
 
 
