@@ -20,16 +20,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.graph_names import check_all_respond, find_node, not_found_error
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.systems.node_services import NodeServices
+from composer.model.lifecycle import PRIMARY_STATES, next_transition
 
-PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
 _PATTERN = re.compile(r"[*?\[]")
-#: The next transition on the way to a goal state, by goal and current state.
-_NEXT_TRANSITION = {
-    "unconfigured": {"inactive": "cleanup", "active": "deactivate"},
-    "inactive": {"unconfigured": "configure", "active": "deactivate"},
-    "active": {"unconfigured": "configure", "inactive": "activate"},
-    "finalized": dict.fromkeys(("unconfigured", "inactive", "active"), "shutdown"),
-}
 
 
 class TransitionError(RosError):
@@ -150,7 +143,7 @@ class LifecycleClient:
         """
         before = state = self.state(node)
         while state != goal:
-            label = _NEXT_TRANSITION.get(goal, {}).get(state)
+            label = next_transition(state, goal)
             if label is None:
                 raise TransitionError(
                     f"'{goal}' cannot be reached: {node} is {state}",

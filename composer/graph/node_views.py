@@ -24,22 +24,10 @@ from composer.graph.scene import (
     node_key,
 )
 from composer.model import ChannelKind
+from composer.model.lifecycle import PRIMARY_STATES, TRANSITIONS
 
 #: An arrow that stands for more names than these says how many.
 _MAX_NAMES = 3
-
-_STATES = ("unconfigured", "inactive", "active", "finalized")
-
-#: (from, transition, to): design.ros2.org/articles/node_lifecycle.html, primary states only.
-_TRANSITIONS = (
-    ("unconfigured", "configure", "inactive"),
-    ("inactive", "activate", "active"),
-    ("active", "deactivate", "inactive"),
-    ("inactive", "cleanup", "unconfigured"),
-    ("unconfigured", "shutdown", "finalized"),
-    ("inactive", "shutdown", "finalized"),
-    ("active", "shutdown", "finalized"),
-)
 
 #: A state with more nodes than these says how many more there are.
 _MAX_NODES = 24
@@ -135,21 +123,22 @@ def _names_in_short(names: tuple[str, ...], kind: ChannelKind) -> tuple[str, ...
 
 def states_view(scene: Scene) -> Graph:
     """Return the state machine; each state lists the nodes that are in it."""
-    others = sorted({node.state for node in scene.nodes} - {*_STATES, ""})
+    others = sorted({node.state for node in scene.nodes} - {*PRIMARY_STATES, ""})
     return Graph(
         title=scene.title,
         view="states",
         direction=Direction.RIGHT,
-        vertices=tuple(_state(state, scene) for state in (*_STATES, *others)),
+        vertices=tuple(_state(state, scene) for state in (*PRIMARY_STATES, *others)),
         edges=tuple(
             Edge(
-                f"state:{begin} -> state:{end}",
+                f"state:{begin} -> state:{transition.goal}",
                 f"state:{begin}",
-                f"state:{end}",
+                f"state:{transition.goal}",
                 EdgeKind.TRANSITION,
                 (name,),
             )
-            for begin, name, end in _TRANSITIONS
+            for name, transition in TRANSITIONS.items()
+            for begin in transition.ids
         ),
     )
 

@@ -16,6 +16,7 @@ from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, comma
 from composer.cli.support.results import as_json, say_none_found
 from composer.cli.support.ros import require_ros, ros_session
 from composer.cli.support.terminal import columns, lines, say, write
+from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:
     from composer.client.systems.lifecycle_batch import LifecycleBatch
@@ -29,12 +30,11 @@ lifecycle_app = command_group(
     """
 )
 
-_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _EXAMPLE = "for example: compose lifecycle set planner deactivate"
 
 
 def _complete_word(incomplete: str) -> list[str]:
-    transitions = [name for name in _TRANSITIONS if incomplete and name.startswith(incomplete)]
+    transitions = [name for name in TRANSITIONS if incomplete and name.startswith(incomplete)]
     return [*complete_node(incomplete), *transitions]
 
 
@@ -208,7 +208,7 @@ def _split(words: list[str], to: GoalState | None) -> tuple[list[str], str | Non
             raise UsageError("specify a transition, or a state with --to", hint=_EXAMPLE)
         transition = words.pop()
     if not words:
-        if transition is None or transition in _TRANSITIONS:
+        if transition is None or transition in TRANSITIONS:
             raise UsageError("specify nodes", hint=_EXAMPLE)
         raise UsageError(f"specify a transition of '{transition}'", hint=_EXAMPLE)
     return words, transition

@@ -9,17 +9,10 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.lifecycle import CompletedTransition, LifecycleClient
 from composer.client.session import Deadline, RosError, Session
 from composer.client.systems.managers import Systems
+from composer.model.lifecycle import TRANSITIONS
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 
-#: The goal of each transition, by the state in which it is available.
-_GOALS = {
-    "configure": {"unconfigured": "inactive"},
-    "activate": {"inactive": "active"},
-    "deactivate": {"active": "inactive"},
-    "cleanup": {"inactive": "unconfigured"},
-    "shutdown": dict.fromkeys(("unconfigured", "inactive", "active"), "finalized"),
-}
 #: Managers publish their last report to each new subscription, and again every second.
 _REPORT_WITHIN_S = 2.0
 _RANK = {"finalized": -1, "unconfigured": 0, "inactive": 1, "active": 2}
@@ -36,7 +29,8 @@ class LifecycleRequest:
         """Return the goal for a node in ``state``; None if the transition is not available."""
         if self.state is not None:
             return self.state
-        return _GOALS.get(self.transition or "", {}).get(state)
+        wanted = TRANSITIONS.get(self.transition or "")
+        return wanted.goal if wanted is not None and state in wanted.ids else None
 
 
 @dataclass(frozen=True, slots=True)

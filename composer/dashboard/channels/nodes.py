@@ -15,6 +15,7 @@ from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe, to_json
 from composer.dashboard.protocol.outbox import Update
+from composer.model.lifecycle import available_transitions
 from composer.model.qos import QosProfile
 from composer.runtime.process.computer import ProcessUsage, process_usage
 
@@ -34,11 +35,6 @@ _FIRST_USAGE_PERIOD_S = 0.8
 #: Reports arrive a little earlier or later than after a second.
 _EARLY = 0.8
 COMMANDS = ("startup", "pause", "resume", "reset", "shutdown")
-_TRANSITIONS = {
-    "unconfigured": ["configure", "shutdown"],
-    "inactive": ["activate", "cleanup", "shutdown"],
-    "active": ["deactivate", "shutdown"],
-}
 #: What is shown of a report. Counts of messages by topic are for the graph.
 _SHOWN = (
     *("state", "desired", "since_s", "restarts", "errors", "last_error", "held_down", "condition"),
@@ -125,7 +121,7 @@ class NodesFeed(Feed):
             "system": system,
             **{key: getattr(node, key) for key in _SHOWN},
             "usage": self._usage.get(node.pid) if node.host == self._host else None,
-            "transitions": _TRANSITIONS.get(node.state, []),
+            "transitions": list(available_transitions(node.state)),
             "declared_at": self._declared_at(node.node),
         }
 
@@ -134,7 +130,7 @@ class NodesFeed(Feed):
             "name": node,
             "system": None,
             "state": state,
-            "transitions": _TRANSITIONS.get(state or "", []),
+            "transitions": list(available_transitions(state or "")),
             "declared_at": self._declared_at(node),
         }
 

@@ -11,13 +11,13 @@ from composer.dashboard.channels.topics import shown_qos
 from composer.dashboard.context import Dashboard, Prepared
 from composer.dashboard.declared import required
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe
+from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline
     from composer.client.systems.lifecycle_batch import NodeOutcome
     from composer.dashboard.observing.ros_graph import RosGraph
 
-_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
 _READ_S = 5.0
 _CHANGE_S = 20.0
 #: As long as the transitions of a node may take by default, with a margin.
@@ -115,7 +115,7 @@ def drift(_: Values, dashboard: Dashboard) -> Prepared:
 
 def transition(values: Values, _: Dashboard) -> Prepared:
     """Request a transition of a node, on request together with its dependents."""
-    name, label = values.text("node"), values.choice("transition", _TRANSITIONS)
+    name, label = values.text("node"), values.choice("transition", tuple(TRANSITIONS))
     dependents = values.flag("dependents")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:

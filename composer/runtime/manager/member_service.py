@@ -18,13 +18,13 @@ from lifecycle_msgs.msg import State, Transition, TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
 from composer.base.fast_dataclass import dataclass
+from composer.model.lifecycle import FINALIZED, TRANSITIONS
 from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.lives import REPORTS_WITHIN_S
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import (
-    FINALIZED,
     InProcessNode,
     ManagedNode,
     TransitionOutcome,
@@ -54,14 +54,6 @@ _LIFECYCLE_SERVICES: Mapping[str, Any] = {
     "get_state": GetState,
     "get_available_transitions": GetAvailableTransitions,
     "change_state": ChangeState,
-}
-#: The state in which a transition runs, by its label.
-_DURING = {
-    "configure": "configuring",
-    "cleanup": "cleaningup",
-    "activate": "activating",
-    "deactivate": "deactivating",
-    "shutdown": "shuttingdown",
 }
 
 
@@ -101,7 +93,7 @@ async def _lifecycle_response(node: ManagedNode, request: Any) -> Any:
         TransitionDescription(
             transition=Transition(id=number, label=label),
             start_state=State(label=node.state),
-            goal_state=State(label=_DURING[label]),
+            goal_state=State(label=TRANSITIONS[label].during),
         )
         for label, number in node.lifecycle.available.items()
     ]

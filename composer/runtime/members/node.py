@@ -9,22 +9,28 @@ from functools import partial
 from typing import Any
 
 from composer.model import Node
+from composer.model.lifecycle import (
+    ACTIVE,
+    FINALIZED,
+    INACTIVE,
+    PRIMARY_STATES,
+    TRANSITIONS,
+    UNCONFIGURED,
+    last_transition,
+)
 from composer.plan import Condition
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import within
 from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
-from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES, TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import (
-    ACTIVE,
-    INACTIVE,
-    UNCONFIGURED,
     OutsideContext,
     OutsideNode,
     TransitionRefused,
 )
-from composer.runtime.outside_nodes.remote_node import DONE_IN, GOALS
+from composer.runtime.outside_nodes.remote_node import DONE_IN
 from composer.runtime.protocol.reports import NodeReport
 from composer.runtime.protocol.requests import CREATE, StepResult
 
@@ -174,7 +180,7 @@ class MemberNode(OutsideNode):
             return  # a process that was not started here may be used again
         if self._reported in DONE_IN[transition]:
             return
-        goal, reported = GOALS[transition], Future[None]()
+        goal, reported = TRANSITIONS[transition].goal, Future[None]()
         self._awaited = goal, reported
         try:
             result = self._process.request(self.full_name, transition, self._after)
@@ -309,12 +315,7 @@ class MemberNode(OutsideNode):
             self._listener.on_transition_end(outcome)
             self._listener.on_returned()
             return
-        transition = {
-            UNCONFIGURED: "cleanup",
-            INACTIVE: "deactivate" if self._state == ACTIVE else "configure",
-            ACTIVE: "activate",
-            FINALIZED: "shutdown",
-        }[state]
+        transition = last_transition(self._state, state)
         self._state = state
         self.activations += state == ACTIVE
         self._listener.on_transition_end(TransitionOutcome(transition, state, success=True))

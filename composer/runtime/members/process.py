@@ -16,6 +16,7 @@ from dataclasses import replace
 from functools import partial
 
 from composer.model import LogLevel, Process
+from composer.model.lifecycle import FINALIZED, PRIMARY_STATES
 from composer.model.names import PROGRAM_LOGGER
 from composer.plan import SystemGoals
 from composer.runtime.children.child_processes import Child, StartFailed
@@ -36,7 +37,6 @@ from composer.runtime.members.lives import (
     NodeFigures,
 )
 from composer.runtime.members.requests import MemberRequests
-from composer.runtime.node.managed_node import FINALIZED, PRIMARY_STATES
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
 from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import NAME, REQUEST, StepResult

@@ -16,6 +16,7 @@ from typing import Any, Protocol, TypeVar
 from rclpy.node import Node as RosNode
 
 from composer.model import Node
+from composer.model.lifecycle import FINALIZED
 from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
@@ -26,7 +27,7 @@ from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
-from composer.runtime.node.managed_node import FINALIZED, NodeListener, TransitionOutcome
+from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime

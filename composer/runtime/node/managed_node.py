@@ -14,11 +14,6 @@ if TYPE_CHECKING:  # tests of the supervision run without ROS
     from composer.runtime.executors.loop import Loop
     from composer.runtime.node.parameter_services import ParameterServices
 
-#: The label of the state that a node cannot leave.
-FINALIZED = "finalized"
-#: The labels of the states between transitions.
-PRIMARY_STATES = ("unconfigured", "inactive", "active", FINALIZED)
-
 
 @dataclass(frozen=True, slots=True)
 class TransitionOutcome:

@@ -11,16 +11,14 @@ from rclpy.parameter import Parameter as RosParameter
 
 from composer.model import Component, LogLevel, Node
 from composer.model.interface_packages import COMPOSITION, how_to_build
+from composer.model.lifecycle import ACTIVE, FINALIZED, UNCONFIGURED
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.command_line import remappings
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.node.managed_node import FINALIZED
 from composer.runtime.node.parameters import parameter_message
 from composer.runtime.outside_nodes.external_node import PERIOD_S
 from composer.runtime.outside_nodes.outside_node import (
-    ACTIVE,
-    UNCONFIGURED,
     OutsideContext,
     OutsideNode,
     TransitionRefused,

@@ -10,14 +10,13 @@ from typing import Any
 
 from composer.base.regular_files import write_whole
 from composer.model import Executable, ExecutableKind, LogLevel, Node
+from composer.model.lifecycle import INACTIVE, UNCONFIGURED
 from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
 from composer.runtime.children.output import attribute_line
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.outside_nodes.outside_node import (
-    INACTIVE,
-    UNCONFIGURED,
     OutsideContext,
     TransitionRefused,
     elsewhere_text,

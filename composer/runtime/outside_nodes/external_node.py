@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from composer.model import External, Node
+from composer.model.lifecycle import ACTIVE, INACTIVE, TRANSITIONS, UNCONFIGURED
 from composer.runtime.outside_nodes.outside_node import (
-    ACTIVE,
-    INACTIVE,
-    UNCONFIGURED,
     OutsideContext,
     OutsideNode,
     TransitionRefused,
@@ -18,13 +16,6 @@ from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered
 #: How often an external node is looked for.
 PERIOD_S = 0.5
 _NOTHING_EARLIER: frozenset[bytes] = frozenset()
-#: The states of the node itself in which its service is asked for a transition.
-_STARTS = {
-    "configure": UNCONFIGURED,
-    "activate": INACTIVE,
-    "deactivate": ACTIVE,
-    "cleanup": INACTIVE,
-}
 
 
 class ExternalNode(OutsideNode):
@@ -88,7 +79,9 @@ class ExternalNode(OutsideNode):
         end_s = self.loop.clock.monotonic() + self._timeout_s
         try:
             state = await self._remote.state(end_s)
-            if state == _STARTS[transition]:  # otherwise, something else has moved it already
+            if (
+                state in TRANSITIONS[transition].ids
+            ):  # otherwise, something else has moved it already
                 success, state = await self._remote.change(transition, end_s)
                 if not success:
                     raise TransitionRefused(f"its service reports a failure; it is {state}", state)

@@ -8,11 +8,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Set
 from typing import Any
 
-from lifecycle_msgs.msg import Transition
 from rclpy.node import Node as RosNode
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, Port
+from composer.model.lifecycle import (
+    ACTIVE,
+    FINALIZED,
+    TRANSITIONS,
+    UNCONFIGURED,
+    available_transitions,
+    last_transition,
+)
 from composer.model.names import split_node_name
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.exceptions import describe
@@ -21,38 +28,15 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import (
-    FINALIZED,
     ManagedNode,
     NodeListener,
     TransitionOutcome,
 )
-from composer.runtime.outside_nodes.remote_node import DONE_IN, GOALS
+from composer.runtime.outside_nodes.remote_node import DONE_IN
 
-UNCONFIGURED, INACTIVE, ACTIVE = "unconfigured", "inactive", "active"
-_DURING = {
-    "configure": "configuring",
-    "activate": "activating",
-    "deactivate": "deactivating",
-    "cleanup": "cleaningup",
-    "shutdown": "shuttingdown",
-}
-_TRANSITIONS = {state: transition for transition, state in _DURING.items()}
+#: The transitions by the states in which they run.
+_BY_DURING = {item.during: name for name, item in TRANSITIONS.items()}
 _AFTER_ERROR = "errorprocessing"
-_AVAILABLE: dict[str, Mapping[str, int]] = {
-    UNCONFIGURED: {
-        "configure": Transition.TRANSITION_CONFIGURE,
-        "shutdown": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
-    },
-    INACTIVE: {
-        "activate": Transition.TRANSITION_ACTIVATE,
-        "cleanup": Transition.TRANSITION_CLEANUP,
-        "shutdown": Transition.TRANSITION_INACTIVE_SHUTDOWN,
-    },
-    ACTIVE: {
-        "deactivate": Transition.TRANSITION_DEACTIVATE,
-        "shutdown": Transition.TRANSITION_ACTIVE_SHUTDOWN,
-    },
-}
 _POLL_S = 0.02
 _MAX_MISSING = 3
 
@@ -180,7 +164,7 @@ class OutsideNode(ABC):
     @property
     def available(self) -> Mapping[str, int]:
         """The ids of the transitions that can be requested now, by name."""
-        return _AVAILABLE.get(self._state, {})
+        return available_transitions(self._state)
 
     async def change(self, transition: str) -> TransitionOutcome:
         """Run an external ``transition`` as soon as no other one runs. Raises nothing."""
@@ -217,11 +201,11 @@ class OutsideNode(ABC):
             reason = f"refused: the node is {start}; available transitions: {names}"
             return TransitionOutcome(transition, start, success=False, reason=reason)
         self.transition_started_s = self.loop.clock.monotonic()
-        self._state = _DURING[transition]
+        self._state = TRANSITIONS[transition].during
         state, reason = start, "its executor has stopped"
         try:
             await self._work(transition)
-            state, reason = GOALS[transition], ""
+            state, reason = TRANSITIONS[transition].goal, ""
         except TransitionRefused as refusal:
             state, reason = refusal.state, str(refusal)
         except Cancelled:
@@ -255,7 +239,7 @@ class OutsideNode(ABC):
         """Follow a transition that another tool has requested from the node itself."""
         if self._lock.is_held or self._state in (state, FINALIZED):
             return
-        transition = _TRANSITIONS.get(start) or _transition_between(self._state, state)
+        transition = _BY_DURING.get(start) or last_transition(self._state, state)
         success = start != _AFTER_ERROR and state in DONE_IN[transition]
         reason = "" if success else "a transition that another tool requested has failed"
         self._state = state
@@ -276,13 +260,6 @@ class OutsideNode(ABC):
                 return False
             await sleep(self.loop, _POLL_S)
         return True
-
-
-def _transition_between(before: str, after: str) -> str:
-    """Return the last transition on the way from one primary state to another."""
-    if after == INACTIVE:
-        return "deactivate" if before == ACTIVE else "configure"
-    return {UNCONFIGURED: "cleanup", ACTIVE: "activate", FINALIZED: "shutdown"}[after]
 
 
 def missing_text(ports: Iterable[Port]) -> str:

@@ -12,12 +12,12 @@ from rclpy.node import Node as RosNode
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from composer.model import Node, Port, PortKind
+from composer.model.lifecycle import PRIMARY_STATES, TRANSITIONS
 from composer.model.names import join_node_name, split_node_name
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.middleware.dds_participants import is_in_group
-from composer.runtime.node.managed_node import PRIMARY_STATES
 from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.
@@ -132,14 +132,6 @@ _POLL_S = 0.02
 _SOON_S = 0.02
 _EVENTS_DEPTH = 20
 _CONFIRMED_WITHIN_S = 5.0
-#: The state in which each transition ends if it succeeds.
-GOALS = {
-    "configure": "inactive",
-    "activate": "active",
-    "deactivate": "inactive",
-    "cleanup": "unconfigured",
-    "shutdown": "finalized",
-}
 #: The states of a node in another process of the system in which each transition has nothing to do:
 #: a process that ran before the coordinating one keeps its nodes as they are.
 DONE_IN = {
@@ -262,7 +254,7 @@ class RemoteLifecycle(RemoteServices):
                 if response is None:
                     after = await self._settled(end_s)
                     if after != before:  # the response was lost, not the request
-                        return after == GOALS[transition], after
+                        return after == TRANSITIONS[transition].goal, after
                     response = await self._response(future, end_s)  # it may be on its way
             finally:
                 self._change_state.remove_pending_request(future)

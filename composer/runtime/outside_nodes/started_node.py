@@ -8,10 +8,9 @@ from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 from composer.model import Node, Outside
+from composer.model.lifecycle import INACTIVE, UNCONFIGURED
 from composer.runtime.executors.futures import Future
 from composer.runtime.outside_nodes.outside_node import (
-    INACTIVE,
-    UNCONFIGURED,
     OutsideContext,
     OutsideNode,
     TransitionRefused,

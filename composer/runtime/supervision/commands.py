@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import PrimaryState, System
+from composer.model.lifecycle import FINALIZED
 from composer.plan import (
     blocked_nodes,
     optional_nodes,
@@ -24,7 +25,6 @@ from composer.plan import (
     start_causes,
     start_goals,
 )
-from composer.runtime.node.managed_node import FINALIZED
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor

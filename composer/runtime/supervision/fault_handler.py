@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 
 from composer.model import OnFailure, PrimaryState
+from composer.model.lifecycle import FINALIZED
 from composer.plan import Decision, DesiredState, Fault, FaultKind, Plan, Restart, Step, decide
-from composer.runtime.node.managed_node import FINALIZED
 from composer.runtime.supervision.events import NodeFailed
 from composer.runtime.supervision.main_queue import LoopRecovered
 from composer.runtime.supervision.phases import ExecutionOptions

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from composer.model import LogLevel, Node, PrimaryState
+from composer.model.lifecycle import FINALIZED
 from composer.plan import Fault, FaultKind
-from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision import events
 from composer.runtime.supervision.main_queue import (
     Item,

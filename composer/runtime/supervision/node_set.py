@@ -10,17 +10,14 @@ from composer.model import (
     PrimaryState,
     System,
 )
+from composer.model.lifecycle import FINALIZED
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.placement import place_threads
 from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.members.node import MemberNode
 from composer.runtime.metrics.figures import chain_figures, figures
-from composer.runtime.node.managed_node import (
-    FINALIZED,
-    ManagedNode,
-    TransitionOutcome,
-)
+from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameters import ParameterError
 from composer.runtime.outside_nodes.external_node import ExternalNode
