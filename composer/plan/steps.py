@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import DependencyEdge
+from composer.model.lifecycle import FINALIZED, TRANSITIONS
 
 TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
 
@@ -44,12 +45,9 @@ class Step:
 
 
 #: The state in which each transition ends; shutdown leaves the primary states of a plan.
-_REACHED = {
-    "configure": PrimaryState.INACTIVE,
-    "activate": PrimaryState.ACTIVE,
-    "deactivate": PrimaryState.INACTIVE,
-    "cleanup": PrimaryState.UNCONFIGURED,
-    "shutdown": PrimaryState.UNCONFIGURED,
+REACHED = {
+    name: PrimaryState.UNCONFIGURED if item.goal == FINALIZED else PrimaryState(item.goal)
+    for name, item in TRANSITIONS.items()
 }
 
 
@@ -71,7 +69,7 @@ class Plan:
 
     def states_after(self, states: Mapping[str, PrimaryState]) -> Mapping[str, PrimaryState]:
         """Return the states to which the plan leads from ``states``, by the keys of nodes."""
-        reached = {step.node: _REACHED[step.transition] for step in self.steps}
+        reached = {step.node: REACHED[step.transition] for step in self.steps}
         return {**states, **reached}
 
     def __str__(self) -> str:

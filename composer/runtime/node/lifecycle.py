@@ -23,6 +23,7 @@ from rclpy.service import Service
 from rclpy.type_support import check_is_valid_srv_type
 
 from composer.behavior import TransitionFailed
+from composer.model.lifecycle import TRANSITIONS
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.exceptions import (
     describe,
@@ -38,15 +39,7 @@ from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
 
-_NAMES = {
-    Transition.TRANSITION_CONFIGURE: "configure",
-    Transition.TRANSITION_CLEANUP: "cleanup",
-    Transition.TRANSITION_ACTIVATE: "activate",
-    Transition.TRANSITION_DEACTIVATE: "deactivate",
-    Transition.TRANSITION_UNCONFIGURED_SHUTDOWN: "shutdown",
-    Transition.TRANSITION_INACTIVE_SHUTDOWN: "shutdown",
-    Transition.TRANSITION_ACTIVE_SHUTDOWN: "shutdown",
-}
+_NAMES = {number: name for name, item in TRANSITIONS.items() for number in item.ids.values()}
 _Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
 _LABEL_LENGTH = 80
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"

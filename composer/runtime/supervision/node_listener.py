@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from composer.model import LogLevel, Node, PrimaryState
-from composer.model.lifecycle import FINALIZED
+from composer.model.lifecycle import FINALIZED, TRANSITIONS
 from composer.plan import Fault, FaultKind
+from composer.plan.steps import REACHED
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision import events
 from composer.runtime.supervision.main_queue import (
@@ -16,14 +17,6 @@ from composer.runtime.supervision.main_queue import (
 )
 from composer.runtime.supervision.status import Status
 
-#: The state that each transition ends in if it succeeds, and the goal that it sets.
-_GOALS = {
-    "configure": (PrimaryState.INACTIVE, PrimaryState.INACTIVE),
-    "activate": (PrimaryState.ACTIVE, PrimaryState.ACTIVE),
-    "deactivate": (PrimaryState.INACTIVE, PrimaryState.INACTIVE),
-    "cleanup": (PrimaryState.UNCONFIGURED, PrimaryState.UNCONFIGURED),
-    "shutdown": (FINALIZED, PrimaryState.UNCONFIGURED),
-}
 _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
@@ -66,8 +59,8 @@ class SupervisionListener:
     def _record(self, result: TransitionOutcome) -> Item:
         """Record an external transition; return the item for the supervisor."""
         name = self._name
-        goal_state, goal = _GOALS[result.transition]
-        if result.state == goal_state:
+        if result.state == TRANSITIONS[result.transition].goal:
+            goal = REACHED[result.transition]
             self._desired.update(lambda desired: desired.move(name, goal))
         elif result.state in _DOWN:
             text = f"{result.transition} ended in an error: {result.reason}"
