@@ -106,10 +106,7 @@ class SharedSession(Session):
         self, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
     ) -> SampledTopic:
         """Subscribe to a topic. Raises InvalidValueError if the type is not installed."""
-        subscription = self._messages.create_subscription(
-            class_of(type_name), topic, _ignore, rclpy_profile(qos), raw=raw
-        )
-        return SampledTopic(self._messages, subscription, raw=raw)
+        return SampledTopic(self._messages, topic, type_name, qos, raw=raw)
 
     def _spin(self) -> None:
         while self._is_open:
@@ -147,9 +144,13 @@ class Sample:
 class SampledTopic:
     """A subscription whose messages are taken on request; QoS limits what waits meanwhile."""
 
-    def __init__(self, node: Node, subscription: Subscription, *, raw: bool) -> None:
+    def __init__(
+        self, node: Node, topic: str, type_name: str, qos: QosProfile, *, raw: bool
+    ) -> None:
         self._node = node
-        self._subscription = subscription
+        self._subscription = node.create_subscription(
+            class_of(type_name), topic, _ignore, rclpy_profile(qos), raw=raw
+        )
         self._raw = raw
 
     def take(self, limit: int) -> list[Sample]:

@@ -9,7 +9,7 @@ from typing import Any, Self
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
 
-from composer.client.messages.rates import RateMeter
+from composer.client.messages.rates import measure_rates
 from composer.client.session import Deadline, Session
 from composer.client.systems.node_services import NodeServices
 from composer.language.tree import Plain
@@ -69,8 +69,8 @@ class GraphObserver:
         """
         if measure_s <= 0.0:
             return {}
-        with RateMeter(self._session, visible_topics(self._session.graph)) as meter:
-            return meter.measure(min(measure_s, deadline.left_s))
+        topics = visible_topics(self._session.graph)
+        return measure_rates(self._session, topics, min(measure_s, deadline.left_s))
 
     def _states(self, nodes: Collection[str], deadline: Deadline) -> dict[str, str | None]:
         responses = self._responses(nodes, "get_state", GetState, deadline)
