@@ -140,14 +140,9 @@ class Host:
 
         Raises StartRefused if the environment does not allow a start, or the system runs already.
         """
-        is_virtual = self._clock.is_virtual
-        if is_virtual:
-            check_virtual_time(self._system)
-            os.environ.update(ISOLATION)
-        seed = 0 if is_virtual and self._options.seed is None else self._options.seed
-        if seed is not None:
-            use_seed(seed)
-        discovery = None if is_virtual else self._system.discovery
+        self._prepare_clock()
+        is_isolated = self._clock.is_isolated
+        discovery = None if is_isolated else self._system.discovery
         prepare_environment(discovery)
         if self._end.uses_fast_exit:
             use_large_system_profile(os.environ)
@@ -166,11 +161,11 @@ class Host:
         wait = partial(queue.wait, lambda: queue.stopping, stoppable=True)
         servers = discovery_servers(discovery, os.environ, self._reporter.log, wait)
         variables = active_variables(discovery, os.environ)
-        # A run in virtual time is isolated: the same system may run at the same time.
-        context: AbstractContextManager[None] = outside_calls(self._warn)
-        if not is_virtual:
-            context = hold_instance_lock(namespace, variables, self._report_key)
-        with context, signals, servers:
+        watched = outside_calls(self._warn) if self._clock.is_virtual else nullcontext()
+        lock: AbstractContextManager[None] = nullcontext()
+        if not is_isolated:  # otherwise the same system may run at the same time
+            lock = hold_instance_lock(namespace, variables, self._report_key)
+        with lock, signals, servers, watched:
             self._limits.limit_start()
             try:
                 with self._segment():
@@ -182,6 +177,17 @@ class Host:
                 if not self._end.has_left_graph:  # otherwise there is nothing left to shut down
                     try_shutdown()
         return self._end.outcome(has_failed=self._failed)
+
+    def _prepare_clock(self) -> None:
+        """Prepare what the time of the run asks for. Raises StartRefused."""
+        seed = self._options.seed
+        if self._clock.is_virtual:
+            check_virtual_time(self._system)
+            seed = seed or 0
+        if self._clock.is_isolated:
+            os.environ.update(ISOLATION)
+        if seed is not None:
+            use_seed(seed)
 
     def _segment(self) -> AbstractContextManager[None]:
         """Return the block in which this process joins the ROS graph."""

@@ -9,7 +9,6 @@ import signal
 import sys
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
-from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -38,6 +37,7 @@ from composer.cli.support.ros import (
     require_modules,
     require_ros,
 )
+from composer.cli.support.run_time import Time, run_clock
 from composer.cli.support.system_arguments import (
     Arguments,
     ShowWarnings,
@@ -50,7 +50,6 @@ from composer.cli.support.terminal import say, write
 if TYPE_CHECKING:
     from composer.model import Process, System
     from composer.plan import Plan
-    from composer.runtime.clock.clock import Clock
     from composer.runtime.host_options import HostOptions
     from composer.runtime.supervision.events import Outcome
 
@@ -68,15 +67,9 @@ EPILOG = examples(
     "compose run pipeline --wait --timeout 10              run in the background",
     "compose run robot.yaml --process perception           run one of its processes alone",
     "compose run pipeline --time virtual --for 60          a minute in a second, always the same",
+    "compose run pipeline --time virtual --speed 10 --publish-clock   ten times as fast, for RViz",
     "compose run pipeline --dashboard                      watch and control it in the browser",
 )
-
-
-class Time(StrEnum):
-    """The values of ``--time``."""
-
-    REAL = "real"
-    VIRTUAL = "virtual"
 
 
 #: The default of ``--timeout`` with ``--wait``.
@@ -113,9 +106,27 @@ def run(
         Time,
         typer.Option(
             help="'virtual' jumps whenever nothing is left to do: the same run every time. "
-            "Needs --for, and nodes of this process only.",
+            "Needs --for or --speed, and nodes of this process only.",
         ),
     ] = Time.REAL,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FACTOR",
+            min=0.001,
+            callback=finite,
+            help="Let virtual time pass this many times as fast as real time.",
+            show_default="no limit",
+        ),
+    ] = None,
+    publish_clock: Annotated[
+        bool,
+        typer.Option(
+            "--publish-clock",
+            help="In virtual time, publish /clock and take part in the ROS graph, which is "
+            "isolated otherwise.",
+        ),
+    ] = False,
     seed: Annotated[
         int | None,
         typer.Option(
@@ -216,7 +227,8 @@ def run(
         print_arguments(system)
         return
     is_part = process is not None
-    _check_options(time, run_for, await_processes and is_part, wait or dashboard or is_part)
+    used = {"--wait": wait, "--process": is_part, "--dashboard": dashboard and not publish_clock}
+    clock = run_clock(time, run_for, speed, publish_clock=publish_clock, used=used)
     from composer.cli.support.c_streams import C_STREAMS
 
     C_STREAMS.redirect()  # before libraries of ROS are loaded
@@ -240,7 +252,7 @@ def run(
         if process is None:
             update_typings(runnable.result.project)
     declared = runnable.system
-    member = None if process is None else _member(declared, process)
+    member = None if process is None else _member(declared, process, await_processes)
     if member is not None:
         os.environ.update({name.value: value for name, value in member.environment})
     part, up, down = _planned(declared, member, autostart)
@@ -275,7 +287,7 @@ def run(
         all_or_nothing=all_or_nothing,
         process=member,
         report_key=os.environ.pop(REPORT_KEY_VARIABLE, ""),  # not for its own children
-        clock=_clock(time),
+        clock=clock,
         seed=seed,
         started_at_s=None if time is Time.VIRTUAL else process_start_s(),
         member_command=() if await_processes else (*compose_command(), "run", system, *start),
@@ -287,10 +299,12 @@ def run(
         raise typer.Exit(outcome.exit_code)
 
 
-def _member(system: System, name: str) -> Process:
+def _member(system: System, name: str, await_processes: bool) -> Process:
     """Return a process of the system by its name."""
     from composer.base.diagnostics import suggestion
 
+    if await_processes:
+        raise UsageError("--await-processes cannot be used with --process, which starts no other")
     found = {process.name.value: process for process in system.processes}
     if name not in found:
         hint = suggestion(name, list(found)) or "the system has no 'processes'"
@@ -392,27 +406,3 @@ def _options(
         end_within=end_within,
         ends_process=True,
     )
-
-
-def _check_options(
-    time: Time, run_for: float | None, awaits_in_part: bool, is_observed: bool
-) -> None:
-    """Raise UsageError for options that have no meaning together."""
-    if awaits_in_part:
-        raise UsageError("--await-processes cannot be used with --process, which starts no other")
-    if time is Time.REAL:
-        return
-    if run_for is None:
-        raise UsageError("--time virtual needs --for: the time would run away")
-    if is_observed:
-        raise UsageError(
-            "--time virtual cannot be used with --wait, --dashboard and --process: the run takes"
-            " part in nothing outside of its process"
-        )
-
-
-def _clock(time: Time) -> Clock:
-    from composer.runtime.clock.clock import COMPUTER
-    from composer.runtime.clock.virtual import VirtualClock
-
-    return VirtualClock() if time is Time.VIRTUAL else COMPUTER

@@ -17,6 +17,8 @@ class Clock(ABC):
 
     #: Whether it jumps, instead of waiting, when nothing is left to do.
     is_virtual = False
+    #: Whether its system has no contact to other processes.
+    is_isolated = False
 
     @abstractmethod
     def monotonic(self) -> float:

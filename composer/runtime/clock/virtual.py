@@ -49,7 +49,14 @@ class VirtualClock(Clock):
 
     is_virtual = True
 
-    def __init__(self) -> None:
+    def __init__(self, speed: float = inf, *, is_isolated: bool = True) -> None:
+        """``speed`` limits how many times as fast as real time the time advances.
+
+        Unless it ``is_isolated``, the system takes part in the ROS graph, and publishes its time.
+        """
+        self.is_isolated = is_isolated
+        self._speed = speed
+        self._pace_from_s: float | None = None  # the time of the computer when the time was 0
         self._now_s = 0.0
         self._waiting: list[_Waiting] = []  # since when they wait, the longest first
         self._members = {get_ident()}
@@ -153,12 +160,24 @@ class VirtualClock(Clock):
                     break
             else:
                 waiting = min(self._waiting, key=lambda waiting: waiting.until_s)
-                if waiting.until_s == inf:
-                    COMPUTER.sleep(_POLL_S)
+                left_s = self._real_s_until(waiting.until_s)
+                if left_s > 0.0:
+                    COMPUTER.sleep(min(left_s, _POLL_S))
                     continue
                 self._jump(waiting.until_s)
             self._waiting.remove(waiting)
             return waiting
+
+    def _real_s_until(self, until_s: float) -> float:
+        """Return the seconds of real time after which the time may jump to ``until_s``."""
+        if until_s == inf:
+            return inf
+        if self._speed == inf:
+            return 0.0
+        real_s = COMPUTER.monotonic()
+        if self._pace_from_s is None:
+            self._pace_from_s = real_s - self._now_s / self._speed
+        return self._pace_from_s + until_s / self._speed - real_s
 
     def _jump(self, to_s: float) -> None:
         if to_s > self._now_s:
@@ -182,8 +201,8 @@ class Wakeup:
         """End the current or the next wait, from any thread or a signal handler."""
         self._is_woken = True
 
-    def wait(self, until_s: float = inf) -> bool:
-        """Wait for a wake-up; return False if ``until_s`` (monotonic) comes first."""
-        is_woken = self._clock.wait_until(lambda: self._is_woken, until_s)
+    def wait(self, until_s: float = inf, is_over: Callable[[], bool] = lambda: False) -> bool:
+        """Wait for a wake-up or ``is_over()``; return False if ``until_s`` comes first."""
+        is_woken = self._clock.wait_until(lambda: self._is_woken or is_over(), until_s)
         self._is_woken = False
         return is_woken

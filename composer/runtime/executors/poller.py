@@ -141,26 +141,35 @@ class Poller:
 
 
 class VirtualPoller:
-    """Waits for wake-ups and points in virtual time. No entity becomes ready: nothing uses DDS."""
+    """Waits for wake-ups and points in virtual time.
+
+    No entity becomes ready in an isolated system, because all messages stay in the process. In
+    others, entities are ready at any time, as external nodes like.
+    """
 
     def __init__(self, clock: VirtualClock) -> None:
         self._wakeup = Wakeup(clock)
         self.wake = self._wakeup.wake
+        self._epoll = None if clock.is_isolated else select.epoll()
 
     def poll(self) -> Ready:
-        """Return what is ready: nothing."""
-        return ()
+        """Return what is ready."""
+        return () if self._epoll is None else self._epoll.poll(0, _MAX_EVENTS)
 
     def register(self, fd: int) -> None:
-        """Do nothing."""
+        """Report ``fd`` from now on while its counter is not zero."""
+        if self._epoll is not None:
+            self._epoll.register(fd, select.EPOLLIN)
 
     def unregister(self, fd: int) -> None:
-        """Do nothing."""
+        """Stop reporting ``fd``. Call it before the file is closed."""
+        if self._epoll is not None:
+            self._epoll.unregister(fd)
 
     def wait(self, until_s: float) -> Ready:
-        """Wait until :meth:`wake` is called or the clock reaches ``until_s``."""
-        self._wakeup.wait(until_s)
-        return ()
+        """Wait until something is ready or the clock reaches ``until_s``; :meth:`wake` ends it."""
+        self._wakeup.wait(until_s, lambda: bool(self.poll()))
+        return self.poll()
 
 
 def poller_for(clock: Clock) -> Poller | VirtualPoller:

@@ -34,7 +34,7 @@ from composer.runtime.node.managed_node import InProcessNode, ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
-from composer.runtime.node_time.sim_time import SimTimeSource
+from composer.runtime.node_time.sim_time import SimTimeSource, publish_clock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import (
@@ -193,7 +193,9 @@ class ManagerNode:
             self._reports.timings,
         )
         self._query_socket: QuerySocket | None = None
-        if not status.clock.is_virtual:
+        if not status.clock.is_isolated:
+            if status.clock.is_virtual:
+                publish_clock(self._node, self._loop)
             self._query_socket = QuerySocket(namespace, queries.answers(), self._on_query_error)
         self._loop.start()
         self._loop.call_every(_PERIOD_S, self._tick)

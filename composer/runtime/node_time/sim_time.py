@@ -231,3 +231,19 @@ class SimTimeSource:
             self._now = now
             for follower in self._followers:
                 follower(now)
+
+
+#: As often as simulators do by default.
+_CLOCK_PERIOD_S = 0.01
+
+
+def publish_clock(node: Node, loop: Loop) -> None:
+    """Publish the time of ``loop`` on /clock, as long as the loop runs."""
+    publisher = node.create_publisher(ClockMessage, CLOCK_TOPIC, _QOS)
+
+    def publish() -> None:
+        now = Time(nanoseconds=loop.clock.time_ns())
+        publisher.publish(ClockMessage(clock=now.to_msg()))
+
+    loop.call_soon(publish)
+    loop.call_every(_CLOCK_PERIOD_S, publish)

@@ -118,6 +118,14 @@ def test_other_threads_can_wake_a_system_that_waits_forever() -> None:
     assert not other.is_alive()
 
 
+def test_the_speed_is_a_limit() -> None:
+    clock = VirtualClock(speed=20.0)
+    before_s = time.monotonic()
+    run(clock, lambda: [clock.sleep(0.5) for _ in range(4)] and None, lambda: clock.sleep(1.0))
+    assert clock.monotonic() == 2.0
+    assert 0.1 <= time.monotonic() - before_s < 5.0
+
+
 def test_followers_see_each_jump() -> None:
     clock = VirtualClock()
     seen: list[int] = []
