@@ -12,7 +12,7 @@ from typing import Any
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import SystemGoals, optional_nodes, start_goals
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.metrics.message_rate import CountedRate
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.protocol.reports import NodeReport, SystemReport
@@ -59,7 +59,7 @@ class Status:
         self._changed: Callable[[], None] = lambda: None
         self._statistics: Mapping[str, Statistics] = {}
         self._reported: Mapping[str, Mapping[str, Any]] = {}
-        now_s = clock.time()
+        now_s = COMPUTER.time()  # as the readers of reports have it
         models = {node.name.value: node for node in system.nodes}
         self._rates = {name: _NodeRates(clock) for name, node in models.items() if node.in_process}
         self._topics = {
@@ -147,7 +147,7 @@ class Status:
 
     def set_state(self, name: str, state: str) -> None:
         """Set the state of a node."""
-        self._change(name, state=state, since_s=self.clock.time())
+        self._change(name, state=state, since_s=COMPUTER.time())
 
     def update_states(self, states: Mapping[str, str]) -> None:
         """Set observed states, which may also be transition states."""
