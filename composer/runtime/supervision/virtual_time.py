@@ -179,8 +179,10 @@ def _watched(
 ) -> Callable[..., Any]:
     @wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
-        place = _user_place(sys._getframe(1), walks=outside.walks)
-        if place and (place, outside.name) not in places and outside.applies(arguments, options):
+        frame = sys._getframe(1)
+        place = _user_place(frame, walks=outside.walks)
+        is_new = bool(place) and (place, outside.name) not in places
+        if is_new and _is_callback(frame) and outside.applies(arguments, options):
             places.add((place, outside.name))
             shown = outside.shown or f"{outside.name}()"
             report(f"{place} uses {shown}, which virtual time does not control; use {outside.use}")
@@ -196,3 +198,8 @@ def _user_place(frame: FrameType | None, *, walks: bool) -> str:
     path = "" if frame is None else frame.f_code.co_filename
     is_user_code = frame is not None and not (is_library(path) or is_internal(path))
     return f"{path}:{frame.f_lineno}" if frame is not None and is_user_code else ""
+
+
+def _is_callback(frame: FrameType) -> bool:
+    """Return whether the composer has called the code; a test of pytest is not of the system."""
+    return any(is_internal(caller.f_code.co_filename) for caller in outward(frame))

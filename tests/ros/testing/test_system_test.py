@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -167,3 +168,9 @@ def test_errors_of_the_file_are_shown(tmp_path: Path) -> None:
     path.write_text("system: s\nnodez: {}\n", encoding="utf-8")
     with pytest.raises(TestFailure, match="did you mean 'nodes'"):
         SystemTest(path)
+
+
+def test_a_test_may_use_the_time_of_the_computer() -> None:
+    with SystemTest(SYSTEMS / "minimal.yaml") as system:
+        time.sleep(0)
+        assert [line.text for line in system.log] == ["started"]
