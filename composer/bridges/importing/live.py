@@ -123,10 +123,10 @@ def _without_queue(profile: QosProfile) -> QosProfile:
     return QosProfile(
         reliability=profile.reliability,
         durability=profile.durability,
-        deadline_ms=profile.deadline_ms,
-        lifespan_ms=profile.lifespan_ms,
+        deadline_ms=profile.deadline_ms or None,
+        lifespan_ms=profile.lifespan_ms or None,
         liveliness=profile.liveliness,
-        liveliness_lease_duration_ms=profile.liveliness_lease_duration_ms,
+        liveliness_lease_duration_ms=profile.liveliness_lease_duration_ms or None,
     )
 
 

@@ -13,7 +13,7 @@ from composer.base.characters import escape_lines, is_safe
 from composer.base.source import SourceFile, Span
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.document import parse_bytes
-from composer.language.document.limits import MAX_ENTRIES
+from composer.language.document.limits import MAX_BYTES, MAX_ENTRIES
 from composer.language.document.writer import write_document
 from composer.language.rules import TOO_LARGE
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
@@ -27,6 +27,8 @@ _PRESETS = ("command", "sensor_data", "state")
 _PART = 0.1
 #: What was left out and is listed in a file.
 _MAX_LISTED = 200
+_RANGE = ("minimum", "maximum", "step")
+_TOLERANCE = 1e-6  # for a whole number of steps, in steps
 _NOWHERE = Span(SourceFile("", ""), 1, 1, 1)
 _NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_]+")
 
@@ -214,7 +216,7 @@ def readable(found: FoundSystem) -> FoundSystem:
         is_large = any(item.rule is TOO_LARGE for item in diagnostics)
         if not is_large and len(found.nodes) <= MAX_ENTRIES:
             return found
-        found = _smaller(found, int(len(content) * _PART))
+        found = _smaller(found, max(_PART, 1 - MAX_BYTES / len(content)))
 
 
 def _without_unreadable(found: FoundSystem) -> FoundSystem:
@@ -225,13 +227,37 @@ def _without_unreadable(found: FoundSystem) -> FoundSystem:
         kept = []
         for item in node.parameters:
             if _is_readable(item.value):
-                settings = {key: _escaped(value) for key, value in item.settings.items()}
-                kept.append(replace(item, settings=settings))
+                kept.append(_with_readable_settings(item))
             else:
                 problem = "its value has characters or numbers that a file cannot have"
                 left_out.append(f"parameter {item.name} of {node.full_name}: {problem}")
         nodes.append(replace(node, parameters=tuple(kept)))
     return replace(found, nodes=tuple(nodes), left_out=tuple(left_out))
+
+
+def _with_readable_settings(item: FoundParameter) -> FoundParameter:
+    """Return a parameter without limits that its value is not in: a node may report any."""
+    settings = {key: _escaped(value) for key, value in item.settings.items() if _is_readable(value)}
+    if all(_is_in_range(value, settings) for value in _elements(item.value)):
+        return replace(item, settings=settings)
+    others = {key: value for key, value in settings.items() if key not in _RANGE}
+    comment = "Its value is not in the range that the node reports."
+    return replace(item, settings=others, comments=(*item.comments, comment))
+
+
+def _elements(value: Plain) -> list[Plain]:
+    return value if isinstance(value, list) else [value]
+
+
+def _is_in_range(value: Plain, settings: dict[str, Plain]) -> bool:
+    low, high, step = (settings.get(key) for key in _RANGE)
+    numbers = [number for number in (low, value, high) if isinstance(number, int | float)]
+    if numbers != sorted(numbers):
+        return False
+    if not isinstance(step, int | float) or not isinstance(value, int | float) or value == high:
+        return True
+    steps = (value - (low if isinstance(low, int | float) else 0)) / step if step > 0 else math.nan
+    return math.isclose(steps, round(steps), abs_tol=_TOLERANCE) if math.isfinite(steps) else False
 
 
 def _is_readable(value: Plain) -> bool:
@@ -249,25 +275,26 @@ def _escaped(value: Plain) -> Plain:
     return escape_lines(value) if isinstance(value, str) else value
 
 
-def _smaller(found: FoundSystem, size: int) -> FoundSystem:
-    """Leave out the largest parameters, at least ``size`` characters; without any, nodes."""
+def _smaller(found: FoundSystem, part: float) -> FoundSystem:
+    """Leave out a part: of the characters of parameters, the largest first; without any, nodes."""
     parameters = [
         (len(str(item.value)) + len(str(item.settings)), number, item)
         for number, node in enumerate(found.nodes)
         for item in node.parameters
     ]
     if not parameters:
-        kept = min(MAX_ENTRIES, len(found.nodes) - max(1, int(len(found.nodes) * _PART)))
+        kept = min(MAX_ENTRIES, len(found.nodes) - max(1, int(len(found.nodes) * part)))
         full = (f"node {node.full_name}: the file is full" for node in found.nodes[kept:])
         return replace(found, nodes=found.nodes[:kept], left_out=(*found.left_out, *full))
     parameters.sort(key=lambda item: -item[0])
-    sizes = itertools.accumulate(characters for characters, _, _ in parameters)
-    removed = parameters[: sum(total < size for total in sizes) + 1]
+    wanted = part * sum(size for size, _, _ in parameters)
+    sizes = itertools.accumulate(size for size, _, _ in parameters)
+    removed = parameters[: sum(total < wanted for total in sizes) + 1]
     nodes, left_out = list(found.nodes), list(found.left_out)
-    for characters, number, item in removed:
+    for size, number, item in removed:
         node = nodes[number]
         kept_parameters = tuple(other for other in node.parameters if other is not item)
         nodes[number] = replace(node, parameters=kept_parameters)
         what = f"parameter {item.name} of {node.full_name}"
-        left_out.append(f"{what}: its value has about {characters:,} characters")
+        left_out.append(f"{what}: its value has about {size:,} characters")
     return replace(found, nodes=tuple(nodes), left_out=tuple(left_out))

@@ -166,6 +166,13 @@ LARGE = 3_000_000
         ([FoundParameter("broken", "double_array", [1.0, math.nan])], ["broken"]),
         ([FoundParameter("described", "bool", True, {"description": "\u202e"})], []),
         ([FoundParameter(f"p{i}", "string", "x" * 9_000) for i in range(300)], None),
+        ([FoundParameter("a", "integer", 3, {"minimum": 5, "maximum": 1})], []),
+        ([FoundParameter("a", "double", 3.0, {"minimum": 5.0})], []),
+        ([FoundParameter("a", "double_array", [1.0, 3.0], {"maximum": 2.0})], []),
+        ([FoundParameter("a", "integer", 3, {"minimum": 0, "step": 7})], []),
+        ([FoundParameter("a", "integer", 3, {"step": -1})], []),
+        ([FoundParameter("a", "double", 3.0, {"minimum": -math.inf, "maximum": math.nan})], []),
+        ([FoundParameter("a", "double", 0.3, {"minimum": 0.0, "step": 0.1})], []),
     ],
 )
 def test_what_a_file_cannot_hold_is_left_out(
