@@ -177,10 +177,11 @@ def _frame_vertices(transforms: tuple[SceneTransform, ...], *, several: bool) ->
     frames = dict.fromkeys(
         (item.topic, name) for item in transforms for name in (item.parent, item.child)
     )
+    by_frame: dict[tuple[str, str], list[str]] = {}
+    for item in transforms:
+        by_frame.setdefault((item.topic, item.child), []).append(item.node)
     for topic, name in frames:
-        broadcasters = [
-            item.node for item in transforms if (item.topic, item.child) == (topic, name)
-        ]
+        broadcasters = by_frame.get((topic, name), [])
         details: Details = (("broadcast by", [*broadcasters]),) if broadcasters else ()
         yield Vertex(
             key=_frame_key(topic, name),

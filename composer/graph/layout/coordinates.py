@@ -175,12 +175,13 @@ def rank_extents(root: Group) -> list[Extent]:
         if group.first_rank == group.last_rank:
             needed = group.least_along - 2 * group.padding
             widths[group.first_rank] = max(widths[group.first_rank], needed)
+    before, behind = _frame_spaces(root, before=True), _frame_spaces(root, before=False)
     extents = []
     start = 0.0
     for rank, width in enumerate(widths):
-        begin = start + _space_for_frames(root, rank, before=True)
+        begin = start + before.get(rank, 0.0)
         extents.append(Extent(begin, begin + width))
-        start = begin + width + _space_for_frames(root, rank, before=False) + _RANK_GAP
+        start = begin + width + behind.get(rank, 0.0) + _RANK_GAP
     return extents
 
 
@@ -197,13 +198,13 @@ def extent_of(item: Item, ranks: list[Extent]) -> Extent:
     return Extent(begin - missing / 2, end + missing / 2)
 
 
-def _space_for_frames(group: Group, rank: int, *, before: bool) -> float:
-    """Return the space before or behind a rank for the group and the frames in it."""
-    if before:
-        needed = group.padding + group.label_along if group.first_rank == rank else 0.0
-    else:
-        needed = group.padding if group.last_rank == rank else 0.0
-    nested = [child for child in group.inner() if child.first_rank <= rank <= child.last_rank]
-    return needed + max(
-        (_space_for_frames(child, rank, before=before) for child in nested), default=0.0
-    )
+def _frame_spaces(group: Group, *, before: bool) -> dict[int, float]:
+    """Return the space before or behind the ranks where the group, or a frame in it, ends."""
+    spaces: dict[int, float] = {}
+    for child in group.inner():
+        for rank, space in _frame_spaces(child, before=before).items():
+            spaces[rank] = max(space, spaces.get(rank, 0.0))
+    end = group.first_rank if before else group.last_rank
+    own = group.padding + (group.label_along if before else 0.0)
+    spaces[end] = spaces.get(end, 0.0) + own
+    return spaces

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import accumulate, combinations
 
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex, natural_order
 from composer.graph.layout.boxes import Item
@@ -135,10 +134,10 @@ def _scale(size: Size, page: Size) -> float:
 
 def _rows(sizes: Sequence[Size], page: Size) -> list[range]:
     """Return which rectangles are in each row, so that the whole is largest on the page."""
-    ends = list(accumulate((size.width for size in sizes), initial=0.0))
+    width = sum(size.width for size in sizes)
     # In hundredths, so that there are few to compare.
-    shares = {math.ceil((end - begin) / ends[-1] * 100) for begin, end in combinations(ends, 2)}
-    candidates = (_fill(sizes, ends[-1] * share / 100) for share in sorted(shares, reverse=True))
+    shares = range(100, 0, -1) if sizes else ()
+    candidates = (_fill(sizes, width * share / 100) for share in shares)
     return max(candidates, key=lambda rows: _scale(_size(sizes, rows), page), default=[])
 
 
