@@ -94,12 +94,14 @@ def load(
 
 
 @_without_cycle_collection()
-def load_files(paths: Iterable[Path]) -> list[LoadResult]:
-    """Load the files, with all combinations of arguments that they allow.
+def load_files(
+    paths: Iterable[Path], overrides: OverrideOptions = NO_OVERRIDES
+) -> list[LoadResult]:
+    """Load the files, with all combinations of the arguments that ``overrides`` leave open.
 
     Files of one project share its interfaces.
     """
-    return _check(_resolve_files(paths, all_combinations=True))
+    return _check(_resolve_files(paths, overrides, all_combinations=True))
 
 
 @_without_cycle_collection()
@@ -151,15 +153,21 @@ def _resolve_files(
 
 @_without_cycle_collection()
 def load_bytes(
-    content: bytes, folder: Path, *, shown: str, interfaces: Interfaces | None = None
+    content: bytes,
+    folder: Path,
+    *,
+    shown: str,
+    overrides: OverrideOptions = NO_OVERRIDES,
+    interfaces: Interfaces | None = None,
 ) -> LoadResult:
     """Load a text, such as standard input, as if it were the file ``shown`` in ``folder``.
 
-    All combinations of arguments that it allows are checked.
+    All combinations of the arguments that ``overrides`` leave open are checked.
     """
+    given, diagnostics = read_overrides(overrides)
     document = Document(*parse_bytes(content, shown))
     definitions = Definitions.of(real_folder(folder / shown), interfaces)
-    return _check([_resolve(document, definitions, all_combinations=True)])[0]
+    return _check([_resolve(document, definitions, given, diagnostics, all_combinations=True)])[0]
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from composer.base.diagnostics import Diagnostic
+from composer.base.diagnostics import Diagnostic, Severity
 from composer.loading import load, load_files
 from composer.model.resolve import OverrideOptions
 
@@ -51,6 +51,30 @@ def diagnostics_in(folder: Path, text: str, **files: str) -> list[Diagnostic]:
 
 def messages_in(folder: Path, text: str, **files: str) -> list[str]:
     return [f"{item.rule.name}: {item.message}" for item in diagnostics_in(folder, text, **files)]
+
+
+WRONG = ROBOT.replace("velodyne.scan, ouster.scan", "velodyne.scan, ouster.sacn")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ((), {("unknown-port", True)}),
+        (("lidar=ouster",), {("unknown-port", False)}),
+        (("lidar=velodyne",), set()),
+        (("simulation=1",), set()),
+        (("lidar=oster",), {("unknown-word", False)}),
+        (("lidra=ouster",), {("unknown-variable", False), ("unknown-port", True)}),
+    ],
+)
+def test_given_arguments_leave_fewer_combinations(
+    tmp_path: Path, arguments: tuple[str, ...], expected: set[tuple[str, bool]]
+) -> None:
+    """``expected`` are the errors, and whether each names the arguments that it needs."""
+    overrides = OverrideOptions(arguments=arguments)
+    [result] = load_files([written(tmp_path, WRONG)], overrides)
+    errors = [item for item in result.diagnostics if item.severity is Severity.ERROR]
+    assert {(item.rule.name, "(with " in item.message) for item in errors} == expected
 
 
 def chosen(path: Path, *arguments: str) -> list[str]:

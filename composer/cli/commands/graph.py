@@ -13,9 +13,9 @@ from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
 from composer.cli.support.system_arguments import (
-    complete_system,
-    is_argument,
+    complete_system_or_argument,
     load_system,
+    split_arguments,
     system_file,
 )
 from composer.cli.support.terminal import say, write_bytes
@@ -49,7 +49,7 @@ def graph(
         typer.Argument(
             metavar="SYSTEM... [NAME=VALUE]...",
             help="System files or names of example systems, drawn in one diagram, and arguments.",
-            autocompletion=complete_system,
+            autocompletion=complete_system_or_argument,
         ),
     ] = None,
     *,
@@ -124,10 +124,8 @@ def graph(
 def _declared(names: list[str]) -> Scene:
     systems: list[System] = []
     diagnostics: list[Diagnostic] = []
-    arguments = [name for name in names if is_argument(name)]
+    names, arguments = split_arguments(names)
     for name in names:
-        if name in arguments:
-            continue
         result = load_system(system_file(name), shown=name, arguments=arguments)
         if result.system is None:
             raise CommandError(f"'{name}' cannot be drawn because of its errors")

@@ -17,10 +17,12 @@ from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.options import examples
 from composer.cli.support.system_arguments import (
+    complete_system_or_argument,
     example_systems,
     nearest_path,
     path_exists,
     project_systems,
+    split_arguments,
 )
 from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 EPILOG = examples(
     "compose validate systems nodes",
     "compose validate systems/pipeline.yaml --strict",
+    "compose validate mapping.yaml lidar=ouster      with this value of an argument only",
     "compose validate systems --format sarif > report.sarif",
     "compose validate systems --ignore qos-implicit --ignore RC5",
     "cat pipeline.yaml | compose validate -",
@@ -58,10 +61,12 @@ _RULE = "a code (RC301), a code prefix (RC3) or a name. Repeatable."
 
 def validate(
     paths: Annotated[
-        list[Path] | None,
+        list[str] | None,
         typer.Argument(
-            metavar="PATH...",
-            help="Files, folders to search for systems and node types, or - for stdin.",
+            metavar="PATH... [NAME=VALUE]...",
+            help="Files, folders to search for systems and node types, or - for stdin, and"
+            " arguments of the systems.",
+            autocompletion=complete_system_or_argument,
         ),
     ] = None,
     *,
@@ -109,7 +114,8 @@ def validate(
 ) -> None:
     """Check systems and node types.
 
-    Nothing is started, and ROS is not needed. Settings for a whole project can be set in its
+    Nothing is started, and ROS is not needed. All combinations of arguments are checked; those of
+    which NAME=VALUE is given, with this value only. Settings for a whole project can be set in its
     composer.yaml: strict, select, ignore, severity, nodes and interfaces.
 
     The formats json, sarif and github always have all diagnostics.
@@ -121,7 +127,8 @@ def validate(
         return
     if not paths:
         raise UsageError("specify files or folders", hint="for example: compose validate systems")
-    checked = _check(paths, stdin_name)
+    names, arguments = split_arguments(paths)
+    checked = _check([Path(name) for name in names], stdin_name, arguments)
     diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
     _print(diagnostics, output_format or _default_format(), max_diagnostics)
     suffix = "" if diagnostics else ": no problems found"
@@ -144,20 +151,22 @@ class _Checked:
     projects: tuple[Project, ...]
 
 
-def _check(paths: Sequence[Path], stdin_name: str) -> _Checked:
+def _check(paths: Sequence[Path], stdin_name: str, arguments: Sequence[str]) -> _Checked:
     from composer.language.document.limits import MAX_BYTES
     from composer.loading import load_bytes, load_files
     from composer.loading.reported import collect_diagnostics
+    from composer.model.resolve import OverrideOptions
     from composer.project.files import find_files
 
     for path in paths:
         if path != _STDIN and not path_exists(path):
             raise UsageError(f"there is no file or folder '{path}'", hint=_path_hint(path))
     found = find_files(path for path in paths if path != _STDIN)
-    results = load_files(found.files)
+    overrides = OverrideOptions(arguments=tuple(arguments))
+    results = load_files(found.files, overrides)
     if _STDIN in paths:
         content = sys.stdin.buffer.read(MAX_BYTES + 1)
-        results.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name))
+        results.insert(0, load_bytes(content, Path.cwd(), shown=stdin_name, overrides=overrides))
     diagnostics = [*found.diagnostics, *collect_diagnostics(results)]
     if not results and not diagnostics:
         raise UsageError("there is no system and no node type in " + ", ".join(map(str, paths)))

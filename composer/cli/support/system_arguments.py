@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import Enum, auto
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -63,31 +63,67 @@ AnyRunningSystem = Annotated[
 ]
 
 
-def is_argument(text: str) -> bool:
-    """Return whether a word is NAME=VALUE, and no file."""
-    return _ARGUMENT.fullmatch(text) is not None and not path_exists(Path(text))
+def split_arguments(words: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Return the files and names among words, and the values of arguments: NAME=VALUE, no file.
+
+    Raises typer.BadParameter.
+    """
+    names: list[str] = []
+    arguments: list[str] = []
+    for word in words:
+        is_file = not re.match(r"\w+:?=", word) or path_exists(Path(word))
+        (names if is_file else arguments).append(word)
+    return names, _argument_words(arguments)
 
 
-def _argument_words(words: list[str] | None) -> list[str]:
+def _argument_words(words: list[str]) -> list[str]:
     """Return the values of NAME=VALUE. Raises typer.BadParameter."""
-    for word in words or ():
+    for word in words:
         if _ARGUMENT.fullmatch(word) is None:
             launch = _LAUNCH_ARGUMENT.fullmatch(word)
             example = f"; write {launch[1]}={launch[2]}" if launch is not None else ""
             raise typer.BadParameter(f"'{word}' is not of the form name=value{example}.")
-    return words or []
+    return words
+
+
+def _checked_arguments(context: typer.Context, words: list[str] | None) -> list[str]:
+    """Check the words of a command, but not while one of them is completed."""
+    return (words or []) if context.resilient_parsing else _argument_words(words or [])
 
 
 @silent
 def complete_argument(context: typer.Context, incomplete: str) -> list[str]:
     """Complete the names of the arguments of a system, and their choices."""
+    words = context.params.get("arguments") or []
+    return _completed_arguments([context.params["system"]], words, incomplete)
+
+
+@silent
+def complete_system_or_argument(context: typer.Context, incomplete: str) -> list[str]:
+    """Complete systems, and arguments of those that are given."""
+    words = [*(context.params.get("systems") or context.params.get("paths") or ())]
+    systems = [word for word in words if path_exists(Path(word)) or word in example_systems()]
+    completed = _completed_arguments(systems, words, incomplete)
+    is_value = any("=" not in text for text in completed)
+    return completed if is_value else [*complete_system(incomplete), *completed]
+
+
+def _completed_arguments(
+    systems: Iterable[str], words: Sequence[str], incomplete: str
+) -> list[str]:
+    """Return the arguments that continue a word. Bash makes three words of NAME=VALUE."""
     from composer.language.tree_values import word as value
 
-    words = []
-    for name, declared in declared_arguments(system_file(context.params["system"])).items():
-        values = [value(item) for item in declared.alternatives] or [""]
-        words += [f"{name}={text}" for text in values]
-    return [text for text in words if text.startswith(incomplete)]
+    name = next((word for word in reversed(words) if word != "="), None)
+    completed = []
+    for system in systems:
+        declared = declared_arguments(system_file(system))
+        values = {key: [value(item) for item in declared[key].alternatives] for key in declared}
+        if name in values:
+            completed += values[name]
+        else:
+            completed += [f"{key}={text}" for key in values for text in values[key] or [""]]
+    return [text for text in completed if text.startswith(incomplete)]
 
 
 #: The arguments of a system on a command line.
@@ -96,7 +132,7 @@ Arguments = Annotated[
     typer.Argument(
         metavar="[NAME=VALUE]...",
         help="Values for the arguments of the system: 'compose run SYSTEM --help-arguments'.",
-        callback=_argument_words,
+        callback=_checked_arguments,
         autocompletion=complete_argument,
         show_default=False,
     ),

@@ -97,6 +97,17 @@ def test_stdin_can_have_a_file_name(folder: Path, monkeypatch: pytest.MonkeyPatc
     assert "<stdin>:3:36" in compose("validate", "-").out
 
 
+def test_arguments_are_given_as_to_run(folder: Path) -> None:
+    text = (
+        "system: a\narguments: {far: {choices: [x, y]}}\nnodes:\n  one: {if: far == 'y', typ: x}\n"
+    )
+    Path("a.yaml").write_text(text)
+    assert compose("validate", "a.yaml", "far=x").code == 0
+    assert compose("validate", "a.yaml", "far=y").code == 1
+    refused = compose("validate", "a.yaml", "far:=y")
+    assert (refused.code, "write far=y" in refused.err) == (2, True)
+
+
 def test_project_settings_apply(folder: Path) -> None:
     Path("composer.yaml").write_text("strict: true\nignore: [RC5]\nseverity: {RC231: info}\n")
     Path("deep.yaml").write_text("system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n")

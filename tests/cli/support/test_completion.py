@@ -55,6 +55,30 @@ def test_the_names_of_example_systems_are_completed() -> None:
     assert complete("run", "pi") == ["pipeline"]
 
 
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (["run", "S", ""], ["sim=false", "sim=true", "lidar=sick", "lidar=ouster", "rate="]),
+        (["config", "S", "lidar=o"], ["lidar=ouster"]),
+        # bash makes words of "lidar", "=" and what follows
+        (["run", "S", "lidar", "="], ["sick", "ouster"]),
+        (["run", "S", "lidar", "=", "ou"], ["ouster"]),
+        (["run", "S", "lidar", "=", "sick", "sim"], ["sim=false", "sim=true"]),
+        (["graph", "S", "lid"], ["lidar=sick", "lidar=ouster"]),
+        (["validate", "S", "lidar", "=", "o"], ["ouster"]),
+        (["run", "missing.yaml", ""], []),
+    ],
+)
+def test_arguments_of_a_system_are_completed(
+    tmp_path: Path, words: list[str], offered: list[str]
+) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(
+        "system: s\narguments:\n  sim: false\n  lidar: {choices: [sick, ouster]}\n  rate: 5.0\n"
+    )
+    assert complete(*(str(path) if word == "S" else word for word in words)) == offered
+
+
 @pytest.fixture
 def robot(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
