@@ -53,6 +53,52 @@ def messages_in(folder: Path, text: str, **files: str) -> list[str]:
     return [f"{item.rule.name}: {item.message}" for item in diagnostics_in(folder, text, **files)]
 
 
+PROCESSES = """\
+system: p
+arguments: {vision: false, cameras: 0}
+executors: {fast: {kind: single_threaded}}
+processes:
+  perception: {nodes: [detector, camera_*]}
+  display: {cpus: [0]}
+nodes:
+  detector: {if: vision, executor: fast}
+  camera_${i}: {for_each: {i: "${cameras}"}}
+  screen: {if: vision, process: display}
+  base: {}
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ({}, set()),
+        ({"vision": "true"}, {"perception", "display"}),
+        ({"cameras": "2"}, {"perception"}),
+    ],
+)
+def test_a_process_without_its_nodes_is_left_out(
+    tmp_path: Path, arguments: dict[str, str], expected: set[str]
+) -> None:
+    values = ", ".join(f"{name}: {value}" for name, value in arguments.items())
+    outer = tmp_path / "outer.yaml"
+    outer.write_text(f"system: o\ninclude: [{{file: robot.yaml, arguments: {{{values}}}}}]\n")
+    words = tuple(f"{name}={value}" for name, value in arguments.items())
+    for result in (
+        load(written(tmp_path, PROCESSES), overrides=OverrideOptions(arguments=words)),
+        load(outer),
+    ):
+        assert result.system is not None
+        assert [
+            item.message for item in result.diagnostics if item.severity is Severity.ERROR
+        ] == []
+        assert {item.name.value for item in result.system.processes} == expected
+
+
+def test_a_process_that_no_node_may_have_is_an_error(tmp_path: Path) -> None:
+    text = "system: p\nprocesses: {empty: {cpus: [0]}}\nnodes: {base: {}}\n"
+    assert messages_in(tmp_path, text) == ["conflicting-process: process 'empty' has no nodes"]
+
+
 WRONG = ROBOT.replace("velodyne.scan, ouster.scan", "velodyne.scan, ouster.sacn")
 
 

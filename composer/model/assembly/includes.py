@@ -22,7 +22,11 @@ from composer.model.assembly.include_entries import Include, IncludeReader, Syst
 from composer.model.assembly.limits import IncludeLimits, exceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
 from composer.model.assembly.namespacing import PREFIXED, add_namespace
-from composer.model.assembly.references import expand_references, without_left_out
+from composer.model.assembly.references import (
+    expand_references,
+    without_empty_processes,
+    without_left_out,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +103,8 @@ class IncludeResolver:
             wrong = {_line(item) for item in self.diagnostics}
             self.diagnostics += (item for item in conflicts if not _lines(item) & wrong)
         self.left_out = tuple(all_left_out)
-        return expand_references(joined, self.left_out, self.limits)
+        whole = expand_references(joined, self.left_out, self.limits)
+        return whole if self._stack else without_empty_processes(whole, self.left_out)
 
     def _part(self, item: Tree, includer: SystemFile) -> Part | None:
         included = self.included_system(item, includer)

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree, plain
-from composer.language.tree_values import changed_at, entries, items
+from composer.language.tree_values import changed_at, entries, items, mapping, plain_text
 from composer.model.assembly.limits import IncludeLimits
 from composer.model.names import matches_wildcard
 
@@ -61,6 +61,27 @@ def expand_references(tree: Mapping, left_out: Iterable[LeftOut], limits: Includ
     for path in _PORTS:
         tree = changed_at(tree, path, wildcards.end)
     return tree
+
+
+def without_empty_processes(tree: Mapping, left_out: Iterable[LeftOut]) -> Mapping:
+    """Return a system without the processes that have no nodes, if conditions leave nodes out."""
+    if not any(item.section == "nodes" for item in left_out):
+        return tree
+    used = {plain_text(mapping(entry).get("process")) for entry in entries(tree.get("nodes"))}
+
+    def kept(section: Tree) -> Tree:
+        if not isinstance(section, Mapping):
+            return section
+        inner = tuple(
+            entry
+            for entry in section
+            if entry.name in used
+            or not isinstance(entry.value, Mapping)
+            or items(entry.value.get("nodes"))
+        )
+        return Mapping(inner, section.span)
+
+    return changed_at(tree, ("processes",), kept)
 
 
 def without_left_out(overrides: Mapping, left_out: Iterable[LeftOut]) -> Mapping:
