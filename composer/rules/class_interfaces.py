@@ -82,8 +82,9 @@ def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic
         elif len(same) == 1 and port.qos.known:
             override = ("qos override", f"{item.node.name}.{port.name}")
             for found in _different_qos(port, same[0], what, context):
-                # A class without QoS overrides does not have the profile of the model.
-                yield found if same[0].has_qos_overrides else replace(found, subjects=(override,))
+                # A class that ignores overrides does not have the profile of the model.
+                is_model = port.qos.overridden <= same[0].overridable
+                yield found if is_model else replace(found, subjects=(override,))
 
 
 def _different_qos(
@@ -114,12 +115,13 @@ def _different_qos(
 
 
 def _compared_policies(port: Port, created: CreatedPort) -> list[str]:
-    """Return the policies to compare; a class without QoS overrides ignores their parameters."""
-    qos = port.qos
-    policies = _POLICIES if qos.explicit else ()
-    if created.has_qos_overrides:
-        return [policy for policy in policies if policy not in qos.overridden]
-    return [*policies, *sorted(qos.overridden.difference(policies))]
+    """Return the policies to compare: those of the file, and overrides that the class ignores."""
+    policies = _POLICIES if port.qos.explicit else ()
+    overridden, ignored = port.qos.overridden, port.qos.overridden - created.overridable
+    return [
+        *(policy for policy in policies if policy not in overridden or policy in ignored),
+        *sorted(ignored.difference(policies)),
+    ]
 
 
 def _value(policy: object) -> str:

@@ -54,7 +54,7 @@ _DURATIONS = {
 class CreatedPort:
     """A port that a class creates; what its source does not show is None.
 
-    ``has_qos_overrides`` is whether parameters may override its QoS.
+    ``overridable`` are the policies that parameters may override, as fields of QosProfile.
     """
 
     kind: PortKind
@@ -62,7 +62,7 @@ class CreatedPort:
     interface: str | None
     qos: QosProfile | None
     span: Span
-    has_qos_overrides: bool
+    overridable: frozenset[str]
 
 
 def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
@@ -79,8 +79,26 @@ def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
             scope.known(scope.interface, argument(call, 0, names[0])),
             scope.known(partial(qos_profile, scope), qos),
             span_of(call, scope.source),
-            any(keyword.arg == "qos_overriding_options" for keyword in call.keywords),
+            _overridable(scope, call),
         )
+
+
+def _overridable(scope: Scope, call: ast.Call) -> frozenset[str]:
+    """Return the policies of ``qos_overriding_options``; all if the source does not show them."""
+    options = [item.value for item in call.keywords if item.arg == "qos_overriding_options"]
+    if not options:
+        return frozenset()
+    kinds: ast.expr | None = None
+    match scope.known(scope.followed, options[0]):
+        case ast.Call(func=ast.Attribute(attr="with_default_policies")):
+            return frozenset({"history", "depth", "reliability"})
+        case ast.Call() as created:
+            kinds = scope.known(scope.followed, argument(created, 0, "policy_kinds"))
+    if isinstance(kinds, ast.List | ast.Tuple | ast.Set):
+        names = [item.attr.lower() for item in kinds.elts if isinstance(item, ast.Attribute)]
+        if len(names) == len(kinds.elts):
+            return frozenset(_DURATIONS.get(name, name) for name in names)
+    return frozenset({*_POLICIES, *_DURATIONS.values(), "depth"})
 
 
 def all_created_ports(node_class: ClassOfNode) -> list[CreatedPort] | None:

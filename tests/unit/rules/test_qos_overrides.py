@@ -176,8 +176,11 @@ def test_a_topic_that_no_node_has_is_reported_for_wildcards(tmp_path: Path) -> N
 
 CLASS = """\
 from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import String
+
+KINDS = list(QoSPolicyKind)
 
 class Talker(Node):
     def __init__(self):
@@ -187,6 +190,8 @@ class Talker(Node):
 
 
 OPTS_IN = ", qos_overriding_options=QoSOverridingOptions.with_default_policies()"
+DURABILITY = ", qos_overriding_options=QoSOverridingOptions([QoSPolicyKind.DURABILITY])"
+COMPUTED = ", qos_overriding_options=QoSOverridingOptions(KINDS)"
 
 
 @pytest.mark.parametrize(
@@ -194,6 +199,14 @@ OPTS_IN = ", qos_overriding_options=QoSOverridingOptions.with_default_policies()
     [
         ("", "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
         (OPTS_IN, "depth: 3", None),
+        (DURABILITY, "durability: transient_local", None),
+        (DURABILITY, "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
+        (COMPUTED, "depth: 3", None),
+        (
+            OPTS_IN,
+            "deadline: 1000000",
+            "class 'Talker' creates publisher 'words' with deadline_ms unlimited, not 1.0",
+        ),
         (
             "",
             "reliability: best_effort",
