@@ -23,6 +23,7 @@ NODE_OF = "system: s\nnodes:\n  n:\n    "
 PARAMETER_TYPES = (
     "bool integer double string byte_array bool_array integer_array double_array string_array"
 )
+ARGUMENT_TYPES = "bool integer double string bool_array integer_array double_array string_array"
 WORDS = [
     ("system: s\nqos_profiles:\n  q:\n    reliability: |", "reliable best_effort"),
     ("system: s\nqos_profiles:\n  q:\n    durability: |", "volatile transient_local"),
@@ -41,6 +42,7 @@ WORDS = [
     (NODE_OF + "lifecycle:\n      autostart: |", "active inactive unconfigured"),
     (NODE_OF + "lifecycle:\n      depends_on:\n        m: |", "active inactive"),
     (NODE_OF + "parameters:\n      p:\n        type: |", PARAMETER_TYPES),
+    ("system: s\narguments:\n  a:\n    type: |", ARGUMENT_TYPES),
     (NODE_OF + "timers:\n      t:\n        clock: |", "ros steady"),
     (
         NODE_OF + "timers:\n      t:\n        log:\n          level: |",
@@ -78,6 +80,23 @@ def test_the_words_of_node_types_are_offered(server: LanguageServer) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "offered"),
+    [
+        ("arguments:\n  a:\n    |", "type default choices description"),
+        ("nodes:\n  n:\n    |", "for_each if unless"),
+        ("processes:\n  p:\n    |", "for_each if unless"),
+        ("include:\n  - file: a.yaml\n    |", "for_each if unless arguments"),
+        ("connections:\n  - topic: a\n    |", "for_each if unless"),
+    ],
+)
+def test_keys_of_arguments_and_conditions_are_offered(
+    server: LanguageServer, text: str, offered: str
+) -> None:
+    found = server.complete(server.open(f"system: s\n{text}\n", SYSTEM))
+    assert set(offered.split()) <= found.keys()
+
+
+@pytest.mark.parametrize(
     ("text", "offered", "not_offered"),
     [
         ("- |", f"topic service action {ENDS}", ""),
@@ -112,6 +131,10 @@ def test_all_forms_of_a_connection_are_offered(
         ("system: s\nconnections: [{service: a, ser|ver: n.a}]", "The service server"),
         ("system: s\nconnections: [{action: a, ser|ver: n.a}]", "The action server"),
         ("system: s\nparameter|_files: [a.yaml]", "ROS parameter files"),
+        ("system: s\nargu|ments: {a: 1}", "Named values that"),
+        ("system: s\narguments: {a: {cho|ices: [x]}}", "The allowed values"),
+        (NODE_OF + "{i|f: sim}", "Leave this out unless the condition holds"),
+        ("system: s\ninclude: [{file: a.yaml, un|less: sim}]", "Leave this out if the condition"),
         (NODE_OF + "parameters: {p: {ty|pe: double}}", "The ROS parameter type"),
         (NODE_OF + "parameters: {p|p: 1.0}", "A parameter, declared by"),
         (NODE_OF + "{type: relay, parameters: {p|p: 1.0}}", "The value of a parameter"),
