@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any
 
 from composer.base.source import SourceFile
@@ -26,8 +27,11 @@ def parameter_values(sources: Iterable[tuple[str, bool]], full_name: str) -> dic
     for text, is_file in sources:
         if is_file:
             files = ParameterFiles()
+            # launch_ros writes values into files with random names.
+            is_written = Path(text).is_relative_to(gettempdir())
+            where = full_name if is_written else f"{full_name} in {text}"
             problems += [
-                f"parameters of {full_name} in {text}: {problem.message}"
+                f"parameters of {where}: {problem.message}"
                 for problem in read_parameter_file(Path(text), files)
             ]
             given.append(files)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import suppress
 from itertools import product
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 from composer.language.document.scalars import NumberRefused, resolve_plain
 from composer.model.names import join_node_name
@@ -55,56 +55,107 @@ def all_visits(visit: Callable[[Mapping[str, str]], Visit], given: Mapping[str, 
     with others: the reason by the name, if it is known.
     """
     base = visit(given)
-    values, problems = _values_that_work(visit, given, base)
+    tried = _tried_values(visit, given, base)
+    values, problems = tried.values, tried.problems
     declared = {item["name"]: item for item in base["arguments"]}
-    while prod(map(len, values.values())) > MAX_VISITS:
-        values.popitem()
-    marks = {}
+    marks: dict[str, str] = {}
     for name, item in declared.items():
-        if name not in {*values, *problems} and item["default"] is not None:
-            found = _attempted(visit, {**given, name: mark(name)})
-            if isinstance(found, str) or not _is_kept(base, found, name, item["default"]):
-                continue
-            if identifier(name) in marked_names(inner_sections(found["nodes"])):
-                problems[name] = "nodes inside a program have parameters that depend on it"
-            else:
-                marks[name] = mark(name)
-    visits = _combined_visits(lambda chosen: visit({**given, **chosen}), values, marks)
+        found = _attempted(visit, {**given, name: mark(name)})
+        if name in problems or isinstance(found, str):
+            continue
+        if identifier(name) in marked_names(inner_sections(found["nodes"])):
+            problems[name] = "nodes inside a program have parameters that depend on it"
+        elif name in tried.compared:
+            if not item["choices"] and item["value"] not in _OPPOSITES:
+                values[name] = _with_any_other(name, item["value"], tried.compared[name])
+        elif all(_is_kept(each, found, name, text) for text, each in tried.visits_of(name, base)):
+            marks[name] = mark(name)
+    several = sorted(values, key=lambda name: name not in tried.deciding)
+    while prod(len(values[name]) for name in several) > MAX_VISITS:
+        # Rather an argument that only appears in values than one that decides.
+        several.remove(next((name for name in reversed(several) if name in marks), several[-1]))
+    alone = {name: text for name, text in marks.items() if name not in several}
+    chosen = {name: values[name] for name in several}
+    visits = _combined_visits(lambda each: visit({**given, **each}), chosen, alone)
+    needed = [name for name, item in declared.items() if item["value"] == mark(name)]
+    kept = {*chosen, *alone, *needed}
     return {
         "arguments": [
             {**item, "values": values.get(item["name"], [])}
             for item in declared.values()
-            if item["name"] in {*values, *marks}
+            if item["name"] in kept
         ],
         "visits": visits or [{"values": {}, **base}],
         "base": base["nodes"],
         "resolved": {
             name: problems.get(name, "")
             for name, item in declared.items()
-            if item["default"] and name not in {*values, *marks}
+            if item["value"] and name not in kept
         },
     }
 
 
-def _values_that_work(
+def _with_any_other(name: str, value: str, compared: Collection[str]) -> list[str]:
+    """Return constants with a mark for any value that is not compared; first what ``value`` is."""
+    first = value if value in compared else mark(name)
+    return list(dict.fromkeys([first, *sorted(compared), mark(name)]))
+
+
+class _Tried(NamedTuple):
+    """What visits with one other value each have shown of the arguments.
+
+    ``values`` are those of arguments with several values, ``problems`` say why others are left
+    out. ``compared`` are the constants in conditions, ``deciding`` the arguments of which a value
+    changes which nodes there are.
+    """
+
+    values: dict[str, list[str]]
+    problems: dict[str, str]
+    compared: dict[str, set[str]]
+    deciding: set[str]
+    visits: dict[tuple[str, str], Visit]
+
+    def visits_of(self, name: str, base: Visit) -> Iterator[tuple[str, Visit]]:
+        """Yield the values of an argument that work, each with its visit."""
+        for item in base["arguments"]:
+            if item["name"] == name:
+                yield item["value"], base
+        for (argument, text), found in self.visits.items():
+            if argument == name:
+                yield text, found
+
+
+def _tried_values(
     visit: Callable[[Mapping[str, str]], Visit], given: Mapping[str, str], base: Visit
-) -> tuple[dict[str, list[str]], dict[str, str]]:
-    """Return the arguments with several values, and why some values are left out."""
-    values, problems = _alternatives(base), {}
-    refused = set()
+) -> _Tried:
+    """Visit with each other value of each argument that is known to have several."""
+    tried = _Tried(_alternatives(base), {}, {}, set(), {})
+    values, refused = tried.values, set()
     for name, texts in tuple(values.items()):
         for other in texts[1:]:  # a branch may compare other arguments
             found = _attempted(visit, {**given, name: other})
             problem = found if isinstance(found, str) else _dependent_section(found, base)
             if problem or isinstance(found, str):
                 refused.add((name, other))
-                problems[name] = f"with '{other}', {problem}"
+                tried.problems[name] = f"with '{other}', {problem}"
                 continue
+            tried.visits[name, other] = found
+            if _node_names(found) != _node_names(base):
+                tried.deciding.add(name)
             for key, more in _alternatives(found, base).items():
                 values[key] = list(dict.fromkeys([*values.get(key, ()), *more]))
-    for name in problems:
+    for name in tried.problems:
         values[name] = [text for text in values[name] if (name, text) not in refused]
-    return {name: texts for name, texts in values.items() if len(texts) > 1}, problems
+    for each in (base, *tried.visits.values()):
+        for name, constants in each["compared"].items():
+            tried.compared.setdefault(name, set()).update(constants)
+    for name in [name for name, texts in values.items() if len(texts) == 1]:
+        del values[name]
+    return tried
+
+
+def _node_names(visit: Visit) -> list[str | None]:
+    return [item["name"] for item in visit["nodes"]]
 
 
 def _dependent_section(found: Visit, base: Visit) -> str:
@@ -166,12 +217,10 @@ def _alternatives(visit: Visit, base: Visit | None = None) -> dict[str, list[str
     """Return the values of each argument that is known to have several, its own first."""
     found = {}
     for item in (base or visit)["arguments"]:
-        default = item["default"]
-        if default is None:
-            continue
+        value = item["value"]
         others = [*item["choices"], *visit["compared"].get(item["name"], ())]
-        others += [_OPPOSITES[default]] if default in _OPPOSITES else []
-        values = list(dict.fromkeys([default, *others]))
+        others += [_OPPOSITES[value]] if value in _OPPOSITES else []
+        values = list(dict.fromkeys([value, *others]))
         if len(values) > 1:
             found[item["name"]] = values
     return found
@@ -196,6 +245,8 @@ def _without_mark(found: Any, base: Any, name: str, default: str) -> bool:
         return len(found) == len(base) and all(
             _without_mark(one, other, name, default) for one, other in pairs
         )
+    if found == mark(name) and isinstance(base, bool):
+        return str(base).lower() == default.lower()
     if found == mark(name) and default:
         return bool(base in (default, resolve_plain(default)))
     return bool((found.replace(mark(name), default) if isinstance(found, str) else found) == base)
@@ -289,14 +340,18 @@ def condition(visits: Sequence[Mapping[str, str]], present: Iterable[int]) -> di
     groups = {tuple(item[name] for name in names): False for item in visits}
     for number in numbers:
         groups[tuple(visits[number][name] for name in names)] = True
-    switches = _switches(visits)
+    constants = {name: sorted({item[name] for item in visits} - {mark(name)}) for name in names}
     there = [group for group, is_there in groups.items() if is_there]
     absent = [group for group, is_there in groups.items() if not is_there]
-    present_if = " or ".join(_terms(names, there, switches))
-    absent_if = " or ".join(_terms(names, absent, switches))
+    present_if = " or ".join(_terms(constants, there))
+    absent_if = " or ".join(_terms(constants, absent))
+    are_known = all(
+        is_switch(constants[name]) or any(item[name] == mark(name) for item in visits)
+        for name in names
+    )
     if len(there) != len(absent):
         is_positive = len(there) < len(absent)
-    elif switches.issuperset(names):
+    elif are_known:
         is_positive = len(present_if) <= len(absent_if)
     else:  # what other values choose is not known: they have what the default has
         is_positive = 0 not in numbers
@@ -316,16 +371,23 @@ def _are_enough(
 
 
 def _terms(
-    names: Sequence[str], groups: Iterable[Sequence[str]], switches: Collection[str]
+    constants: Mapping[str, Sequence[str]], groups: Iterable[Sequence[str]]
 ) -> Iterator[str]:
     for group in groups:
-        pairs = zip(names, group, strict=True)
-        yield " and ".join(_term(name, value, name in switches) for name, value in pairs)
+        pairs = zip(constants, group, strict=True)
+        yield " and ".join(_term(name, value, constants[name]) for name, value in pairs)
 
 
-def _term(name: str, value: str, is_switch: bool) -> str:
-    name = identifier(name)
-    if is_switch:
-        return name if value.lower() == "true" else f"not {name}"
-    quote = '"' if "'" in value else "'"
-    return f"{name} == {quote}{value}{quote}"
+def _term(name: str, value: str, constants: Sequence[str]) -> str:
+    """Return a comparison; a mark is any value but the ``constants``."""
+    variable = identifier(name)
+    if value == mark(name):
+        return " and ".join(f"{variable} != {_quoted(text)}" for text in constants)
+    if is_switch(constants):
+        return variable if value.lower() == "true" else f"not {variable}"
+    return f"{variable} == {_quoted(value)}"
+
+
+def _quoted(text: str) -> str:
+    quote = '"' if "'" in text else "'"
+    return f"{quote}{text}{quote}"

@@ -11,9 +11,11 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +32,10 @@ from launch.actions import (
     TimerAction,
 )
 from launch.events import Shutdown as ShutdownEvent
+from launch.frontend.parse_substitution import parse_substitution
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 from launch.utilities.type_utils import perform_typed_substitution
+from launch_ros import parameter_descriptions
 from launch_ros.actions import (
     ComposableNodeContainer,
     LifecycleNode,
@@ -44,7 +48,7 @@ from rclpy.parameter import parameter_value_to_python
 from composer.base.source import shown_path
 from composer.launch.comparisons import compared, text_of
 from composer.launch.parameter_values import parameter_values
-from composer.launch.variants import all_visits
+from composer.launch.variants import all_visits, mark, marked_names
 
 _UNKNOWN_NAME = "<node_name_unspecified>"
 #: The name that launch gives to the module of each launch file.
@@ -57,9 +61,13 @@ _SIGNAL_TIMEOUT_S = 5.0
 class Visitor:
     """Collects the nodes of a launch description, in the order in which they would start."""
 
-    def __init__(self, context: LaunchContext, given: Mapping[str, str]) -> None:
+    def __init__(
+        self, context: LaunchContext, given: Mapping[str, str], needed: Mapping[str, str]
+    ) -> None:
+        """``needed`` are values for arguments without one."""
         self._context = context
         self._given = given
+        self._needed = needed
         self._environment = dict(context.environment)
         self._count = 0
         self.nodes: list[dict[str, Any]] = []
@@ -74,8 +82,8 @@ class Visitor:
             raise RuntimeError("the launch file includes itself without an end")
         if not self._is_chosen(entity):
             return
-        if isinstance(entity, DeclareLaunchArgument):
-            self._declare(entity)
+        if isinstance(entity, DeclareLaunchArgument) and self._declare(entity):
+            return
         if isinstance(entity, Node):
             self.nodes.append(self._node(entity, note))
             self._add_components(entity, self.nodes[-1], note)
@@ -103,21 +111,29 @@ class Visitor:
             self.compared.setdefault(name, []).append(text)
         return bool(condition.evaluate(self._context))
 
-    def _declare(self, argument: DeclareLaunchArgument) -> None:
-        """Add an argument, unless the file that includes this one sets it."""
-        given = self._context.launch_configurations.get(argument.name)
-        if given is not None and argument.name not in self._given:
-            return
-        default = argument.default_value
+    def _declare(self, argument: DeclareLaunchArgument) -> bool:
+        """Add an argument, unless the file that includes this one sets it.
+
+        Returns whether its value is none that launch would accept: a mark.
+        """
+        configurations, name = self._context.launch_configurations, argument.name
+        if name in configurations and name not in (*self._given, *self._needed):
+            return bool(marked_names(configurations[name]))
+        default = self._given.get(name)
+        if default is None and argument.default_value is not None:
+            default = self._text(argument.default_value)
+        value = configurations.get(name, default)
         self.arguments.setdefault(
-            argument.name,
+            name,
             {
-                "name": argument.name,
-                "default": given or (None if default is None else self._text(default)),
+                "name": name,
+                "default": default,
+                "value": value,
                 "description": _described(argument),
                 "choices": list(argument.choices or ()),
             },
         )
+        return bool(marked_names(value))
 
     def _left_out(self, entity: Any) -> list[str]:
         """Describe what cannot be a node of a system; nothing for what can be visited."""
@@ -220,7 +236,7 @@ class Visitor:
 
 def _described(argument: DeclareLaunchArgument) -> str:
     """Return the description of an argument, without what launch adds to it."""
-    text = argument.description.partition("One of: [")[0].strip()
+    text = re.split(r"(?:One of|Valid choices are): \[", argument.description)[0].strip()
     return "" if text == "no description given" else text
 
 
@@ -307,8 +323,9 @@ def _components(action: Any) -> Iterable[Any]:
 
 def main(report: Path, path: str, arguments: list[str]) -> None:
     """Visit a launch file, write the report, and end the process."""
-    # launch_ros reads each parameter file several times for each node, slowly.
+    # launch_ros reads each parameter file, and parses its values, several times for each node.
     yaml.SafeLoader = yaml.CSafeLoader  # type: ignore[misc, assignment]
+    vars(parameter_descriptions)["parse_substitution"] = lru_cache(maxsize=None)(parse_substitution)
     given = dict(text.split(":=", 1) for text in arguments)
     environment = dict(os.environ)
 
@@ -335,10 +352,14 @@ def _visited(path: str, values: Mapping[str, str]) -> dict[str, Any]:
     asyncio.set_event_loop(loop)
     context._set_asyncio_loop(loop)
     context.extend_globals({"launch_service": LaunchService})
-    include = IncludeLaunchDescription(
-        AnyLaunchDescriptionSource(path), launch_arguments=list(values.items())
-    )
-    visitor = Visitor(context, values)
+    source = AnyLaunchDescriptionSource(path)
+    needed = {
+        argument.name: [*(argument.choices or ()), mark(argument.name)][0]
+        for argument in source.get_launch_description(context).get_launch_arguments()
+        if argument.default_value is None and argument.name not in values
+    }
+    include = IncludeLaunchDescription(source, launch_arguments=[*values.items(), *needed.items()])
+    visitor = Visitor(context, values, needed)
     try:
         visitor.visit(LaunchDescription([include]))
     finally:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +62,7 @@ def describe_launch_file(
     nodes = tuple(
         _node(item, node_name, left_out) for item, node_name in zip(items, names, strict=True)
     )
-    nodes += tuple(_external_containers(nodes))
+    nodes += tuple(_external_containers(nodes, items, visits))
     left_out += lost
     command = " ".join(["compose import launch", path, *given])
     return FoundSystem(
@@ -83,7 +83,7 @@ def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """
     visits = report["visits"]
     values = [visit["values"] for visit in visits]
-    defaults = {mark(item["name"]): item["default"] for item in report["arguments"]}
+    defaults = {mark(item["name"]): item["value"] for item in report["arguments"]}
     by_name: dict[tuple[str, ...], dict[int, dict[str, Any]]] = {}
     for number, visit in enumerate(visits):
         counts: Counter[tuple[str, ...]] = Counter()
@@ -138,23 +138,26 @@ def _names_in_use(
 def _argument(argument: Mapping[str, Any], items: Iterable[Mapping[str, Any]]) -> Plain:
     """Return the declaration of an argument: its default alone if there is nothing else."""
     reference, default = mark(argument["name"]), argument["default"]
-    value: Plain = default
+    text = argument["value"]
+    value: Plain = text
     choices = [text for text in argument["choices"] if text in argument["values"]]
-    if is_switch([default, *choices, *argument["values"]]):
-        value, choices = default.lower() == "true", []
+    if is_switch([text, *choices, *argument["values"]]):
+        value, choices = text.lower() == "true", []
     elif any(
         item["parameters"].get(name) == reference
         for item in items
         for name, sample in item["samples"].items()
         if not isinstance(sample, str)
     ):
-        value = _typed(default)
-    declared: dict[str, Plain] = {"default": value}
+        value = _typed(text)
+    declared: dict[str, Plain] = {} if default is None else {"default": value}
     if choices:
         declared["choices"] = choices
+    elif default is None:
+        declared["type"] = "string"
     if argument["description"]:
         declared["description"] = escape_lines(argument["description"])
-    return value if len(declared) == 1 else declared
+    return value if [*declared] == ["default"] else declared
 
 
 def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
@@ -192,14 +195,20 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
     )
 
 
-def _external_containers(nodes: Iterable[FoundNode]) -> Iterable[FoundNode]:
-    """Yield the containers that the launch file does not start."""
+def _external_containers(
+    nodes: Sequence[FoundNode], items: Sequence[Mapping[str, Any]], visits: Sequence[Any]
+) -> Iterable[FoundNode]:
+    """Yield the containers that the launch file does not start, each with its condition."""
     started = {node.full_name for node in nodes}
-    for full_name in dict.fromkeys(node.container for node in nodes if node.container):
-        if full_name not in started:
-            namespace, name = split_node_name(full_name)
-            comment = "The launch file loads components into it, and does not start it."
-            yield FoundNode(name, namespace, {"external": True}, comments=(comment,))
+    present: dict[str, set[int]] = {}
+    for node, item in zip(nodes, items, strict=True):
+        if node.container and node.container not in started:
+            present.setdefault(node.container, set()).update(item["present"])
+    for full_name, numbers in present.items():
+        namespace, name = split_node_name(full_name)
+        keys: dict[str, Plain] = {**condition([visit["values"] for visit in visits], numbers)}
+        comment = "The launch file loads components into it, and does not start it."
+        yield FoundNode(name, namespace, {**keys, "external": True}, comments=(comment,))
 
 
 def _names(items: Iterable[Mapping[str, Any]], left_out: list[str]) -> list[str]:

@@ -6,35 +6,44 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
-from composer.launch.variants import all_visits, condition
+from composer.language.tree import plain
+from composer.launch.variants import all_visits, condition, mark
 from composer.loading import load, load_files
 from composer.model.resolve import OverrideOptions
+from tests.examples import examples
 from tests.unit.bridges.importing.test_launch_file import node
 
 Nodes = Callable[[Mapping[str, str]], list[dict[str, Any]]]
 
 
 def argument(name: str, default: str | None, *choices: str) -> dict[str, Any]:
-    return {"name": name, "default": default, "description": "", "choices": list(choices)}
+    value = {
+        "default": default,
+        "value": default if default is not None else [*choices, mark(name)][0],
+    }
+    return {"name": name, **value, "description": "", "choices": list(choices)}
 
 
 def visited(
     nodes: Nodes, *arguments: dict[str, Any], **compared: list[str]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the system and what is left out of a launch file that has ``nodes(values)``."""
-    defaults = {item["name"]: item["default"] or "" for item in arguments}
+    defaults = {item["name"]: item["value"] for item in arguments}
 
     def visit(values: Mapping[str, str]) -> dict[str, Any]:
         declared = [
-            {**item, "default": values.get(item["name"], item["default"])} for item in arguments
+            {**item, "value": values.get(item["name"], item["value"])} for item in arguments
         ]
         return {
             "nodes": nodes({**defaults, **values}),
@@ -238,6 +247,66 @@ def test_constants_that_are_compared_and_choices_are_tried(tmp_path: Path) -> No
     assert started("model_name=other") == {"large", "sick", "nav"}
 
 
+def test_any_other_value_differs_from_the_constants() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        parameters = {"yaml_filename": values["map"]} if values["map"] else {}
+        return [node("map_server", parameters=parameters)]
+
+    system, left_out = visited(nodes, argument("map", ""), map=[""])
+    assert left_out == ()
+    assert [(conditions(item), item.get("parameters")) for item in system["nodes"].values()] == [
+        ({"if": "map == ''"}, None),
+        ({"if": "map != ''"}, {"yaml_filename": {"type": "string", "default": "${map}"}}),
+    ]
+
+
+def test_equal_descriptions_have_one_condition() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        parameters = {"use_sim_time": values["sim"] == "true", "rate": 5}
+        arguments = ["-d"] if values["localization"] == "true" else []
+        is_third = values["localization"] == values["third"] == "true"
+        third = [node("third", parameters={"sim": values["sim"] == "true"})] if is_third else []
+        return [node("slam", parameters=parameters, arguments=arguments), *third]
+
+    bools = [argument(name, "false") for name in ("localization", "third")]
+    system, _ = visited(nodes, argument("sim", "false", "true", "false"), *bools)
+    assert system["arguments"] == {"sim": False, "localization": False, "third": False}
+    assert [conditions(item) for item in system["nodes"].values()] == [
+        {"unless": "localization"},
+        {"if": "localization"},
+        {"if": "localization and third"},
+    ]
+    types = {
+        item["parameters"][key]["type"]
+        for item in system["nodes"].values()
+        for key in item["parameters"]
+        if "sim" in key
+    }
+    assert types == {"bool"}
+
+
+def test_arguments_without_a_value_need_one() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        return [node("driver", parameters={"ip": values["ip"], "type": values["type"]})]
+
+    system, _ = visited(nodes, argument("type", None, "ur3", "ur5"), argument("ip", None))
+    assert system["arguments"] == {"type": {"choices": ["ur3", "ur5"]}, "ip": {"type": "string"}}
+    values = {
+        name: item["default"] for name, item in system["nodes"]["driver"]["parameters"].items()
+    }
+    assert values == {"ip": "${ip}", "type": "${type}"}
+
+
+def test_a_container_that_something_else_starts_has_the_condition_of_its_components() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        component = {"package": "p", "plugin": "p::P"}
+        changes = {"component": component, "container": ("/", "box")}
+        return [node("map", **changes if values["composed"] == "True" else {})]
+
+    system, _ = visited(nodes, argument("composed", "False"))
+    assert conditions(system["nodes"]["box"]) == {"if": "composed"}
+
+
 A, B = ({"a": a, "b": b} for a, b in (("false", "x"), ("false", "y")))
 C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
 
@@ -280,13 +349,15 @@ def generate_launch_description():
         DeclareLaunchArgument("lidar", default_value="sick", choices=["sick", "ouster"]),
         DeclareLaunchArgument("model", default_value="waffle"),
         DeclareLaunchArgument("map", default_value="/a.yaml"),
+        DeclareLaunchArgument("ip", description="Where it is."),
         Node(package="p", executable="sim", name="sim", condition=IfCondition(sim)),
         Node(package="p", executable="base", name="base", condition=UnlessCondition(sim)),
         Node(package="p", executable="o", name="lidar",
              condition=LaunchConfigurationEquals("lidar", "ouster")),
         Node(package="p", executable="b", name="arm", condition=IfCondition(is_burger)),
         Node(package="p", executable="m", name="map", parameters=[
-            {"use_sim_time": sim, "yaml": LaunchConfiguration("map")}]),
+            {"use_sim_time": sim, "yaml": LaunchConfiguration("map"),
+             "ip": LaunchConfiguration("ip")}]),
     ])
 """
 
@@ -302,6 +373,7 @@ def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
         "lidar": {"default": "sick", "choices": ["sick", "ouster"]},
         "model": "waffle",
         "map": "/a.yaml",
+        "ip": {"type": "string", "description": "Where it is."},
     }
     assert {name: conditions(item) for name, item in system["nodes"].items()} == {
         "sim": {"if": "sim"},
@@ -311,6 +383,80 @@ def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
         "map": {},
     }
     values = {name: item["default"] for name, item in system["nodes"]["map"]["parameters"].items()}
-    assert values == {"use_sim_time": "${sim}", "yaml": "${map}"}
+    assert values == {"use_sim_time": "${sim}", "yaml": "${map}", "ip": "${ip}"}
     [result] = load_files([tmp_path / "robot.yaml"])
     assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
+
+
+VALUES = {"a": ["true", "false"], "b": ["True", "False"], "c": ["x", "y", "z"], "d": ["one", "any"]}
+ARGUMENTS = [
+    argument("a", "false"),
+    argument("b", "True"),
+    argument("c", "x", *VALUES["c"]),
+    argument("d", "any"),
+]
+TESTS = st.dictionaries(
+    st.sampled_from(sorted(VALUES)), st.integers(min_value=0, max_value=1), max_size=3
+)
+NODES = st.lists(
+    st.tuples(
+        TESTS,  # the values with which there is a node
+        TESTS,  # those that give it an argument
+        st.sampled_from([None, *VALUES]),  # the argument that is its parameter
+    ),
+    min_size=1,
+    max_size=3,
+)
+
+
+def holds(tests: Mapping[str, int], values: Mapping[str, str]) -> bool:
+    """Return whether each value is the one with that index; of "d", only "one" is compared."""
+    return all(
+        (values[name] == "one") == (index == 0)
+        if name == "d"
+        else values[name] == VALUES[name][index]
+        for name, index in tests.items()
+    )
+
+
+@given(NODES, st.lists(st.sampled_from(list(product(*VALUES.values()))), min_size=4, max_size=4))
+@examples(40)
+def test_a_system_starts_what_the_launch_file_starts(
+    tmp_path_factory: pytest.TempPathFactory,
+    described: list[Any],
+    combinations: list[tuple[str, ...]],
+) -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        return [
+            node(
+                f"n{number}",
+                arguments=["-v"] if holds(verbose, values) else [],
+                parameters={} if name is None else {"p": values[name]},
+            )
+            for number, (present, verbose, name) in enumerate(described)
+            if holds(present, values)
+        ]
+
+    # What a condition compares: of "d", one constant.
+    used = {name for present, verbose, _ in described for name in (*present, *verbose)}
+    compared = {"d": ["one"]} if "d" in used else {}
+    system, _ = visited(nodes, *ARGUMENTS, **compared)
+    path = tmp_path_factory.mktemp("system") / "s.yaml"
+    path.write_text(yaml.safe_dump(system))
+    for chosen in combinations:
+        values = dict(zip(VALUES, chosen, strict=True))
+        expected = {item["name"]: (item["arguments"], item["parameters"]) for item in nodes(values)}
+        words = tuple(f"{k}={v}" for k, v in values.items() if k in system.get("arguments", {}))
+        result = load(path, overrides=OverrideOptions(arguments=words))
+        tree = plain(result.tree) if result.tree is not None else {}
+        assert isinstance(tree, dict)
+        found = {
+            item.get("name", key): (
+                item["executable"].get("arguments", []),
+                {name: str(each["default"]) for name, each in item.get("parameters", {}).items()},
+            )
+            for key, item in tree.get("nodes", {}).items()
+        }
+        assert {k: (a, {n: t.lower() for n, t in p.items()}) for k, (a, p) in found.items()} == {
+            k: (a, {n: t.lower() for n, t in p.items()}) for k, (a, p) in expected.items()
+        }
