@@ -73,9 +73,8 @@ from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor
 from composer.runtime.supervision.virtual_time import (
     ISOLATION,
-    Standstill,
     check_virtual_time,
-    outside_calls,
+    watched_time,
 )
 
 _KEY_BYTES = 32
@@ -161,7 +160,10 @@ class Host:
         wait = partial(queue.wait, lambda: queue.stopping, stoppable=True)
         servers = discovery_servers(discovery, os.environ, self._reporter.log, wait)
         variables = active_variables(discovery, os.environ)
-        watched = outside_calls(self._warn) if self._clock.is_virtual else nullcontext()
+        watched: AbstractContextManager[None] = nullcontext()
+        if isinstance(self._clock, VirtualClock):
+            parts = (self._clock, self._node_set, lambda: queue.stopping)
+            watched = watched_time(*parts, self._warn, self._fail)
         lock: AbstractContextManager[None] = nullcontext()
         if not is_isolated:  # otherwise the same system may run at the same time
             lock = hold_instance_lock(namespace, variables, self._report_key)
@@ -263,8 +265,6 @@ class Host:
             return False
         for warning in self._node_set.warnings:
             self._warn(warning)
-        if isinstance(self._clock, VirtualClock):
-            Standstill(self._clock, self._node_set, self._fail)
         if self._options.ends_process:
             # What is there now stays to the end. A search for reference cycles in it takes 0.1 s.
             gc.freeze()

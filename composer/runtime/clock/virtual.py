@@ -62,6 +62,8 @@ class VirtualClock(Clock):
         self._members = {get_ident()}
         self._alive: set[threading.Thread] = set()
         self._followers: list[Callable[[int], None]] = []
+        #: How often a thread has begun its turn.
+        self.turns = 0
         self._reads = 0  # since the last jump
         self._creeps_s = 0.0  # at each read
         #: Called on the thread that reads the clock, each :data:`STANDSTILL_READS` without a jump.
@@ -166,6 +168,7 @@ class VirtualClock(Clock):
                     continue
                 self._jump(waiting.until_s)
             self._waiting.remove(waiting)
+            self.turns += 1
             return waiting
 
     def _real_s_until(self, until_s: float) -> float:

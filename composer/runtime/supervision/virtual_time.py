@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -13,11 +14,13 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, System
+from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.clock.virtual import VirtualClock
 from composer.runtime.executors.stacks import is_internal, is_library, location_of, outward
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.intra_process.router import shared_channels
 from composer.runtime.process import StartRefused
+from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.node_set import NodeSet
 
 #: Nothing outside of the process takes part in a run.
@@ -116,6 +119,62 @@ class Standstill:
         return f"a callback goes on without waiting{' at ' + places if places else ''}"
 
 
+#: How often the turn is looked at, in seconds of real time.
+_LOOK_S = 1.0
+#: The number of looks after which a callback is named, and after which it may be interrupted.
+_NAMED_AFTER, _INTERRUPTED_AFTER = 10, 2
+
+
+class TurnWatch:
+    """Names callbacks that do not return, and so keep the turn: no time passes meanwhile.
+
+    It looks at them in real time, on a thread that is not of the system. They may compute something
+    long, so it interrupts them only once the system stops.
+    """
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        node_set: NodeSet,
+        is_stopping: Callable[[], bool],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._clock = clock
+        self._node_set = node_set
+        self._is_stopping = is_stopping
+        self._warn = warn
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="turn watch", daemon=True)
+
+    def __enter__(self) -> None:
+        """Start to look."""
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        """Look no more."""
+        self._end.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        turns = looks = 0
+        while not COMPUTER.wait(self._end, _LOOK_S):
+            looks = looks + 1 if turns == self._clock.turns else 0
+            turns = self._clock.turns
+            is_over = self._is_stopping() and looks >= _INTERRUPTED_AFTER
+            for callback in self._callbacks() if is_over or looks == _NAMED_AFTER else ():
+                at = callback.location()
+                if is_over:
+                    self._warn(f"{callback.name} is interrupted; it is at {at}")
+                    callback.interrupt()
+                else:
+                    lasts = f"{callback.name} has not returned for {looks * _LOOK_S:g} s"
+                    self._warn(f"{lasts}, in which the time does not advance; it is at {at}")
+
+    def _callbacks(self) -> list[RunningCallback]:
+        loops = tuple(self._node_set.loops.values())
+        return [stack[0] for loop in loops for stack in running_callbacks(loop)]
+
+
 @dataclass(frozen=True, slots=True)
 class _Outside:
     """A function of Python that is not of virtual time, and what to use instead.
@@ -168,6 +227,23 @@ def outside_calls(report: Callable[[str], None]) -> Iterator[None]:
             original = getattr(owner, attribute)
             stack.callback(setattr, owner, attribute, original)
             setattr(owner, attribute, _watched(original, outside, places, report))
+        yield
+
+
+@contextmanager
+def watched_time(
+    clock: VirtualClock,
+    node_set: NodeSet,
+    is_stopping: Callable[[], bool],
+    warn: Callable[[str], None],
+    fail: Callable[[str], None],
+) -> Iterator[None]:
+    """Context manager: report what keeps the time of a run from advancing or being the same.
+
+    ``warn`` receives what may be meant, ``fail`` what has to end the run.
+    """
+    Standstill(clock, node_set, fail)
+    with outside_calls(warn), TurnWatch(clock, node_set, is_stopping, warn):
         yield
 
 

@@ -268,6 +268,28 @@ def test_a_system_whose_time_does_not_advance_ends(tmp_path: Path, nodes: str, r
     assert re.search(rf"ran for 1.0 s: the time does not advance, {reason}", done.stderr)
 
 
+HANGS = """
+from composer.behavior import Behavior
+
+class Hangs(Behavior):
+    def on_start(self):
+        self.log.info("it hangs")
+        while True:
+            pass
+"""
+
+
+def test_a_callback_that_does_not_return_is_interrupted_at_the_end(tmp_path: Path) -> None:
+    system = tmp_path / "hangs.yaml"
+    node = "{behavior: parts:Hangs, timers: {start: {period_ms: 1000}}}"
+    system.write_text(f"system: hangs\nnodes: {{x: {node}}}\n")
+    (tmp_path / "parts.py").write_text(HANGS)
+    with RunningSystem(str(system), "--time", "virtual", "--for", "5") as running:
+        running.wait_for("it hangs")
+        assert running.stop()[0] == 0
+        assert re.search(r"on_start is interrupted; it is at \S+parts.py:[78]", running.output)
+
+
 #: What is not of virtual time, by its line.
 OUTSIDE = """
 import os, random, socket, subprocess, threading, time, uuid
