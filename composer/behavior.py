@@ -272,7 +272,7 @@ class Transforms(Protocol):
 class Behavior:
     """Base class of behaviors: the attributes that the composer sets before ``on_configure``.
 
-    In a test without ROS, set the attributes that a handler uses to test doubles.
+    :class:`composer.testing.BehaviorTest` sets them in a test.
     """
 
     # Slots are faster to access than the dict, which subclasses use for their own attributes.
