@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry, Path
 from composer.typed import PlannerBehavior
 
 NANOSECONDS = 1_000_000_000
+MAX_POINTS = 10_000
 
 
 class Planner(PlannerBehavior):
@@ -32,7 +33,7 @@ class Planner(PlannerBehavior):
         if self.odometry is None:
             response.message = "no odometry received yet: the frame of the path is unknown"
             return response
-        reason = _refusal(request)
+        reason = _refusal(request) or self._too_many_points(request)
         if reason is None:
             response.path = self._path(request, self.odometry.header.frame_id)
             response.success = True
@@ -41,12 +42,24 @@ class Planner(PlannerBehavior):
             response.message = reason
         return response
 
-    def _path(self, request: PlanTrajectory.Request, frame_id: str) -> Path:
+    def _too_many_points(self, request: PlanTrajectory.Request) -> str | None:
+        if self._duration_s(request) <= MAX_POINTS * self._period_s:
+            return None
+        return f"at this velocity, the path has more than {MAX_POINTS} points"
+
+    def _duration_s(self, request: PlanTrajectory.Request) -> float:
         start, goal = request.start, request.goal
         velocity = min(request.max_velocity, self.parameters.max_velocity)
-        period_s = self.parameters.sample_period_ms / 1000.0
-        length = math.dist((start.x, start.y, start.z), (goal.x, goal.y, goal.z))
-        steps = max(1, math.ceil(length / (velocity * period_s)))
+        return math.dist((start.x, start.y, start.z), (goal.x, goal.y, goal.z)) / velocity
+
+    @property
+    def _period_s(self) -> float:
+        return self.parameters.sample_period_ms / 1000.0
+
+    def _path(self, request: PlanTrajectory.Request, frame_id: str) -> Path:
+        start, goal = request.start, request.goal
+        period_s = self._period_s
+        steps = max(1, math.ceil(self._duration_s(request) / period_s))
         yaw = math.atan2(goal.y - start.y, goal.x - start.x)
         path = Path()
         path.header.frame_id = frame_id

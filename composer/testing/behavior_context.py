@@ -68,7 +68,8 @@ class VirtualLoop(BaseLoop):
         while not is_over():
             calls += 1
             if calls > _CALLS_AT_ONE_TIME:
-                raise TestFailure(f"{calls - 1:,} calls, but the time stands still")
+                at_s = self.clock.monotonic()
+                raise TestFailure(f"{calls - 1:,} calls at {at_s:g} s: no time passes")
             if self._ready:
                 self._ready.popleft()()
                 self.raise_error()

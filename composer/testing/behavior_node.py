@@ -163,7 +163,7 @@ class TestNode:
             raise BehaviorError(f"the node has failed: {self.failures[failures]}")
         if result is False:
             raise TransitionFailed(f"{name} returned False")
-        if result not in (None, True):
+        if result is not None and result is not True:
             text = f"{name} returned {shown(result)}; None and True mean done, False refused"
             raise TypeError(text)
 
