@@ -236,11 +236,12 @@ class TestNode:
             case PortKind.SUBSCRIPTION:
                 return SubscriptionPort(context, port, self._on_message(port, handler))
             case PortKind.SERVICE:
-                return ServicePort(context, name, interface, handler, reentrant=port.reentrant)
+                respond = handler or (lambda _, response: response)
+                return ServicePort(context, name, interface, respond, reentrant=port.reentrant)
             case PortKind.ACTION_SERVER:
-                accept = method(behavior, f"accept_{name}")
+                execute, accept = handler or (lambda _: None), method(behavior, f"accept_{name}")
                 limit = None if port.reentrant else port.qos.profile.queue_depth or inf
-                return ActionServerPort(context, name, interface, (handler, accept), limit)
+                return ActionServerPort(context, name, interface, (execute, accept), limit)
             case _:
                 client = ClientPort(context, port, interface)
                 if name in self.servers:

@@ -291,9 +291,11 @@ class BehaviorTest:
     def _record(self, port: str, content: Any) -> None:
         declared = self._model.port(port)
         if declared is not None:
-            self._messages.check(declared.interface.value, _PARTS[declared.kind], content, port)
+            self._messages.check(
+                declared.interface.value, _PARTS[declared.kind], content, f"'{port}'"
+            )
         self._sent.setdefault(port, []).append(Received(self.now_s, content))
-        self._note(f"'{port}': {short(content)}")
+        self._timeline.add(self.now_s, lambda: f"'{port}': {short(content)}")
         if self._node.transforms is not None and port.startswith("/tf"):
             self._node.transforms.on_broadcast(port, content)
 
