@@ -26,6 +26,7 @@ from benchmarks import (
     systems,
     targets,
     validation,
+    virtual_time,
 )
 from benchmarks.figures import Row, as_json, table
 
@@ -34,6 +35,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
     "commands": ("wall time of commands without a running system", start_up.measure),
     "live": ("wall time of commands on a running system", live_commands.measure),
     "validation": ("scaling of compose validate with the size of a system", validation.measure),
+    "virtual": ("wall time of scenarios in virtual time", virtual_time.measure),
     "pipeline": ("CPU of systems/pipeline.yaml", pipeline.measure),
     "ring": ("CPU per message at full speed, start-up time and memory of N nodes", systems.ring),
     "growth": ("CPU per message with 300 nodes compared to 10", systems.growth),
