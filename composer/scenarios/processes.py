@@ -1,7 +1,7 @@
 """Runs scenarios side by side, each in a process of its own.
 
 A process runs one scenario: rclpy has one context, and modules of user code have state. The
-processes are forks of this one, which has imported everything and has no threads, so each starts
+processes are forks of this one, which has imported everything and started no thread, so each starts
 within milliseconds.
 """
 
