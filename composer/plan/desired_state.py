@@ -1,9 +1,9 @@
 """The desired state of a system: goals, failed nodes, and restarts.
 
-Everything that changes it has a place in one order, given by serial numbers: external transitions
+Everything that changes it has a place in one order, given by serial numbers: requested transitions
 and failures increase :attr:`DesiredState.serial`. A plan, and a fault, carry the serial number of
 the desired state that they are based on. If the node of a step or of a fault has been moved
-externally after that, the step or the fault is outdated: the later of two changes of a node wins.
+on request after that, the step or the fault is outdated: the later of two changes of a node wins.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ T = TypeVar("T")
 class FaultKind(StrEnum):
     """How the failure of a node was detected."""
 
-    TRANSITION = "transition"  # requested externally, ended in an error
+    TRANSITION = "transition"  # requested, ended in an error
     STEP = "step"  # a step of a plan failed
     SILENCE = "silence"
     CALLBACK = "callback"  # took too long and was interrupted
@@ -49,7 +49,7 @@ class Condition(StrEnum):
 class Fault:
     """A failure of a node. ``node`` is its key; ``serial`` that of the desired state at the time.
 
-    A fault is outdated once an external transition has moved the node.
+    A fault is outdated once a requested transition has moved the node.
     """
 
     node: str
@@ -78,8 +78,8 @@ class DesiredState:
     ``unhandled`` are the nodes with a failed transition whose fault has not been handled, with the
     serial number of the fault.
 
-    ``serial`` is the number of the last external transition or failure; ``moved`` and ``failed``
-    are the numbers of the last external transition of each node, and of the failure that keeps it
+    ``serial`` is the number of the last requested transition or failure; ``moved`` and ``failed``
+    are the numbers of the last requested transition of each node, and of the failure that keeps it
     down. ``activity`` is that of the system with these goals: "running", "paused" or "reset".
     """
 
@@ -101,11 +101,11 @@ class DesiredState:
         return min(self.scheduled.values(), key=lambda restart: restart.due_s, default=None)
 
     def has_moved(self, node: str, since: int) -> bool:
-        """Return whether an external transition has moved the node since a serial number."""
+        """Return whether a requested transition has moved the node since a serial number."""
         return self.moved.get(node, 0) > since
 
     def failed_after_move_of(self, node: str, failed: str) -> bool:
-        """Return whether ``failed`` has failed since ``node`` was last moved externally."""
+        """Return whether ``failed`` has failed since ``node`` was last moved on request."""
         return self.failed.get(failed, 0) >= self.moved.get(node, 0)
 
     def with_goals(
@@ -117,7 +117,7 @@ class DesiredState:
         """Return a copy with new goals for some of the nodes, and perhaps another activity.
 
         ``since`` is the serial number at which the goals were requested: nodes that have been moved
-        externally after that keep theirs.
+        on request after that keep theirs.
         """
         since = self.serial if since is None else since
         new = {name: goal for name, goal in goals.items() if not self.has_moved(name, since)}
@@ -125,7 +125,7 @@ class DesiredState:
         return replace(self, goals=merged, activity=activity or self.activity)
 
     def move(self, node: str, state: PrimaryState) -> DesiredState:
-        """Return a copy after an external transition: the new state is the goal of the node.
+        """Return a copy after a requested transition: the new state is the goal of the node.
 
         It is no longer kept down.
         """
@@ -138,7 +138,7 @@ class DesiredState:
         )
 
     def break_down(self, node: str) -> DesiredState:
-        """Return a copy after an external transition that ended in an error: a fault follows."""
+        """Return a copy after a requested transition that ended in an error: a fault follows."""
         serial = self.serial + 1
         return replace(
             self,
@@ -180,7 +180,7 @@ class DesiredState:
         return replace(handled, ignored={**self.ignored, fault.node: fault.text})
 
     def is_outdated(self, fault: Fault) -> bool:
-        """Return whether an external transition has moved the node since the fault.
+        """Return whether a requested transition has moved the node since the fault.
 
         A node that cannot be interrupted does not get better by that.
         """

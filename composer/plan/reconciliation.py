@@ -1,7 +1,7 @@
 """Plan the transitions from observed to desired states, with failed nodes kept down.
 
 The desired state of a failed node is unconfigured, that of the nodes that depend on it at most
-inactive unless they are moved externally after it; all others keep theirs. The plan leads from the
+inactive unless they are moved on request after it; all others keep theirs. The plan leads from the
 observed states to the desired ones (:func:`composer.plan.plan_transitions`). A restart releases a
 failed node after a backoff.
 """
@@ -109,7 +109,7 @@ def desired_states(system: System, desired: DesiredState) -> Mapping[str, Primar
 def blocked_nodes(system: System, desired: DesiredState) -> Mapping[str, str]:
     """Return the nodes that must not be active, each with the failed node that it depends on.
 
-    A node that an external transition has moved since the failure is not among them.
+    A node that a requested transition has moved since the failure is not among them.
     """
     blocked: dict[str, str] = {}
     if not desired.down:

@@ -320,7 +320,7 @@ class Host:
     def _on_command(self, command: Command) -> None:
         if command.name == "shutdown":
             self._shutdown_commands.append(command)
-            self.stop("shutdown requested externally")
+            self.stop("shutdown requested")
         else:
             self._main_queue.put(command)
 

@@ -1,7 +1,7 @@
-"""External transitions, faults and plans in any order: a failure stays where it is.
+"""Requested transitions, faults and plans in any order: a failure stays where it is.
 
 The supervisor, the plan executor and the listeners are the real ones. The nodes are simulated,
-without ROS and threads: wherever another thread could run, some external requests come first.
+without ROS and threads: wherever another thread could run, some requests come first.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class SimulatedNode:
         self.state = "unconfigured"
         self.loop = self.lifecycle = self
         self.breaks = False
-        self._running = ""  # the external transition that runs
+        self._running = ""  # the requested transition that runs
         self._start = ""
         self._name = model.name.value
         self._world = world
@@ -155,33 +155,33 @@ class SimulatedNode:
         """End the step in which an external node is awaited."""
         future, self.awaited = self.awaited, None
         if future is not None:
-            future.set_result(self._finish(ending, external=False))
+            future.set_result(self._finish(ending, requested=False))
 
     async def run_step(
         self, transition: str, is_outdated: Callable[[], bool]
     ) -> TransitionOutcome | None:
-        """Wait for an external transition, then run the step as the lifecycle does.
+        """Wait for a requested transition, then run the step as the lifecycle does.
 
         Return None if an external node is awaited.
         """
         self._world.interleave()
         self.end("success")
         if is_outdated():
-            return TransitionOutcome(transition, self.state, False, external=False, outdated=True)
+            return TransitionOutcome(transition, self.state, False, requested=False, outdated=True)
         if transition not in self.available:
-            return TransitionOutcome(transition, self.state, False, "refused", external=False)
+            return TransitionOutcome(transition, self.state, False, "refused", requested=False)
         self._world.on_step(self._name, transition)
         self._running, self._start = transition, self.state
         if self.is_absent and transition == "activate":
             self.state = "activating"
             return None
-        outcome = self._finish("error" if self.breaks else "success", external=False)
+        outcome = self._finish("error" if self.breaks else "success", requested=False)
         self.breaks = False
         self._world.interleave()
         return outcome
 
     def request(self, request: Request) -> None:
-        """Run, begin or end an external transition."""
+        """Run, begin or end a requested transition."""
         if self.awaited is not None:
             return
         if self._running:
@@ -193,16 +193,16 @@ class SimulatedNode:
                 self.end(request.ending)
 
     def end(self, ending: str) -> None:
-        """End the external transition that runs, if any."""
+        """End the requested transition that runs, if any."""
         if self._running and self.awaited is None:
-            self._finish(ending, external=True)
+            self._finish(ending, requested=True)
 
-    def _finish(self, ending: str, *, external: bool) -> TransitionOutcome:
+    def _finish(self, ending: str, *, requested: bool) -> TransitionOutcome:
         transition, self._running = self._running, ""
         ends = {"success": GOALS[transition], "failure": self._start, "error": "unconfigured"}
         self.state = ends[ending]
         is_success = ending == "success"
-        outcome = TransitionOutcome(transition, self.state, is_success, ending, external=external)
+        outcome = TransitionOutcome(transition, self.state, is_success, ending, requested=requested)
         self._world.on_end(self._name, outcome)
         self._listener.on_transition_end(outcome)
         return outcome
@@ -231,9 +231,9 @@ class World:
         self._clock = 0
         self.moved_at = dict.fromkeys(NAMES, 0)
         self.broken: set[str] = set()  # the last step of these nodes has failed
-        #: The nodes that the supervisor may move: it had a reason since they were moved externally.
+        #: The nodes that the supervisor may move: it had a reason since they were moved on request.
         self.may_move = set(NAMES)
-        #: The states that external transitions ended in, of the other nodes.
+        #: The states that requested transitions ended in, of the other nodes.
         self.left_in: dict[str, str] = {}
 
     # --- what happens
@@ -247,7 +247,7 @@ class World:
             self.nodes[request.node].request(request)
 
     def on_step(self, name: str, transition: str) -> None:
-        assert name in self.may_move, f"'{transition}' of {name} undoes an external transition"
+        assert name in self.may_move, f"'{transition}' of {name} undoes a requested transition"
         if transition == "configure" and name == "teleop":  # a class, which is constructed now
             assert self.nodes[EXTERNAL].state not in ("activating", "configuring")
         if transition == "activate":  # what follows a failure is decided before
@@ -257,9 +257,9 @@ class World:
 
     def on_end(self, name: str, outcome: TransitionOutcome) -> None:
         self.broken.discard(name)
-        if outcome.reason == "error" and not outcome.external and name != "camera":
+        if outcome.reason == "error" and not outcome.requested and name != "camera":
             self.broken.add(name)
-        if not outcome.external or outcome.reason == "failure":
+        if not outcome.requested or outcome.reason == "failure":
             return
         self._clock += 1
         self.moved_at[name] = self._clock
@@ -465,8 +465,8 @@ class Supervision(RuleBasedStateMachine):
         self.is_reconciled, _ = self.commands.run(Command(name, lambda *_: None))
 
     @invariant()
-    def external_transitions_last(self) -> None:
-        """A node is where the last external transition left it, unless there was a reason since."""
+    def requested_transitions_last(self) -> None:
+        """A node is where a requested transition left it, unless there was a reason since."""
         for name, state in self.world.left_in.items():
             node = self.world.nodes[name]
             assert node.is_moving or node.state == state, name

@@ -41,7 +41,7 @@ _REPORTED_WITHIN_S = 2.0
 class MemberNode(OutsideNode):
     """The :class:`.ManagedNode` of a node in another process of the system.
 
-    Its process starts with its first transition. What it reports without a request is an external
+    Its process starts with its first transition. What it reports by itself is a requested
     transition, or a failure that its process has handled by taking it down.
     """
 
@@ -290,7 +290,7 @@ class MemberNode(OutsideNode):
         if not self._lock.is_held and self._reported in (INACTIVE, ACTIVE):
             self._state = self._reported
             self._listener.on_transition_end(
-                TransitionOutcome("return", self._state, success=True, external=False)
+                TransitionOutcome("return", self._state, success=True, requested=False)
             )
         self._listener.on_returned()
 
@@ -311,7 +311,7 @@ class MemberNode(OutsideNode):
         if state in self._given_up:
             self._given_up.clear()
             self._state = state
-            outcome = TransitionOutcome("return", state, success=True, external=False)
+            outcome = TransitionOutcome("return", state, success=True, requested=False)
             self._listener.on_transition_end(outcome)
             self._listener.on_returned()
             return

@@ -135,25 +135,25 @@ class Lifecycle:
         }
 
     async def change(self, transition: str) -> TransitionOutcome:
-        """Run an external ``transition`` as soon as no other one runs. Raises nothing."""
+        """Run a requested ``transition`` as soon as no other one runs. Raises nothing."""
         while (current := self._acquire()) is not None:
             await current
-        return await self._run(transition, external=True)
+        return await self._run(transition, requested=True)
 
     async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
         """Run the ``transition`` of a plan as soon as no other one runs. Raises nothing.
 
-        If ``is_outdated()`` then, do not run it: an external transition came first.
+        If ``is_outdated()`` then, do not run it: a requested transition came first.
         """
         while (current := self._acquire()) is not None:
             await current
         if is_outdated():
             self._release()
-            reason = "an external transition came first"
+            reason = "a requested transition came first"
             return TransitionOutcome(
-                transition, self.state, success=False, reason=reason, external=False, outdated=True
+                transition, self.state, success=False, reason=reason, requested=False, outdated=True
             )
-        return await self._run(transition, external=False)
+        return await self._run(transition, requested=False)
 
     def fail_request(self) -> None:
         """Answer the pending ``change_state`` request: its transition hangs. Thread-safe."""
@@ -181,10 +181,10 @@ class Lifecycle:
         if current is not None:
             current.set_result(None)
 
-    async def _run(self, transition: str, *, external: bool) -> TransitionOutcome:
+    async def _run(self, transition: str, *, requested: bool) -> TransitionOutcome:
         """Run a transition; the state machine has been acquired, and is released at the end."""
         try:
-            return await self._transition(transition, external=external)
+            return await self._transition(transition, requested=requested)
         except Cancelled:
             raise
         except BaseException as error:
@@ -196,7 +196,7 @@ class Lifecycle:
         finally:
             self._release()
 
-    async def _transition(self, transition: str, *, external: bool) -> TransitionOutcome:
+    async def _transition(self, transition: str, *, requested: bool) -> TransitionOutcome:
         start = self.state
         transition_id = self.available.get(transition)
         if transition_id is None:
@@ -214,7 +214,7 @@ class Lifecycle:
             self._machine.trigger_transition_by_label(_SUCCESS, True)
         reason = "" if cause is None else describe(cause)
         result = TransitionOutcome(
-            transition, self.state, success=cause is None, reason=reason, external=external
+            transition, self.state, success=cause is None, reason=reason, requested=requested
         )
         self._hooks.on_transition_end(result)
         return result
@@ -303,7 +303,7 @@ class Lifecycle:
 
     async def _answer_change_state(self, transition: str, reply: Reply) -> None:
         self._pending_reply.append(reply)
-        result = await self._run(transition, external=True)
+        result = await self._run(transition, requested=True)
         self._answer(success=result.success)
 
     def _answer(self, *, success: bool) -> None:

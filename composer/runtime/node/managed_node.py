@@ -19,15 +19,15 @@ if TYPE_CHECKING:  # tests of the supervision run without ROS
 class TransitionOutcome:
     """How a requested transition ended, in which state, and why it did not succeed.
 
-    ``external`` is false for the step of a plan; ``outdated`` is true for a step that was not run
-    because an external transition came first.
+    ``requested`` is false for the step of a plan; ``outdated`` is true for a step that was not run
+    because a requested transition came first.
     """
 
     transition: str
     state: str
     success: bool
     reason: str = ""
-    external: bool = True
+    requested: bool = True
     outdated: bool = False
 
 
@@ -64,12 +64,12 @@ class ManagedLifecycle(Protocol):
         """The ids of the transitions that can be requested now, by name. Thread-safe."""
 
     async def change(self, transition: str) -> TransitionOutcome:
-        """Run an external ``transition`` as soon as no other one runs."""
+        """Run a requested ``transition`` as soon as no other one runs."""
 
     async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
         """Run the ``transition`` of a plan as soon as no other one runs.
 
-        If ``is_outdated()`` then, do not run it: an external transition came first.
+        If ``is_outdated()`` then, do not run it: a requested transition came first.
         """
 
     def fail_request(self) -> None:

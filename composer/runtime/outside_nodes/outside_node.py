@@ -167,34 +167,39 @@ class OutsideNode(ABC):
         return available_transitions(self._state)
 
     async def change(self, transition: str) -> TransitionOutcome:
-        """Run an external ``transition`` as soon as no other one runs. Raises nothing."""
+        """Run a requested ``transition`` as soon as no other one runs. Raises nothing."""
         await self._lock.acquire()
-        return await self._run(transition, external=True)
+        return await self._run(transition, requested=True)
 
     async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
         """Run the ``transition`` of a plan as soon as no other one runs. Raises nothing."""
         await self._lock.acquire()
         if is_outdated():
             self._lock.release()
-            reason = "an external transition came first"
+            reason = "a requested transition came first"
             return TransitionOutcome(
-                transition, self._state, success=False, reason=reason, external=False, outdated=True
+                transition,
+                self._state,
+                success=False,
+                reason=reason,
+                requested=False,
+                outdated=True,
             )
-        return await self._run(transition, external=False)
+        return await self._run(transition, requested=False)
 
     def fail_request(self) -> None:
         """Do nothing: requests of external nodes do not pass through this process."""
 
-    async def _run(self, transition: str, *, external: bool) -> TransitionOutcome:
+    async def _run(self, transition: str, *, requested: bool) -> TransitionOutcome:
         """Run a transition; the lock has been acquired, and is released at the end."""
         try:
-            result = await self._transition(transition, external=external)
+            result = await self._transition(transition, requested=requested)
         finally:
             self._lock.release()
         self._on_settled()
         return result
 
-    async def _transition(self, transition: str, *, external: bool) -> TransitionOutcome:
+    async def _transition(self, transition: str, *, requested: bool) -> TransitionOutcome:
         start = self._state
         if transition not in self.available:
             names = ", ".join(self.available) or "none"
@@ -216,7 +221,7 @@ class OutsideNode(ABC):
             self._state = state
         self.activations += state == ACTIVE
         result = TransitionOutcome(
-            transition, state, success=not reason, reason=reason, external=external
+            transition, state, success=not reason, reason=reason, requested=requested
         )
         self._listener.on_transition_end(result)
         return result

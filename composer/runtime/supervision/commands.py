@@ -75,7 +75,7 @@ class Commands:
         self.status.set_activity(done if problem is None else before)
         return problem
 
-    # The actions move no node that has been moved externally since the serial number ``since``.
+    # The actions move no node that has been moved on request since the serial number ``since``.
 
     def _start_up(self, since: int, *, together: bool) -> str | None:
         problem = self._recreate(since)

@@ -101,7 +101,7 @@ class Restarted:
 
 @dataclass(frozen=True, slots=True)
 class Commanded:
-    """A command was requested externally: for the whole system, or for ``nodes``."""
+    """A command was requested: for the whole system, or for ``nodes``."""
 
     elapsed_s: float
     command: str
@@ -109,7 +109,7 @@ class Commanded:
 
     def __str__(self) -> str:
         of = f" of {', '.join(self.nodes)}" if self.nodes else ""
-        return f"{self.command}{of} requested externally"
+        return f"{self.command}{of} requested"
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ class FaultHandler:
         decisions = ((fault, self._decide(fault, now_s)) for fault in faults)
         handled = [(fault, decision) for fault, decision in decisions if decision is not None]
         self._report_failed(handled)
-        # Before they move: their steps are not to be taken for external transitions.
+        # Before they move: their steps are not to be taken for requested transitions.
         self._reconciler.publish_desired()
         for fault, _ in handled:
             if fault.kind is FaultKind.LOST:
@@ -141,7 +141,7 @@ class FaultHandler:
                 self._status.set_error(name, text)
 
     def _shut_down_unless_down(self, name: str) -> None:
-        """Shut down a failed node that could not be cleaned up, unless it was moved externally."""
+        """Shut down a failed node that could not be cleaned up, unless it was moved on request."""
         desired = self._shared.value
         at = self._node_set.states().get(name, PrimaryState.UNCONFIGURED)
         is_kept_down = name in desired.down and name not in self._reconciler.absent

@@ -18,7 +18,7 @@ from composer.runtime.process.signals import wakeup_for
 class SharedDesiredState:
     """The current desired state. Thread-safe.
 
-    Nodes record external transitions, on their own threads, before they answer the request. The
+    Nodes record requested transitions, on their own threads, before they answer the request. The
     supervisor changes the rest, on the main thread. The lock gives all changes one order, and is
     held for microseconds only: no transition waits for the supervisor or for another node.
     """

@@ -23,7 +23,7 @@ _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 class SupervisionListener:
     """Reports one node's transitions and errors to the status, the user and the supervisor.
 
-    The state that an external transition ends in becomes the desired one, before the node answers
+    The state that a requested transition ends in becomes the desired one, before the node answers
     the request or starts another transition. The main queue receives it too, because other nodes
     may have to move. The plan executor waits for the result of a step.
     """
@@ -45,8 +45,8 @@ class SupervisionListener:
         self._last_state = ""
 
     def on_transition_end(self, result: TransitionOutcome) -> None:
-        """Report the new state; record an external transition first."""
-        item = self._record(result) if result.external else None
+        """Report the new state; record a requested transition first."""
+        item = self._record(result) if result.requested else None
         at_s = self._reporter.elapsed_s
         transition, state = result.transition, result.state
         self._status.set_state(self._name, state)
@@ -57,7 +57,7 @@ class SupervisionListener:
             self._main_queue.put(item)
 
     def _record(self, result: TransitionOutcome) -> Item:
-        """Record an external transition; return the item for the supervisor."""
+        """Record a requested transition; return the item for the supervisor."""
         name = self._name
         if result.state == TRANSITIONS[result.transition].goal:
             goal = REACHED[result.transition]
@@ -66,7 +66,7 @@ class SupervisionListener:
             text = f"{result.transition} ended in an error: {result.reason}"
             serial = self._desired.update(lambda desired: desired.break_down(name)).serial
             return Fault(name, FaultKind.TRANSITION, text, serial)
-        return NodeMoved(name, f"external transition of {self._full_name}")
+        return NodeMoved(name, f"requested transition of {self._full_name}")
 
     def on_error(self, callback: str, text: str) -> None:
         """Report an error of user code."""

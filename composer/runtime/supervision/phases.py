@@ -22,7 +22,7 @@ class StepFailed:
     """A step that failed, and the state that the node is in.
 
     ``stuck`` is true if the step was abandoned, or a callback was interrupted that blocked it;
-    ``stack`` is where that callback was. ``outdated`` is true if it was not run because an external
+    ``stack`` is where that callback was. ``outdated`` is true if it was not run because a requested
     transition came first.
     """
 
@@ -53,7 +53,7 @@ class ExecutionOptions:
     plan; their ends are in the main queue. With ``are_faults``, the caller reports the failures.
 
     ``serial`` is that of the desired state that the plan is based on. Nodes that have been moved
-    externally since then are not moved; None moves them as well.
+    on request since then are not moved; None moves them as well.
     """
 
     best_effort: bool = False

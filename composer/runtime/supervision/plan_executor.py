@@ -154,7 +154,7 @@ class PlanExecutor:
         self._main_queue.wakeup.wake()
 
     def _is_outdated(self, step: Step, options: ExecutionOptions) -> bool:
-        """Return whether an external transition or a fault came first.
+        """Return whether a requested transition or a fault came first.
 
         Called once no other transition can.
         """

@@ -50,7 +50,7 @@ class Reconciler:
     ) -> None:
         self.system = system
         self.node_set = node_set
-        #: Also changed by the nodes, which record external transitions.
+        #: Also changed by the nodes, which record requested transitions.
         self.shared = SharedDesiredState()
         self.main_queue = main_queue
         self.status = status
@@ -150,7 +150,7 @@ class Reconciler:
     def roll_back(
         self, before: Mapping[str, PrimaryState], since: int, node: str, reason: str
     ) -> None:
-        """Take the nodes back to the states ``before``, unless they were moved externally since.
+        """Take the nodes back to the states ``before``, unless they were moved on request since.
 
         ``node`` has failed for ``reason``.
         """

@@ -1,7 +1,7 @@
-"""Keeps a system in its desired state: handles faults, external transitions and restarts.
+"""Keeps a system in its desired state: handles faults, requested transitions and restarts.
 
 :mod:`composer.plan` decides what to do. The supervisor does it, on the main thread, one event at a
-time, and owns the clock of the restarts. Nodes record external transitions in the desired state
+time, and owns the clock of the restarts. Nodes record requested transitions in the desired state
 themselves, so every plan is based on all of them (see :mod:`.main_queue`).
 """
 
@@ -70,7 +70,7 @@ class Supervisor:
         )
 
     def has_moved(self, node: str, since: int) -> bool:
-        """Return whether an external transition has moved the node since a serial number."""
+        """Return whether a requested transition has moved the node since a serial number."""
         return self.desired.has_moved(node, since)
 
     # --- the whole system
@@ -83,7 +83,7 @@ class Supervisor:
         *,
         forget_failures: bool = False,
     ) -> None:
-        """Change the goals of nodes, except of those moved externally since a serial number.
+        """Change the goals of nodes, except of those moved on request since a serial number.
 
         ``activity`` is that of the system with these goals; by default, it does not change.
         """
@@ -221,7 +221,7 @@ class Supervisor:
         self.reconciler.reconcile_settled(", ".join(causes[:_MAX_CAUSES]) + more)
 
     def restart(self, restarts: Iterable[Restart]) -> None:
-        """Restart failed nodes together, unless external transitions come first."""
+        """Restart failed nodes together, unless requested transitions come first."""
         texts: list[str] = []
         for restart in restarts:
             name, serial = restart.node, self.desired.serial

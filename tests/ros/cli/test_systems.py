@@ -197,7 +197,7 @@ def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> Non
     assert repeated_until(bool, "lifecycle", "restart", "planner") == (
         "/fleet/planner: restarted (2 of 3 nodes active)\n"
     )
-    requested = "restart of /fleet/planner requested externally"
+    requested = "restart of /fleet/planner requested"
     wait_until(lambda: len(robot.messages(requested)) >= before + 8, "the log of the restart")
     assert robot.messages()[before:] == [
         requested,

@@ -119,7 +119,7 @@ def test_commands_pause_resume_reset_and_start_a_system(tmp_path: Path, peer: Pe
             assert command(peer, "is_active")[0] is (message.startswith("2")), what
         assert command(peer, "shutdown")[0]
         assert system.end().exit_code == 0
-    assert system.end().reason == "shutdown requested externally"
+    assert system.end().reason == "shutdown requested"
     assert system.states()[-3:][0] in ("/fleet/camera finalized", "/fleet/motor finalized")
 
 

@@ -180,7 +180,7 @@ def test_a_failed_node_is_isolated_and_the_others_continue(
         if fault == "deactivate":
             assert failed.reason == "deactivate ended in an error: ValueError: stuck motor"
 
-        # After external transitions, its dependents become active again.
+        # After requested transitions, its dependents become active again.
         assert peer.set_parameter("/sensor", "fault", "") == ""
         assert peer.change("/sensor", "configure")
         assert peer.state("/motor") == "inactive"

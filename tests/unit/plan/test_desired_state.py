@@ -1,4 +1,4 @@
-"""Of an external transition and a fault, a plan or a command, the later one wins."""
+"""Of a requested transition and a fault, a plan or a command, the later one wins."""
 
 from __future__ import annotations
 
@@ -55,17 +55,17 @@ def test_goals_do_not_replace_those_of_later_external_transitions() -> None:
     assert desired.with_goals(down, desired.serial).goals == down
 
 
-def test_a_dependent_that_is_activated_externally_stays_active(robot: System) -> None:
+def test_a_dependent_that_is_activated_on_request_stays_active(robot: System) -> None:
     desired = DesiredState(ALL_ACTIVE).fail(fault("sensor", 0))
     paused = {"sensor": UNCONFIGURED, "planner": INACTIVE, "motor": INACTIVE}
     assert desired_states(robot, desired) == paused
     moved = desired.move("motor", ACTIVE)
     assert desired_states(robot, moved) == {**paused, "motor": ACTIVE}
     again = moved.release("sensor").fail(fault("sensor", moved.serial))
-    assert desired_states(robot, again) == paused, "it fails after the external transition"
+    assert desired_states(robot, again) == paused, "it fails after the requested transition"
 
 
-def test_no_restart_is_scheduled_for_a_node_that_was_moved_externally() -> None:
+def test_no_restart_is_scheduled_for_a_node_that_was_moved_on_request() -> None:
     failed = DesiredState(ALL_ACTIVE).fail(fault("sensor", 0))
     restart = Restart("sensor", 1, due_s=1.0)
     assert failed.schedule(restart).next_restart == restart

@@ -268,7 +268,7 @@ def test_restarts_are_due_in_the_order_of_their_times() -> None:
     assert desired.next_restart == soon
     desired = desired.restart("planner", at_s=101.0)
     assert desired.next_restart == late
-    assert desired.release("sensor").next_restart is None, "an external transition came first"
+    assert desired.release("sensor").next_restart is None, "a requested transition came first"
 
 
 BUDGET = (

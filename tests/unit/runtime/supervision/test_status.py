@@ -17,7 +17,7 @@ CAMERA = NodeReport("/camera", "inactive", starts_active=False, state="inactive"
     [
         ((PLANNER, CAMERA), True),
         ((PLANNER, replace(CAMERA, state="active")), True),
-        ((PLANNER, replace(CAMERA, state="unconfigured")), True),  # by an external transition
+        ((PLANNER, replace(CAMERA, state="unconfigured")), True),  # by a requested transition
         ((replace(PLANNER, state="inactive"), CAMERA), False),
         ((replace(PLANNER, state="deactivating"), CAMERA), False),
         ((PLANNER, replace(CAMERA, state="unconfigured", held_down="no lens")), False),
