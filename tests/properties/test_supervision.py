@@ -17,10 +17,11 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from composer.model import Node, PrimaryState
 from composer.model.dependencies import dependency_edges
+from composer.model.lifecycle import FINALIZED
 from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.futures import Future
-from composer.runtime.node.managed_node import FINALIZED, TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.main_queue import (
