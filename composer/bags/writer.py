@@ -17,6 +17,7 @@ from composer.bags import qos_yaml
 from composer.bags.bag import NANOSECONDS, Attachment, BagError, BagMessage, BagTopic
 from composer.base.fast_dataclass import dataclass
 
+_BYTES_PER_MB = 1_000_000
 #: Of rosbag2 in Jazzy.
 _METADATA_VERSION = 9
 _ROS_DISTRO = "jazzy"
@@ -32,6 +33,13 @@ class SplitLimits:
 
     size_bytes: float = inf
     duration_s: float = inf
+
+
+def split_limits(megabytes: float | None, seconds: float | None) -> SplitLimits:
+    """Return the limits; None is no limit."""
+    return SplitLimits(
+        inf if megabytes is None else megabytes * _BYTES_PER_MB, inf if seconds is None else seconds
+    )
 
 
 @dataclass(slots=True)

@@ -18,16 +18,11 @@ from composer.cli.support.terminal import write
 #: ``<name>_app`` with subcommands, or a function with the name of the command and its epilog,
 #: ``EPILOG``.
 COMMANDS = {
-    "Commands for systems": ("run", "down", "ps", "top", "logs", "dashboard", "hosts"),
+    "Commands for systems": (
+        *("run", "down", "ps", "top", "logs", "record", "dashboard", "hosts"),
+    ),
     "Commands for files": (
-        "validate",
-        "test",
-        "config",
-        "graph",
-        "diff",
-        "new",
-        "import",
-        "export",
+        *("validate", "test", "config", "graph", "diff", "new", "import", "export", "bag"),
     ),
     "Commands for ROS 2": (
         "lifecycle",

@@ -29,6 +29,7 @@ from composer.model.ports import (
     Port,
     Qos,
 )
+from composer.model.recording import Recording
 
 T = TypeVar("T")
 
@@ -169,6 +170,7 @@ class System:
     processes: tuple[Process, ...] = ()
     hosts: tuple[Host, ...] = ()
     discovery: Discovery | None = None
+    recording: Recording | None = None
     autostart: PrimaryState = PrimaryState.ACTIVE
     supervision: Supervision = DEFAULT_SUPERVISION
     implied_dependencies: bool = True

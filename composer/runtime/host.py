@@ -23,7 +23,7 @@ from __future__ import annotations
 import gc
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 
@@ -214,6 +214,7 @@ class Host:
             nodes=lambda: {node.full_name: node for node in tuple(self._node_set.nodes.values())},
             recreate=self._recreate,
             expect_end=self._end.keep_entities,
+            save_recording=self._save_recording,
             write_log=self._reporter.log,
         )
         use_sim_time = self._system.use_sim_time
@@ -329,6 +330,12 @@ class Host:
         problem = self._node_set.recreate(name, lambda: False)
         self._status.update_states({name: self._node_set.nodes[name].state})
         return problem
+
+    def _save_recording(self, done: Callable[[bool, str], None]) -> None:
+        if self._options.recorder is None:
+            done(False, "it does not record: its file has no 'recording'")
+        else:
+            self._options.recorder.save(done)
 
     def _on_older_instance(self, namespace: str, instance: Instance) -> None:
         self._node_set.leave_others()

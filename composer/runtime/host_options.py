@@ -4,13 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, Port, Process
 from composer.runtime.clock.clock import COMPUTER, Clock
 
 R = TypeVar("R")
+
+
+class Tap(Protocol):
+    """Receives what a publisher publishes."""
+
+    def put(self, message: Any) -> None:
+        """Receive a message, from any thread. It must not wait."""
+
+
+class Recorder(Protocol):
+    """Receives what the nodes in the process publish."""
+
+    def target(self, port: Port) -> Tap | None:
+        """Return what receives the messages of a publisher, if anything does."""
+
+    def save(self, done: Callable[[bool, str], None]) -> None:
+        """Write the last seconds; ``done`` receives whether that succeeded, and where or why."""
 
 
 class Instruments(Protocol):
@@ -47,7 +64,7 @@ class HostOptions:
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
     by ``clock``; by default, from when the host is created. ``clock`` is the clock of the system.
     With ``seed``, which is 0 by default in virtual time, random numbers are the same in each run.
-    ``instruments`` are those of a test.
+    ``instruments`` are those of a test. ``recorder`` receives what is published.
     """
 
     run_for_s: float | None = None
@@ -70,6 +87,7 @@ class HostOptions:
     report_key: str = ""
     member_command: Sequence[str] = ()
     instruments: Instruments | None = None
+    recorder: Recorder | None = None
 
 
 #: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.

@@ -48,6 +48,7 @@ from composer.cli.support.system_arguments import (
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
+    from composer.bags.system_recording import SystemRecording
     from composer.model import Process, System
     from composer.plan import Plan
     from composer.runtime.host_options import HostOptions
@@ -68,6 +69,7 @@ EPILOG = examples(
     "compose run robot.yaml --process perception           run one of its processes alone",
     "compose run pipeline --time virtual --for 60          a minute in a second, always the same",
     "compose run pipeline --time virtual --speed 10 --publish-clock   ten times as fast, for RViz",
+    "compose run pipeline --record                         record all topics in a bag",
     "compose run pipeline --dashboard                      watch and control it in the browser",
 )
 
@@ -164,6 +166,13 @@ def run(
         ),
     ] = False,
     all_or_nothing: AllOrNothing = False,
+    record: Annotated[
+        bool,
+        typer.Option(
+            "--record",
+            help="Record what the nodes publish, in a new folder of 'bags' or as declared.",
+        ),
+    ] = False,
     dashboard: Annotated[
         bool,
         typer.Option(
@@ -253,8 +262,6 @@ def run(
             update_typings(runnable.result.project)
     declared = runnable.system
     member = None if process is None else _member(declared, process, await_processes)
-    if member is not None:
-        os.environ.update({name.value: value for name, value in member.environment})
     part, up, down = _planned(declared, member, autostart)
     if dry_run:
         if up.steps:
@@ -267,7 +274,8 @@ def run(
     _require(part, dashboard=dashboard)
     if member is None:
         announce_discovery(part)
-    options = given_options(context, (*START_OPTIONS, "seed", "tracing", "check_mutation"))
+    passed = (*START_OPTIONS, "seed", "tracing", "check_mutation", "record")
+    options = given_options(context, passed)
     start = [*declared.arguments, *options]
     from composer.cli.support.process import compose_command, run_in_background
     from composer.runtime.process.computer import process_start_s
@@ -294,13 +302,15 @@ def run(
     )
     shown = given_options(context, ("settings", "namespace", "autostart"))
     shown += ["--", system, *declared.arguments]
-    outcome = _run(part, (up, down), host_options, shown if dashboard else None)
+    recording = _recording(part, all_of_it=record, clock=host_options.clock)
+    host_options = replace(host_options, recorder=recording)
+    outcome = _run(part, (up, down), host_options, recording, shown if dashboard else None)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
 
 def _member(system: System, name: str, await_processes: bool) -> Process:
-    """Return a process of the system by its name."""
+    """Return a process of the system by its name, and set its environment variables."""
     from composer.base.diagnostics import suggestion
 
     if await_processes:
@@ -309,7 +319,9 @@ def _member(system: System, name: str, await_processes: bool) -> Process:
     if name not in found:
         hint = suggestion(name, list(found)) or "the system has no 'processes'"
         raise UsageError(f"'{name}' is not a process of system '{system.name}'", hint=hint)
-    return found[name]
+    member = found[name]
+    os.environ.update({item.value: value for item, value in member.environment})
+    return member
 
 
 def _planned(
@@ -336,8 +348,29 @@ def _require(system: System, *, dashboard: bool) -> None:
         require_dashboard("compose run --dashboard")
 
 
+def _recording(system: System, *, all_of_it: bool, clock: Clock) -> SystemRecording | None:
+    """Return the recording that the system or ``--record`` requests. Raises CommandError."""
+    from composer.model.recording import Recording
+
+    settings = system.recording
+    if all_of_it:
+        settings = replace(settings or Recording(), ring_s=None)
+    if settings is None:
+        return None
+    from composer.cli.support.bags import bag_errors
+
+    with bag_errors(writes=True):
+        from composer.bags.system_recording import SystemRecording
+
+        return SystemRecording(system, settings, clock, say)
+
+
 def _run(
-    system: System, plans: tuple[Plan, Plan], options: HostOptions, dashboard: list[str] | None
+    system: System,
+    plans: tuple[Plan, Plan],
+    options: HostOptions,
+    recording: SystemRecording | None,
+    dashboard: list[str] | None,
 ) -> Outcome:
     """Run the system, with its plans up and down, and a dashboard if its arguments are given."""
     gc.disable()  # until the host has its nodes
@@ -360,6 +393,8 @@ def _run(
         log = stack.enter_context(run_log(name, part=is_part, forwarded=is_child))
         address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
         progress = Progress(sys.stderr, console_format(), address)
+        if recording is not None:
+            stack.enter_context(recording.running())
 
         service_manager = ServiceManager()
 
@@ -371,6 +406,8 @@ def _run(
             if not is_child or not is_known:
                 progress.show(event)
             log.show(event)
+            if recording is not None:
+                recording.on_event(event)
             if isinstance(event, BroughtUp | Stopping):
                 state = READY if isinstance(event, BroughtUp) else STOPPING
                 service_manager.send(state, f"STATUS={event}")

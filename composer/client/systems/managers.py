@@ -30,6 +30,7 @@ from composer.runtime.protocol.requests import (
     STATE_TOPIC,
     Done,
     Restart,
+    SaveRecording,
 )
 from composer.runtime.ros.manager_interface import (
     CALLBACKS_QOS,
@@ -197,11 +198,22 @@ class Systems:
 
         ``nodes`` are full names. Raises NoResponseError.
         """
-        request = Restart(tuple(nodes))
+        return self._request(name, Restart(tuple(nodes)), "restart")
+
+    def save_recording(self, name: str) -> tuple[bool, str]:
+        """Let a flight recorder write; return whether it did, and the folder or why not.
+
+        Raises NoResponseError.
+        """
+        return self._request(name, SaveRecording(), "record")
+
+    def _request(
+        self, name: str, request: Restart | SaveRecording, command: str
+    ) -> tuple[bool, str]:
         message = request_message(request)
         try:
             done: Done = read_answer(
-                self._call(name, REQUEST, RequestService, message, "restart"), request
+                self._call(name, REQUEST, RequestService, message, command), request
             )
         except ProtocolError as error:
             raise NoResponseError(f"{name} refused the request: {error}") from error

@@ -1,4 +1,4 @@
-"""Read where the nodes of a system run: its processes, its hosts, and its discovery."""
+"""Read how a system is deployed: its processes, hosts, discovery, and what it records."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from composer.language.tree_values import (
 )
 from composer.model import Host, Process
 from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
+from composer.model.recording import Recording
 
 
 def read_processes(tree: Tree | None) -> tuple[Process, ...]:
@@ -92,4 +93,19 @@ def read_discovery(entry: Entry | None) -> Discovery | None:
         start=flag(tree.get("start"), default=False),
         peers=texts(tree.get("peers")),
         given=tuple(key(item) for item in entries(tree)),
+    )
+
+
+def read_recording(entry: Entry | None) -> Recording | None:
+    """Return what the system records; None if it is not set."""
+    if entry is None or not isinstance(entry.value, Mapping):
+        return None
+    tree = entry.value
+    return Recording(
+        folder=value_or(text(tree.get("folder")), "bags"),
+        topics=texts(tree.get("topics")),
+        exclude=texts(tree.get("exclude")),
+        ring_s=value_or(number(tree.get("ring_s")), None),
+        split_mb=value_or(number(tree.get("split_mb")), None),
+        split_s=value_or(number(tree.get("split_s")), None),
     )

@@ -40,6 +40,7 @@ from composer.model.resolve.deployment import (
     read_discovery,
     read_hosts,
     read_processes,
+    read_recording,
 )
 from composer.model.resolve.node import (
     SystemContext,
@@ -114,6 +115,7 @@ def resolve_system(
         processes=processes,
         hosts=read_hosts(tree.get("hosts")),
         discovery=read_discovery(tree.entry("discovery")),
+        recording=read_recording(tree.entry("recording")),
         autostart=value_or(choice(lifecycle.get("autostart"), PrimaryState), PrimaryState.ACTIVE),
         supervision=system_supervision,
         delivery=value_or(choice(tree.get("delivery"), Delivery), Delivery.AUTO),

@@ -6,6 +6,7 @@ Which topics, services and actions stay in the process is decided from the model
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TypeAlias, TypeVar
 
@@ -14,7 +15,7 @@ from rclpy.subscription import Subscription
 
 from composer.model import Channel, ChannelKind, Delivery, Port, System, channels
 from composer.model.qos import Liveliness, QosProfile, incompatibilities
-from composer.runtime.host_options import Instruments
+from composer.runtime.host_options import Instruments, Recorder
 from composer.runtime.intra_process.ignore_local_publications import (
     ignore_local,
     unsupported_reason,
@@ -116,13 +117,18 @@ class LocalRouter:
     """
 
     def __init__(
-        self, shared: Mapping[ChannelKey, str | None], instruments: Instruments | None = None
+        self,
+        shared: Mapping[ChannelKey, str | None],
+        instruments: Instruments | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         """``shared`` has the channels with ports at both endpoints, and why they need DDS, if any.
 
-        ``instruments`` are those of a test. rclpy must be initialized.
+        ``instruments`` are those of a test; ``recorder`` receives what is published. rclpy must be
+        initialized.
         """
         self._instruments = instruments
+        self._recorder = recorder
         self._dds_reasons = dict(shared)
         #: Why eligible topics use DDS nevertheless; None if they do not.
         self.refusal: str | None = None
@@ -150,6 +156,9 @@ class LocalRouter:
         self, port: Port, publisher: Publisher, context: PublisherContext
     ) -> tuple[GatedPublisher, Remove]:
         """Return the publisher that a node uses for the port, and a function that removes it."""
+        tap = None if self._recorder is None else self._recorder.target(port)
+        if tap is not None:
+            context = replace(context, observers=(*context.observers, tap))
         topic = self._topics.get(channel_of(port))
         if topic is None:
             return GatedPublisher(publisher, context), _do_nothing

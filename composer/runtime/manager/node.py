@@ -55,6 +55,7 @@ from composer.runtime.protocol.requests import (
     Instance,
     KeepGoals,
     Restart,
+    SaveRecording,
 )
 from composer.runtime.ros.limited_requests import limit_type_descriptions, limited
 from composer.runtime.ros.manager_interface import (
@@ -74,7 +75,7 @@ COMMANDS = (
 _RESTART = "restart"
 #: The requests of the coordinating process to the others.
 _OF_MEMBERS = (ChangeStates, KeepGoals, AskReportKey)
-_OF_COMMANDS = (Restart, CallNodes)
+_OF_COMMANDS = (Restart, SaveRecording, CallNodes)
 _PERIOD_S = 1.0
 _ENDS_WITHIN_S = 0.2
 _RESPONSES_ARRIVE_WITHIN_S = 0.15
@@ -89,8 +90,9 @@ class ManagerCallbacks:
     states; ``callbacks()`` and ``chains()`` return timings; ``nodes()`` returns the nodes by their
     full names; ``recreate(node)``, called on the loop of the node, replaces it by a new one if it
     is finalized, and returns why it cannot be created, or None; ``expect_end()`` is called before
-    the last transitions that another process requests; ``write_log`` receives the lines of the
-    manager's log.
+    the last transitions that another process requests; ``save_recording(done)`` writes the last
+    seconds, if the system has a flight recorder; ``write_log`` receives the lines of the manager's
+    log.
     """
 
     on_command: Callable[[Command], None]
@@ -101,6 +103,7 @@ class ManagerCallbacks:
     nodes: Callable[[], Mapping[str, ManagedNode]]
     recreate: Callable[[ManagedNode], str | None]
     expect_end: Callable[[], None]
+    save_recording: Callable[[Callable[[bool, str], None]], None]
     write_log: Write
 
 
@@ -249,6 +252,8 @@ class ManagerNode:
             return
         if isinstance(request, Restart):
             self._restart(request.nodes, reply)
+        elif isinstance(request, SaveRecording):
+            self._host.save_recording(partial(self._answer, reply))
         elif isinstance(request, CallNodes):
             self._loop.run_task(self._call_nodes(request, reply))
         elif self._member is not None:
@@ -257,10 +262,12 @@ class ManagerNode:
     async def _call_nodes(self, request: CallNodes, reply: Reply) -> None:
         reply(answer_message(await answer_calls(request, self._host.nodes())))
 
-    def _restart(self, nodes: tuple[str, ...], reply: Reply) -> None:
-        def answer(success: bool, message: str) -> None:
-            self._loop.call_soon(lambda: reply(answer_message(Done(success, message))))
+    def _answer(self, reply: Reply, success: bool, message: str) -> None:
+        """Answer a request, from any thread."""
+        self._loop.call_soon(lambda: reply(answer_message(Done(success, message))))
 
+    def _restart(self, nodes: tuple[str, ...], reply: Reply) -> None:
+        answer = partial(self._answer, reply)
         known = self._host.nodes()
         unknown = [name for name in nodes if name not in known]
         if unknown or not nodes:

@@ -203,6 +203,13 @@ class Restart:
 
 
 @dataclass(frozen=True, slots=True)
+class SaveRecording:
+    """Writes the last seconds of a flight recorder; the message of the answer is the folder."""
+
+    Answer: ClassVar = Done
+
+
+@dataclass(frozen=True, slots=True)
 class NodeCall:
     """A request to a service that a node does not have: its full name, and the request."""
 

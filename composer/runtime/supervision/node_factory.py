@@ -88,7 +88,7 @@ class NodeFactory:
         self._process = process
         self._nodes = nodes
         shared = shared_channels(self._system, in_virtual_time=self.clock.is_virtual)
-        self._router = LocalRouter(shared, self._options.instruments)
+        self._router = LocalRouter(shared, self._options.instruments, self._options.recorder)
         return self._router.refusal
 
     def make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:

@@ -1,0 +1,92 @@
+"""Records topics of the ROS graph, by subscriptions whose QoS matches their publishers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from rclpy.subscription import Subscription
+
+from composer.bags.bag import BagTopic
+from composer.bags.definitions import full_definition
+from composer.bags.recorder import Recorder
+from composer.client.messages.topics import strictest_compatible_qos
+from composer.client.messages.values import InvalidValueError, class_of
+from composer.client.session import Session
+from composer.interfaces import Interfaces
+from composer.model.names import is_hidden
+from composer.model.qos import QosProfile, incompatibilities
+from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros_graph.endpoints import TopicInfo
+
+#: Latched messages of a topic, and what arrives while this program is busy.
+_DEPTH = 1000
+
+
+class GraphRecording:
+    """Subscribes to the topics that ``is_wanted``, as soon as they have a publisher."""
+
+    def __init__(
+        self,
+        session: Session,
+        recorder: Recorder,
+        is_wanted: Callable[[TopicInfo], bool],
+        warn: Callable[[str], None],
+    ) -> None:
+        """``warn`` receives why a topic cannot be recorded, once."""
+        self._session = session
+        self._recorder = recorder
+        self._is_wanted = is_wanted
+        self._warn = warn
+        self._interfaces = Interfaces.installed()
+        self._subscriptions: dict[str, tuple[Subscription, QosProfile]] = {}
+        self._refused: set[str] = set()
+
+    @property
+    def topics(self) -> int:
+        """The number of topics with a subscription."""
+        return len(self._subscriptions)
+
+    def update(self) -> None:
+        """Subscribe to new topics, and again where a publisher does not match."""
+        for name, types in self._session.graph.topics():
+            if is_hidden(name) or name in self._refused:
+                continue
+            info = self._session.graph.topic(name, types)
+            if info.publishers and self._is_wanted(info):
+                self._subscribe(info, types)
+
+    def close(self) -> None:
+        """Destroy the subscriptions."""
+        for subscription, _ in self._subscriptions.values():
+            self._session.unsubscribe(subscription)
+        self._subscriptions.clear()
+
+    def _subscribe(self, info: TopicInfo, types: tuple[str, ...]) -> None:
+        offers = tuple(dict.fromkeys(publisher.qos for publisher in info.publishers))
+        current = self._subscriptions.get(info.name)
+        if current is not None:
+            if not any(incompatibilities(offer, current[1]) for offer in offers):
+                return
+            self._session.unsubscribe(current[0])
+        if len(types) != 1:
+            self._refuse(info.name, f"it has several types: {', '.join(types)}")
+            return
+        try:
+            message_class = class_of(types[0])
+        except InvalidValueError as error:
+            self._refuse(info.name, str(error))
+            return
+        definition = full_definition(types[0], self._interfaces)
+        type_hash = info.publishers[0].type_hash
+        topic = BagTopic(info.name, types[0], offers, definition, type_hash=type_hash)
+        put = self._recorder.source(topic).put
+        profile = strictest_compatible_qos(list(offers), _DEPTH)
+        subscription = self._session.subscribe(
+            message_class, info.name, partial(put), rclpy_profile(profile), raw=True
+        )
+        self._subscriptions[info.name] = (subscription, profile)
+
+    def _refuse(self, name: str, reason: str) -> None:
+        self._refused.add(name)
+        self._warn(f"'{name}' is not recorded: {reason}")

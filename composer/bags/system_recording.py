@@ -1,0 +1,151 @@
+"""Records what the nodes of a system publish in this process, from inside."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import strftime
+from typing import Any
+
+from composer import version
+from composer.bags.bag import Attachment, BagError, BagTopic
+from composer.bags.definitions import full_definition
+from composer.bags.recorder import Recorder
+from composer.bags.ring import Ring
+from composer.bags.writer import BagWriter, split_limits
+from composer.interfaces import Interfaces
+from composer.model import Isolation, Port, System
+from composer.model.recording import Recording
+from composer.runtime.clock.clock import Clock
+from composer.runtime.intra_process.topic import CopyingTarget
+from composer.runtime.supervision.events import Event, NodeFailed
+
+#: One fault often leads to others.
+_AFTER_FAULT_S = 0.5
+
+
+def attachments(system: System | None, reason: str = "") -> tuple[Attachment, ...]:
+    """Return what explains a bag: the files of the system, and the versions it ran with."""
+    facts = {"composer": version(), "python": platform.python_version()}
+    if reason:
+        facts["reason"] = reason
+    if system is None:
+        return (Attachment("versions.json", "application/json", json.dumps(facts).encode()),)
+    facts["system"] = system.name.value
+    files = {node.span.file for node in system.nodes} | {system.source}
+    return (
+        Attachment("versions.json", "application/json", json.dumps(facts).encode()),
+        *(
+            Attachment(file.path, "application/yaml", file.text.encode())
+            for file in sorted(files, key=lambda file: file.path)
+        ),
+    )
+
+
+def new_folder(folder: Path, name: str) -> Path:
+    """Return the path of a new bag, with the time in its name."""
+    first = folder / f"{name.strip('/').replace('/', '-')}-{strftime('%Y%m%d-%H%M%S')}"
+    path, number = first, 1
+    while path.exists():
+        number += 1
+        path = first.with_name(f"{first.name}-{number}")
+    return path
+
+
+class SystemRecording:
+    """Records a run of a system: all of it, or with ``ring_s`` the seconds before a fault.
+
+    It is the ``recording`` of the options of a host.
+    """
+
+    def __init__(
+        self, system: System, recording: Recording, clock: Clock, say: Callable[[str], None]
+    ) -> None:
+        """``say`` receives what users have to know. Raises BagError, if the bag cannot be made."""
+        self._system = system
+        self._settings = recording
+        self._folder = Path(recording.folder)
+        self._say = say
+        self._interfaces = Interfaces.installed()
+        self._faults: list[str] = []
+        self._ring: Ring | None = None
+        self._writer: BagWriter | None = None
+        if recording.ring_s is None:
+            self._writer = self._new_writer("")
+            self._recorder = Recorder(self._writer, clock)
+        else:
+            self._ring = Ring(recording.ring_s)
+            self._recorder = Recorder(self._ring, clock)
+            self._prepare_folder()
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Record during a ``with`` block; say at the end what was recorded."""
+        with self._recorder:
+            yield
+        recorder, writer = self._recorder, self._writer
+        if recorder.problem is not None:
+            self._say(f"the recording is not complete: {recorder.problem}")
+        dropped = f", {recorder.dropped} dropped" if recorder.dropped else ""
+        if writer is not None:
+            self._say(f"recorded {writer.count} messages{dropped}: {writer.folder}")
+        elif dropped:
+            self._say(f"the flight recorder has lost messages: {recorder.dropped}")
+
+    def target(self, port: Port) -> Any:
+        """Return what receives the messages of a publisher; None if its topic is not recorded."""
+        if not self._settings.includes(port.full_name):
+            return None
+        type_name = port.interface.value
+        definition = full_definition(type_name, self._interfaces)
+        topic = BagTopic(port.full_name, type_name, (port.qos.profile,), definition)
+        source = self._recorder.source(topic)
+        return CopyingTarget(source) if port.isolation is Isolation.COPY else source
+
+    def save(self, done: Callable[[bool, str], None]) -> None:
+        """Write the last seconds; ``done`` receives whether that succeeded, and the folder or why.
+
+        It is called on another thread.
+        """
+        self._recorder.call_later(0.0, lambda: done(*self._save("requested")))
+
+    def on_event(self, event: Event) -> None:
+        """Write the last seconds soon if a node has failed; once for faults that come together."""
+        if self._ring is None or not isinstance(event, NodeFailed):
+            return
+        if not self._faults:
+            self._recorder.call_later(_AFTER_FAULT_S, self._save_faults)
+        self._faults.append(str(event))
+
+    def _save_faults(self) -> None:
+        faults, self._faults = self._faults, []
+        success, text = self._save("\n".join(faults))
+        self._say(f"recorded the last seconds: {text}" if success else f"cannot record: {text}")
+
+    def _save(self, reason: str) -> tuple[bool, str]:
+        if self._ring is None:
+            return False, "it records all the time: its 'recording' has no 'ring_s'"
+        try:
+            writer = self._new_writer(reason)
+            self._ring.save(writer)
+            writer.close()
+        except BagError as error:
+            return False, str(error)
+        return True, str(writer.folder)
+
+    def _new_writer(self, reason: str) -> BagWriter:
+        limits = split_limits(self._settings.split_mb, self._settings.split_s)
+        path = new_folder(self._folder, self._system.name.value)
+        return BagWriter(path, limits, attachments(self._system, reason))
+
+    def _prepare_folder(self) -> None:
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            probe = self._folder / ".writable"
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            raise BagError(f"cannot write to {self._folder}: {error.strerror}") from error

@@ -1,0 +1,186 @@
+"""``compose record``: write the messages of topics into a bag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.bags import (
+    SplitMb,
+    SplitS,
+    Topics,
+    bag_errors,
+    matches,
+    show_progress,
+)
+from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
+from composer.cli.support.ros import ros_session
+from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
+from composer.cli.support.terminal import say, write
+
+if TYPE_CHECKING:
+    from composer.bags.graph_recording import GraphRecording
+    from composer.bags.recorder import Recorder
+    from composer.bags.writer import BagWriter
+    from composer.client.session import Deadline, Session
+    from composer.runtime.ros_graph.endpoints import TopicInfo
+
+EPILOG = examples(
+    "compose record                               all topics, until Ctrl-C",
+    "compose record pipeline -o run1 --for 60     what nodes of a system publish, for a minute",
+    "compose record --topics /scan --topics '/motors/*'",
+    "compose record pipeline --now                let its flight recorder write a bag",
+)
+_UPDATE_S = 0.25
+_PROGRESS_S = 1.0
+
+
+def record(
+    system: AnyRunningSystem = None,
+    *,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FOLDER",
+            help="The folder of the new bag.",
+            show_default="a name with the time",
+        ),
+    ] = None,
+    topics: Topics = None,
+    run_for: Annotated[
+        float | None,
+        typer.Option(
+            "--for",
+            metavar="SECONDS",
+            min=0.0,
+            callback=finite,
+            help="Stop after this time.",
+            show_default="until Ctrl-C",
+        ),
+    ] = None,
+    now: Annotated[
+        bool,
+        typer.Option("--now", help="Let the flight recorder of a running system write a bag."),
+    ] = False,
+    split_mb: SplitMb = None,
+    split_s: SplitS = None,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Record topics in a bag, which rosbag2 and Foxglove read as well.
+
+    Without SYSTEM, all topics are recorded. Subscriptions have a QoS profile that matches all
+    publishers, and latched messages are included. Topics that appear later are added.
+
+    The 'recording' of a system, and 'compose run --record', record from inside of its process, at
+    less cost.
+    """
+    if now:
+        if system is None or output is not None or topics or run_for is not None:
+            raise UsageError("--now takes a running system, and no other option")
+        _save(system, timeout)
+        return
+    with (
+        bag_errors(writes=True),
+        ros_session("compose record", timeout, carries_messages=True) as (
+            session,
+            deadline,
+        ),
+    ):
+        from composer.bags.system_recording import attachments, new_folder
+        from composer.bags.writer import BagWriter, split_limits
+        from composer.client.session import Deadline
+
+        is_wanted = _chosen(session, deadline, system, topics)
+        folder = output or new_folder(Path(), "recording" if system is None else system)
+        writer = BagWriter(folder, split_limits(split_mb, split_s), attachments(None))
+        until = Deadline(float("inf") if run_for is None else run_for)
+        _record(session, writer, is_wanted, until)
+
+
+def _save(system: str, timeout_s: float) -> None:
+    with ros_session("compose record", timeout_s) as (session, deadline):
+        from composer.client.systems.managers import Systems
+
+        systems = Systems(session, deadline)
+        name = systems.find(running_system_name(system))
+        success, message = systems.save_recording(name)
+    if not success:
+        hint = "set 'ring_s' in the 'recording' of the system, and run it again"
+        raise CommandError(f"{name} did not record: {message}", hint=hint)
+    write(message)
+
+
+def _chosen(
+    session: Session, deadline: Deadline, system: str | None, topics: list[str] | None
+) -> Callable[[TopicInfo], bool]:
+    """Return which topics to record. Raises RosError if there is no such system."""
+    if system is None:
+        return lambda info: matches(info.name, topics)
+    from composer.client.systems.managers import Systems
+
+    systems = Systems(session, deadline)
+    report = systems.report(systems.find(running_system_name(system)))
+    nodes = {node.node for node in report.nodes}
+    systems.close()
+    return lambda info: (
+        matches(info.name, topics) and any(end.node in nodes for end in info.publishers)
+    )
+
+
+def _record(
+    session: Session, writer: BagWriter, is_wanted: Callable[[TopicInfo], bool], until: Deadline
+) -> None:
+    """Record until Ctrl-C. Raises BagError."""
+    from composer.bags.bag import BagError
+    from composer.bags.graph_recording import GraphRecording
+    from composer.bags.recorder import Recorder
+    from composer.runtime.clock.clock import COMPUTER
+
+    say(f"recording in {writer.folder}; press Ctrl-C to stop")
+    recorder = Recorder(writer, COMPUTER)
+    recording = GraphRecording(session, recorder, is_wanted, say)
+    with recorder:
+        try:
+            _receive(session, recorder, recording, writer, until)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            recording.close()
+    show_progress("")
+    if recorder.problem is not None:
+        raise BagError(recorder.problem, "what was written before can be read")
+    write(_facts(writer, recorder))
+
+
+def _receive(
+    session: Session,
+    recorder: Recorder,
+    recording: GraphRecording,
+    writer: BagWriter,
+    until: Deadline,
+) -> None:
+    from composer.client.session import Deadline
+
+    next_progress, last_count = Deadline(_PROGRESS_S), 0
+    while not until.passed and recorder.problem is None:
+        recording.update()
+        pause = Deadline(min(_UPDATE_S, until.left_s))
+        while not pause.passed:
+            session.spin_once(pause)
+        if next_progress.passed:
+            rate = (writer.count - last_count) / _PROGRESS_S
+            show_progress(f"{_facts(writer, recorder)}, {rate:.0f} messages/s")
+            next_progress, last_count = Deadline(_PROGRESS_S), writer.count
+
+
+def _facts(writer: BagWriter, recorder: Recorder) -> str:
+    return (
+        f"{writer.count} messages, {writer.size_bytes / 1e6:.1f} MB,"
+        f" {recorder.dropped} dropped: {writer.folder}"
+    )

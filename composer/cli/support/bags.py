@@ -1,0 +1,120 @@
+"""What the commands for bags share: errors, options, the line of progress."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from composer.cli.support.errors import CommandError
+from composer.cli.support.options import finite
+from composer.cli.support.terminal import say
+
+if TYPE_CHECKING:
+    from composer.bags.bag import Bag
+
+Topics = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--topics",
+        metavar="PATTERN",
+        help="Only topics with this full name; '*' stands for any text. Repeatable.",
+        show_default="all",
+    ),
+]
+Start = Annotated[
+    float,
+    typer.Option(
+        "--start", metavar="SECONDS", min=0.0, callback=finite, help="Skip this much of the bag."
+    ),
+]
+Duration = Annotated[
+    float | None,
+    typer.Option(
+        "--duration",
+        metavar="SECONDS",
+        min=0.0,
+        callback=finite,
+        help="Use only this much of the bag.",
+        show_default="to its end",
+    ),
+]
+Output = Annotated[
+    Path, typer.Option("--output", "-o", metavar="FOLDER", help="The folder of the new bag.")
+]
+SplitMb = Annotated[
+    float | None,
+    typer.Option(
+        "--split-mb", metavar="MB", min=1.0, help="Begin a new file before one is larger."
+    ),
+]
+SplitS = Annotated[
+    float | None,
+    typer.Option(
+        "--split-s", metavar="SECONDS", min=1.0, help="Begin a new file before one is longer."
+    ),
+]
+
+
+Tolerance = Annotated[
+    float,
+    typer.Option("--tolerance", min=0.0, metavar="NUMBER", help="Allowed difference of numbers."),
+]
+TimeTolerance = Annotated[
+    float | None,
+    typer.Option(
+        "--time-tolerance",
+        min=0.0,
+        metavar="SECONDS",
+        callback=finite,
+        help="Allowed difference of the times of messages.",
+        show_default="only their order counts",
+    ),
+]
+Ignore = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--ignore", metavar="FIELD", help="Fields to ignore, such as 'header.stamp.*'. Repeatable."
+    ),
+]
+
+
+@contextmanager
+def bag_errors(*, writes: bool = False) -> Iterator[None]:
+    """Turn a BagError into a CommandError, also if a library of the extra is not installed."""
+    from composer.bags.bag import BagError, require
+
+    try:
+        if writes:
+            require("mcap")
+        yield
+    except BagError as error:
+        raise CommandError(str(error), hint=error.hint) from error
+
+
+def opened(path: Path) -> Bag:
+    """Return a bag, and print what is missing in it. Raises BagError."""
+    from composer.bags.reader import open_bag
+
+    bag = open_bag(path)
+    for warning in bag.warnings:
+        say(f"warning: {warning}")
+    return bag
+
+
+def matches(topic: str, patterns: list[str] | None) -> bool:
+    """Return whether ``--topics`` selects a topic."""
+    from composer.model.names import matches_wildcard
+
+    return not patterns or any(matches_wildcard(pattern, topic) for pattern in patterns)
+
+
+def show_progress(text: str) -> None:
+    """Replace the last line of a terminal."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
