@@ -78,7 +78,7 @@ def _open_mcap(path: Path) -> _McapFile:
     with reading(path), open_regular(path) as stream:
         start = stream.read(len(MCAP0_MAGIC))
         if start != MCAP0_MAGIC:
-            raise BagError(f"{path} is {'no MCAP file' if start else 'empty'}")
+            raise BagError(f"{path} is {'not an MCAP file' if start else 'empty'}")
         problem = "it has no index"
         stream.seek(0)
         try:

@@ -13,10 +13,10 @@ def open_bag(path: Path) -> Bag:
     Raises BagError.
     """
     if not path.exists():
-        raise BagError(f"there is no bag {path}")
+        raise BagError(f"there is not a bag {path}")
     files = _files(path)
     if not files:
-        raise BagError(f"{path} is no bag: it has neither .mcap nor .db3 files")
+        raise BagError(f"{path} is not a bag: it has neither .mcap nor .db3 files")
     if files[0].suffix == ".mcap":
         require("mcap")
         from composer.bags.mcap_bag import McapBag  # noqa: PLC0415 - an extra
@@ -31,7 +31,7 @@ def open_bag(path: Path) -> Bag:
 def _files(path: Path) -> tuple[Path, ...]:
     if path.is_file():
         if path.suffix not in (".mcap", ".db3"):
-            raise BagError(f"{path} is no bag: expected a folder, or a .mcap or .db3 file")
+            raise BagError(f"{path} is not a bag: expected a folder, or a .mcap or .db3 file")
         return (path,)
     try:
         names = sorted(path.iterdir())

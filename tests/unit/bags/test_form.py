@@ -143,7 +143,7 @@ def test_qos_profiles_survive(profile: QosProfile) -> None:
 @pytest.mark.parametrize(
     "damage", ["", "{", "3", "- 3", "[" * 5000, "- {history: 7, depth: x, deadline: 3}"]
 )
-def test_other_texts_are_no_qos_profiles(damage: str) -> None:
+def test_other_texts_have_no_qos_profiles(damage: str) -> None:
     assert set(qos_yaml.from_text(damage)) <= {QosProfile()}
 
 
@@ -233,9 +233,9 @@ def _as_text(path: Path) -> None:
     [
         (_damage_chunk, "is corrupt or not supported"),
         (_as_if_compressed_otherwise, "is corrupt or not supported: .*zzzz"),
-        (_as_text, "is no MCAP file"),
+        (_as_text, "is not an MCAP file"),
         (lambda path: path.write_bytes(b""), "is empty"),
-        (Path.unlink, "is no bag: it has neither"),
+        (Path.unlink, "is not a bag: it has neither"),
     ],
 )
 def test_damage_is_named(tmp_path: Path, damage: Callable[[Path], object], text: str) -> None:
