@@ -23,21 +23,21 @@ from composer.runtime.clock.clock import Clock
 from composer.runtime.intra_process.topic import CopyingTarget
 from composer.runtime.supervision.events import Event, NodeFailed
 
+#: The attachment with facts, and the time at which the process of the system began to start.
+FACTS, STARTED = "recording.json", "started_ns"
 #: One fault often leads to others.
 _AFTER_FAULT_S = 0.5
 
 
-def attachments(system: System | None, reason: str = "") -> tuple[Attachment, ...]:
-    """Return what explains a bag: the files of the system, and the versions it ran with."""
-    facts = {"composer": version(), "python": platform.python_version()}
-    if reason:
-        facts["reason"] = reason
+def attachments(system: System | None, **facts: object) -> tuple[Attachment, ...]:
+    """Return what explains a bag: the files of the system, the versions it ran with, and facts."""
+    facts |= {"composer": version(), "python": platform.python_version()}
     if system is None:
-        return (Attachment("versions.json", "application/json", json.dumps(facts).encode()),)
+        return (Attachment(FACTS, "application/json", json.dumps(facts).encode()),)
     facts["system"] = system.name.value
     files = {node.span.file for node in system.nodes} | {system.source}
     return (
-        Attachment("versions.json", "application/json", json.dumps(facts).encode()),
+        Attachment(FACTS, "application/json", json.dumps(facts).encode()),
         *(
             Attachment(file.path, "application/yaml", file.text.encode())
             for file in sorted(files, key=lambda file: file.path)
@@ -74,7 +74,7 @@ class SystemRecording:
         self._ring: Ring | None = None
         self._writer: BagWriter | None = None
         if recording.ring_s is None:
-            self._writer = self._new_writer("")
+            self._writer = self._new_writer(**{STARTED: clock.time_ns()})
             self._recorder = Recorder(self._writer, clock)
         else:
             self._ring = Ring(recording.ring_s)
@@ -129,17 +129,17 @@ class SystemRecording:
         if self._ring is None:
             return False, "it records all the time: its 'recording' has no 'ring_s'"
         try:
-            writer = self._new_writer(reason)
+            writer = self._new_writer(reason=reason)
             self._ring.save(writer)
             writer.close()
         except BagError as error:
             return False, str(error)
         return True, str(writer.folder)
 
-    def _new_writer(self, reason: str) -> BagWriter:
+    def _new_writer(self, **facts: object) -> BagWriter:
         limits = split_limits(self._settings.split_mb, self._settings.split_s)
         path = new_folder(self._folder, self._system.name.value)
-        return BagWriter(path, limits, attachments(self._system, reason))
+        return BagWriter(path, limits, attachments(self._system, **facts))
 
     def _prepare_folder(self) -> None:
         try:

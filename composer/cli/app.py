@@ -19,7 +19,7 @@ from composer.cli.support.terminal import write
 #: ``EPILOG``.
 COMMANDS = {
     "Commands for systems": (
-        *("run", "down", "ps", "top", "logs", "record", "dashboard", "hosts"),
+        *("run", "down", "ps", "top", "logs", "record", "replay", "dashboard", "hosts"),
     ),
     "Commands for files": (
         *("validate", "test", "config", "graph", "diff", "new", "import", "export", "bag"),

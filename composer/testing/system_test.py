@@ -28,7 +28,7 @@ from composer.base.diagnostics import suggestion
 from composer.behavior import GoalRejected
 from composer.model import LogLevel, ParameterType, PortKind, System
 from composer.runtime.clock.clock import COMPUTER
-from composer.runtime.clock.virtual import VirtualClock
+from composer.runtime.clock.virtual import START_NS, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.host_options import HostOptions
 from composer.runtime.node.managed_node import InProcessNode, ManagedNode
@@ -54,12 +54,13 @@ class SystemTest:
 
     ``system`` is a file, or a model that is already loaded. ``arguments`` are those of the system,
     ``settings`` values of parameters by ``node.parameter``. With ``real_time``, the system has the
-    time of the computer. Runs with the same ``seed`` have the same random numbers.
+    time of the computer. Runs with the same ``seed`` have the same random numbers. Virtual time
+    begins at ``start_ns`` (nanoseconds since 1970).
     """
 
     __test__ = False  # no class of tests
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - options by name
         self,
         system: Path | str | System,
         *,
@@ -67,6 +68,7 @@ class SystemTest:
         settings: Mapping[str, Any] | None = None,
         seed: int = 0,
         real_time: bool = False,
+        start_ns: int = START_NS,
         log_level: LogLevel = LogLevel.INFO,
     ) -> None:
         """Raise TestFailure if the file cannot be read or has errors."""
@@ -75,6 +77,7 @@ class SystemTest:
         self._system = with_tester(system)
         self._seed = seed
         self._is_real = real_time
+        self._start_ns = start_ns
         self._log_level = log_level
         self._observation = Observation(lambda: self._run.now_s)
         self._run: SystemRun
@@ -83,7 +86,7 @@ class SystemTest:
 
     def __enter__(self) -> Self:
         """Bring the system up. Raises StartRefused if it cannot run here, and TestFailure."""
-        clock = COMPUTER if self._is_real else VirtualClock()
+        clock = COMPUTER if self._is_real else VirtualClock(start_ns=self._start_ns)
         tester = self._system.node(TESTER)
         ports = () if tester is None else tester.ports
         self._faults = Faults(clock, ports, self._on_tester)
@@ -182,6 +185,38 @@ class SystemTest:
         converted = _converted(message, publisher.message_type, topic)
         self._observation.on_action(f"published {short(to_plain(converted))} on {topic}")
         publisher.publish(converted)
+
+    def play(self, messages: Iterable[tuple[float, str, Any]]) -> None:
+        """Publish messages at their times (seconds since the start), until the last one.
+
+        They are ``(time, topic, message)``, in order of their times. A timer publishes them, so
+        that their order among calls of the system that are due at the same time is the same each
+        time. Raises what :meth:`publish` and the iterable raise.
+        """
+        loop = self._run.host.nodes[TESTER].loop
+        remaining = iter(messages)
+        over: list[BaseException | None] = []
+
+        def play_next(topic: str = "", message: Any = None) -> None:
+            try:
+                if topic:
+                    self.publish(topic, message)
+                following = next(remaining, None)
+            except Exception as error:
+                over.append(error)
+                return
+            if following is None:
+                over.append(None)
+            else:
+                time_s, *content = following
+                loop.call_later(time_s - self.now_s, partial(play_next, *content))
+
+        loop.call_soon(play_next)
+        self.run_until(lambda: over or self.outcome is not None, inf)
+        if not over:
+            raise self._failure("the system has ended before the last message")
+        if over[0] is not None:
+            raise over[0]
 
     def call(self, service: str, request: Any = None, timeout_s: float = 5.0) -> Any:
         """Call a service and return the response.

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from composer.cli.support.bags import (
+    BagPath,
     Duration,
     Ignore,
     Output,
@@ -22,8 +22,9 @@ from composer.cli.support.bags import (
     Tolerance,
     Topics,
     bag_errors,
-    matches,
     opened,
+    selection,
+    tolerances,
 )
 from composer.cli.support.errors import FAILED
 from composer.cli.support.options import Json, command_group, examples
@@ -36,10 +37,6 @@ if TYPE_CHECKING:
     from composer.bags.editing import Selection
 
 bag_app = command_group("Inspect, cut, join and compare bags of ROS 2: MCAP, and sqlite3.")
-
-BagPath = Annotated[
-    Path, typer.Argument(metavar="BAG", help="The folder of a bag, or a .mcap or .db3 file.")
-]
 
 
 @bag_app.command("info", epilog=examples("compose bag info recording"))
@@ -82,7 +79,7 @@ def convert(
 
     A bag whose writer was killed becomes complete again.
     """
-    _write([bag], _selection(None, 0.0, None), output, (split_mb, split_s))
+    _write([bag], selection(None, 0.0, None), output, (split_mb, split_s))
 
 
 @bag_app.command(
@@ -98,7 +95,7 @@ def cut(
     topics: Topics = None,
 ) -> None:
     """Write a part of a bag to a new one."""
-    _write([bag], _selection(topics, start, duration), output, (None, None))
+    _write([bag], selection(topics, start, duration), output, (None, None))
 
 
 @bag_app.command("merge", epilog=examples("compose bag merge robot1 robot2 -o both"))
@@ -109,7 +106,7 @@ def merge(
     topics: Topics = None,
 ) -> None:
     """Write the messages of several bags to a new one, in the order of their times."""
-    _write(bags, _selection(topics, 0.0, None), output, (None, None))
+    _write(bags, selection(topics, 0.0, None), output, (None, None))
 
 
 @bag_app.command("diff", epilog=examples("compose bag diff golden run1 --tolerance 1e-6"))
@@ -131,16 +128,16 @@ def diff(
     """
     require_ros("compose bag diff")
     with bag_errors():
-        from composer.bags.comparing import Tolerances, differences
+        from composer.bags.comparing import differences
 
         ours, theirs = opened(expected), opened(actual)
-        selection = _selection(topics, 0.0, None)
+        chosen = selection(topics, 0.0, None)
         shift_ns = ours.summary.start_ns - theirs.summary.start_ns
         found = differences(
-            selection.messages(ours),
+            chosen.messages(ours),
             (
                 item._replace(recorded_ns=item.recorded_ns + shift_ns)
-                for item in selection.messages(theirs)
+                for item in chosen.messages(theirs)
             ),
             {
                 name: topic.type_name
@@ -148,25 +145,16 @@ def diff(
                 for name, topic in bag.summary.topics.items()
             },
             ours.summary.start_ns,
-            Tolerances(
-                tolerance, inf if time_tolerance is None else time_tolerance, tuple(ignore or ())
-            ),
+            tolerances(tolerance, time_tolerance, ignore),
         )
     write(lines(map(str, found)) if found else "the bags are equal")
     if found:
         raise typer.Exit(FAILED)
 
 
-def _selection(topics: list[str] | None, start_s: float, duration_s: float | None) -> Selection:
-    from composer.bags.editing import Selection
-
-    until_s = inf if duration_s is None else duration_s
-    return Selection(lambda name: matches(name, topics), start_s, until_s)
-
-
 def _write(
     paths: Sequence[Path],
-    selection: Selection,
+    chosen: Selection,
     folder: Path,
     split: tuple[float | None, float | None],
 ) -> None:
@@ -175,5 +163,5 @@ def _write(
         from composer.bags.writer import split_limits
 
         bags: list[Bag] = [opened(path) for path in paths]
-        writer = write_bag(bags, selection, folder, split_limits(*split))
+        writer = write_bag(bags, chosen, folder, split_limits(*split))
     write(f"{writer.count} messages, {writer.size_bytes / 1e6:.1f} MB: {folder}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +17,12 @@ from composer.cli.support.terminal import say
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
+    from composer.bags.comparing import Tolerances
+    from composer.bags.editing import Selection
 
+BagPath = Annotated[
+    Path, typer.Argument(metavar="BAG", help="The folder of a bag, or a .mcap or .db3 file.")
+]
 Topics = Annotated[
     list[str] | None,
     typer.Option(
@@ -111,6 +117,21 @@ def matches(topic: str, patterns: list[str] | None) -> bool:
     from composer.model.names import matches_wildcard
 
     return not patterns or any(matches_wildcard(pattern, topic) for pattern in patterns)
+
+
+def selection(topics: list[str] | None, start_s: float, duration_s: float | None) -> Selection:
+    """Return the part of a bag that the options select."""
+    from composer.bags.editing import Selection
+
+    until_s = inf if duration_s is None else duration_s
+    return Selection(lambda name: matches(name, topics), start_s, until_s)
+
+
+def tolerances(value: float, time_s: float | None, ignored: list[str] | None) -> Tolerances:
+    """Return what counts as equal."""
+    from composer.bags.comparing import Tolerances
+
+    return Tolerances(value, inf if time_s is None else time_s, tuple(ignored or ()))
 
 
 def show_progress(text: str) -> None:

@@ -49,12 +49,14 @@ class VirtualClock(Clock):
 
     is_virtual = True
 
-    def __init__(self, speed: float = inf, *, is_isolated: bool = True) -> None:
+    def __init__(self, speed: float = inf, *, is_isolated: bool = True, start_ns: int = START_NS) -> None:
         """``speed`` limits how many times as fast as real time the time advances.
 
         Unless it ``is_isolated``, the system takes part in the ROS graph, and publishes its time.
+        ``start_ns`` is the time of the start, in nanoseconds since 1970.
         """
         self.is_isolated = is_isolated
+        self._start_ns = start_ns
         self._speed = speed
         self._pace_from_s: float | None = None  # the time of the computer when the time was 0
         self._now_s = 0.0
@@ -85,8 +87,8 @@ class VirtualClock(Clock):
         self._creeps_s = 1e-6
 
     def time_ns(self) -> int:
-        """Return the nanoseconds since 1970, as if the system had started at :data:`START_NS`."""
-        return START_NS + round(self._now_s * _NANOSECONDS)
+        """Return the nanoseconds since 1970, as if the system had started at ``start_ns``."""
+        return self._start_ns + round(self._now_s * _NANOSECONDS)
 
     def sleep(self, delay_s: float, /) -> None:
         """Block the calling thread for ``delay_s`` seconds of virtual time."""

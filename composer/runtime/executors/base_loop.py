@@ -52,11 +52,13 @@ class TimerQueue:
     """Scheduled calls, for use by one thread.
 
     A sorted list with the next call last, not a heap: taking that call and, if there are few,
-    inserting it again needs no search. A periodic call is inserted again each time.
+    inserting it again needs no search. A periodic call is inserted again each time. In virtual
+    time, calls that are due in the same nanosecond are due at the same time, as in stamps.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
+        self._has_ticks = clock.is_virtual
         self._entries: list[tuple[float, int, ScheduledCall]] = []  # ascending: -due_s, -order
         self._order = itertools.count(0, -1)  # calls due at the same time keep their order
         self._sweep_at = _SWEEP_SIZE
@@ -65,7 +67,7 @@ class TimerQueue:
     def add(self, call: ScheduledCall) -> None:
         """Add a call."""
         self._insert(call)
-        self.next_s = min(self.next_s, call.due_s)
+        self.next_s = min(self.next_s, -self._entries[-1][0])
 
     def next_due_s(self) -> float:
         """Return when the next call is due; infinity if there is none."""
@@ -107,7 +109,8 @@ class TimerQueue:
         entries = self._entries
         if len(entries) >= self._sweep_at:
             self._sweep()
-        entry = (-call.due_s, next(self._order), call)
+        due_s = round(call.due_s, 9) if self._has_ticks else call.due_s
+        entry = (-due_s, next(self._order), call)
         if not entries or entries[-1] < entry:
             entries.append(entry)
         else:

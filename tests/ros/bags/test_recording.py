@@ -127,7 +127,7 @@ def test_a_flight_recorder_writes_at_a_fault_and_on_request(bags: Path) -> None:
         assert 50 < len(after) <= 200
         assert _decoded(other, "/map") == ["the map"]  # it was latched before
         attached = {item.name: item.data.decode() for item in open_bag(other).attachments()}
-        assert "counter failed: requested" in attached["versions.json"]
+        assert "counter failed: requested" in attached["recording.json"]
         run.stop()
 
 

@@ -1,0 +1,115 @@
+"""Publishes the messages of a bag to the ROS graph, at their times."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from composer.bags.bag import NANOSECONDS, BagError, BagMessage, BagTopic
+from composer.base.fast_dataclass import dataclass
+from composer.client.messages.topics import wait_until_acknowledged
+from composer.client.messages.values import InvalidValueError, class_of
+from composer.client.session import Deadline, Session
+from composer.model.qos import Durability, QosProfile, Reliability
+from composer.runtime.ros.qos_profiles import rclpy_profile
+
+#: As of Gazebo and rosbag2.
+_CLOCK_PERIOD_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """How a bag is replayed.
+
+    ``rate`` is the speed; ``names`` replaces names of topics. With ``clock``, the time of the bag
+    is published on /clock.
+    """
+
+    rate: float = 1.0
+    names: Mapping[str, str] = field(default_factory=dict)
+    clock: bool = False
+
+
+class GraphReplay:
+    """Publishers of the topics of a bag, with the QoS profiles of the bag."""
+
+    def __init__(
+        self, session: Session, topics: Iterable[BagTopic], options: ReplayOptions
+    ) -> None:
+        """Raise BagError if types are not installed."""
+        self._session = session
+        self._options = options
+        self.count = 0
+        self._publishers: dict[str, Any] = {}
+        for topic in topics:
+            try:
+                kind = class_of(topic.type_name)
+            except InvalidValueError as error:
+                raise BagError(f"'{topic.name}': {error}", error.hint) from error
+            name = options.names.get(topic.name, topic.name)
+            profile = rclpy_profile(offered(topic.qos))
+            self._publishers[topic.name] = session.node.create_publisher(kind, name, profile)
+        self._clock: Any = None
+        if options.clock:
+            self._clock = session.node.create_publisher(ClockMessage, "/clock", QoSProfile(depth=1))
+
+    def wait_for_subscriptions(self, timeout_s: float) -> None:
+        """Wait until discovery is complete: the first messages reach all subscriptions."""
+        self._session.wait_until_settled(
+            lambda: tuple(item.get_subscription_count() for item in self._publishers.values()),
+            Deadline(timeout_s),
+        )
+
+    def play(
+        self, messages: Iterable[BagMessage], start_ns: int, on_message: Callable[[int], None]
+    ) -> None:
+        """Publish messages; ``start_ns`` is when the first may come. Raises BagError.
+
+        ``on_message(recorded_ns)`` is called for each.
+        """
+        begin_s = time.monotonic()
+        for message in messages:
+            self._wait_until(message.recorded_ns, start_ns, begin_s)
+            self._publishers[message.topic].publish(message.data)
+            self.count += 1
+            on_message(message.recorded_ns)
+
+    def finish(self) -> bool:
+        """Wait until reliable subscriptions have all messages, a second; return whether they do."""
+        results = [wait_until_acknowledged(item) for item in self._publishers.values()]
+        return all(results)
+
+    def _wait_until(self, at_ns: int, start_ns: int, begin_s: float) -> None:
+        due_s = begin_s + (at_ns - start_ns) / NANOSECONDS / self._options.rate
+        while self._clock is not None and time.monotonic() < due_s:
+            passed_ns = (time.monotonic() - begin_s) * self._options.rate * NANOSECONDS
+            self._publish_time(start_ns + round(passed_ns))
+            self._session.spin_until(min(due_s, time.monotonic() + _CLOCK_PERIOD_S))
+        if time.monotonic() < due_s:
+            self._session.spin_until(due_s)
+        if self._clock is not None:
+            self._publish_time(at_ns)
+
+    def _publish_time(self, at_ns: int) -> None:
+        seconds, nanoseconds = divmod(at_ns, NANOSECONDS)
+        self._clock.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
+
+
+def offered(profiles: Iterable[QosProfile]) -> QosProfile:
+    """Return the profile that subscriptions to all recorded publishers match."""
+    found = tuple(profiles)
+    if len(set(found)) == 1:
+        return found[0]
+    reliable = not found or any(item.reliability is Reliability.RELIABLE for item in found)
+    latched = any(item.durability is Durability.TRANSIENT_LOCAL for item in found)
+    return QosProfile(
+        depth=max((item.depth for item in found), default=QosProfile().depth),
+        reliability=Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
+        durability=Durability.TRANSIENT_LOCAL if latched else Durability.VOLATILE,
+    )

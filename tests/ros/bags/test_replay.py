@@ -1,0 +1,140 @@
+"""Replay: into a system in virtual time, compared with a bag, and to the ROS graph."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+
+from composer.bags.bag import BagError, BagMessage, BagTopic
+from composer.bags.comparing import Tolerances
+from composer.bags.editing import Selection
+from composer.bags.reader import open_bag
+from composer.bags.writer import BagWriter
+from composer.model.qos import PRESETS
+from composer.testing.bag_replay import Replay, replay, without_nodes
+from composer.testing.system_run import load_system
+from tests.ros.support.commands import compose, error, finished, output_of, start
+from tests.ros.support.forked import ForkedCommand
+from tests.ros.support.in_process import Peer
+
+SYSTEMS = Path(__file__).parents[3] / "systems"
+PIPELINE = SYSTEMS / "pipeline.yaml"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five seconds of the pipeline."""
+    folder = tmp_path_factory.mktemp("bags")
+    finished(
+        ForkedCommand(
+            *("run", str(PIPELINE), "--record", "--time", "virtual", "--for", "5"), cwd=folder
+        )
+    )
+    [bag] = (folder / "bags").iterdir()
+    return bag
+
+
+def _replayed(bag: Path, **settings: float) -> Replay:
+    named = {f"motor_controller.{name}": value for name, value in settings.items()}
+    system = without_nodes(load_system(PIPELINE, {}, named), ["sensor_*"])
+    return replay(system, open_bag(bag), Selection())
+
+
+@pytest.mark.parametrize(
+    "runs", [10, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+)
+def test_the_commands_are_the_same_each_time(recorded: Path, runs: int) -> None:
+    golden = open_bag(recorded)
+    for _ in range(runs):
+        done = _replayed(recorded)
+        assert done.differences(golden, Tolerances(time_s=0.0)) == []
+        assert len(done.played) == golden.summary.counts["/sensor_data"]
+        assert len(done.messages) >= golden.summary.counts["/motor_commands"] - 2
+
+
+def test_the_first_difference_is_named(recorded: Path, tmp_path: Path) -> None:
+    done = _replayed(recorded, position_gain=1.4)
+    golden = open_bag(recorded)
+    [found] = done.differences(golden, Tolerances(value=1e-6))
+    assert found.topic == "/motor_commands"
+    assert found.text.startswith("linear.x: expected ")
+    assert "; after message " in found.text
+    assert done.differences(golden, Tolerances(value=10.0)) == []
+    assert done.differences(golden, Tolerances(ignored=("linear.*",))) == []
+    with pytest.raises(BagError, match="no topic that the system publishes"):
+        done.differences(open_bag(_chat(tmp_path)), Tolerances())
+
+
+def test_the_command(recorded: Path, tmp_path: Path) -> None:
+    words = ("replay", recorded, "pipeline", "--replace", "sensor_simulator")
+    golden = tmp_path / "golden"
+    assert "which are equal" in output_of(*words, "--compare", recorded, "-o", golden)
+    assert "which are equal" in output_of(*words, "--compare", golden)
+    done = compose(*words, "--compare", golden, "--set", "motor_controller.max_velocity=0.5")
+    assert (done.returncode, done.stdout.count("/motor_commands")) == (1, 1)
+    assert "receives and does not publish" in error(*words[:3])
+
+
+def _chat(folder: Path, name: str = "chat", type_name: str = "std_msgs/msg/String") -> Path:
+    """Write a bag with a latched message and 50 others, one each 10 ms."""
+    writer = BagWriter(folder / name)
+    writer.add_topic(BagTopic("/map", type_name, (PRESETS["state"],)))
+    writer.add_topic(BagTopic("/chat", type_name, (PRESETS["command"],)))
+    for number in range(51):
+        at_ns = 10**18 + number * 10**7
+        data = b"\x00\x01\x00\x00\x03\x00\x00\x00%02d\x00" % number
+        writer.write(BagMessage("/chat" if number else "/map", at_ns, at_ns, data))
+    writer.close()
+    return folder / name
+
+
+def test_the_graph_receives_a_bag(tmp_path: Path, peer: Peer) -> None:
+    got: list[str] = []
+    times: list[int] = []
+    ended = threading.Event()
+
+    def on_chat(message: String) -> None:
+        got.append(message.data)
+        if message.data == "50":
+            ended.set()
+
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    maps: list[str] = []
+    peer.node.create_subscription(String, "/talk", on_chat, 100)
+    peer.node.create_subscription(String, "/map", lambda item: maps.append(item.data), latched)
+    peer.node.create_subscription(Clock, "/clock", lambda item: times.append(item.clock.sec), 100)
+    words = ("--remap", "/chat:=/talk", "--clock", "--rate", "0.5")
+    process = start("replay", str(_chat(tmp_path)), *words)
+    assert ended.wait(60.0)
+    output, text = process.communicate(timeout=60.0)
+    assert (process.returncode, output) == (0, "51 messages\n"), text
+    assert got == [f"{number:02d}" for number in range(1, 51)]
+    assert maps == ["00"]
+    assert set(times) == {10**9}
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (("--topics", "/chit"), "no topic of the bag matches"),
+        (("--compare", "golden"), "--compare can only be used with SYSTEM"),
+        (("pipeline", "--loop"), "--loop can only be used without SYSTEM"),
+        (("--remap", "chat"), "--remap takes /OLD:=/NEW"),
+    ],
+)
+def test_mistakes(tmp_path: Path, options: tuple[str, ...], text: str) -> None:
+    done = compose("replay", _chat(tmp_path), *options)
+    assert done.returncode in {1, 2}
+    assert text in done.stderr
+
+
+def test_a_type_that_is_not_installed_is_named(tmp_path: Path) -> None:
+    bag = _chat(tmp_path, type_name="missing_msgs/msg/Chat")
+    assert "interface 'missing_msgs/msg/Chat' is not installed" in error("replay", bag)
+    with pytest.raises(BagError, match="has no node 'x'"):
+        without_nodes(load_system(PIPELINE, {}, {}), ["x"])
