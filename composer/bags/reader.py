@@ -13,7 +13,7 @@ def open_bag(path: Path) -> Bag:
     Raises BagError.
     """
     if not path.exists():
-        raise BagError(f"there is not a bag {path}")
+        raise BagError(f"there is no bag {path}")
     files = _files(path)
     if not files:
         raise BagError(f"{path} is not a bag: it has neither .mcap nor .db3 files")

@@ -76,8 +76,8 @@ class Source:
 class Recorder:
     """Passes messages to a sink. Use it as a context manager.
 
-    In virtual time nothing is dropped: who publishes too fast waits, and the system does not
-    notice that.
+    In virtual time nothing is dropped: a publisher waits for a full queue, and the system does not
+    notice the wait.
     """
 
     def __init__(self, sink: Sink, clock: Clock) -> None:

@@ -36,7 +36,7 @@ class SplitLimits:
 
 
 def split_limits(megabytes: float | None, seconds: float | None) -> SplitLimits:
-    """Return the limits; None is no limit."""
+    """Return the limits; None for unlimited."""
     return SplitLimits(
         inf if megabytes is None else megabytes * _BYTES_PER_MB, inf if seconds is None else seconds
     )

@@ -109,12 +109,20 @@ class TimerQueue:
         entries = self._entries
         if len(entries) >= self._sweep_at:
             self._sweep()
-        due_s = round(call.due_s, 9) if self._has_ticks else call.due_s
+        due_s = self._tick(call.due_s) if self._has_ticks else call.due_s
         entry = (-due_s, next(self._order), call)
         if not entries or entries[-1] < entry:
             entries.append(entry)
         else:
             insort(entries, entry)
+
+    def _tick(self, due_s: float) -> float:
+        """Return a time in whole nanoseconds, which is not over if ``due_s`` is not."""
+        now_s = self._clock.monotonic()
+        if due_s <= now_s:
+            return due_s
+        tick_s = round(due_s, 9)
+        return tick_s if tick_s > now_s else round(now_s + 1e-9, 9)
 
     def _sweep(self) -> None:
         self._entries[:] = [entry for entry in self._entries if not entry[2].cancelled]

