@@ -65,6 +65,7 @@ class SystemRecording:
         self, system: System, recording: Recording, clock: Clock, say: Callable[[str], None]
     ) -> None:
         """``say`` receives what users have to know. Raises BagError, if the bag cannot be made."""
+        clock.has_ticks = clock.is_virtual  # so that a replay repeats the order of what is due
         self._system = system
         self._settings = recording
         self._folder = Path(recording.folder)

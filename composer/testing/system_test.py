@@ -27,7 +27,7 @@ from rclpy.parameter import Parameter
 from composer.base.diagnostics import suggestion
 from composer.behavior import GoalRejected
 from composer.model import LogLevel, ParameterType, PortKind, System
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.clock.virtual import START_NS, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.host_options import HostOptions
@@ -54,13 +54,14 @@ class SystemTest:
 
     ``system`` is a file, or a model that is already loaded. ``arguments`` are those of the system,
     ``settings`` values of parameters by ``node.parameter``. With ``real_time``, the system has the
-    time of the computer. Runs with the same ``seed`` have the same random numbers. Virtual time
-    begins at ``start_ns`` (nanoseconds since 1970).
+    time of the computer. Runs with the same ``seed`` have the same random numbers. For the replay
+    of a bag, virtual time begins at ``start_ns`` (nanoseconds since 1970), and calls that are due
+    in the same nanosecond are due at the same time.
     """
 
     __test__ = False  # no class of tests
 
-    def __init__(  # noqa: PLR0913 - options by name
+    def __init__(
         self,
         system: Path | str | System,
         *,
@@ -68,7 +69,7 @@ class SystemTest:
         settings: Mapping[str, Any] | None = None,
         seed: int = 0,
         real_time: bool = False,
-        start_ns: int = START_NS,
+        start_ns: int | None = None,
         log_level: LogLevel = LogLevel.INFO,
     ) -> None:
         """Raise TestFailure if the file cannot be read or has errors."""
@@ -77,7 +78,8 @@ class SystemTest:
         self._system = with_tester(system)
         self._seed = seed
         self._is_real = real_time
-        self._start_ns = start_ns
+        self._has_ticks = start_ns is not None
+        self._start_ns = START_NS if start_ns is None else start_ns
         self._log_level = log_level
         self._observation = Observation(lambda: self._run.now_s)
         self._run: SystemRun
@@ -86,7 +88,8 @@ class SystemTest:
 
     def __enter__(self) -> Self:
         """Bring the system up. Raises StartRefused if it cannot run here, and TestFailure."""
-        clock = COMPUTER if self._is_real else VirtualClock(start_ns=self._start_ns)
+        clock: Clock = COMPUTER if self._is_real else VirtualClock(start_ns=self._start_ns)
+        clock.has_ticks = clock.is_virtual and self._has_ticks
         tester = self._system.node(TESTER)
         ports = () if tester is None else tester.ports
         self._faults = Faults(clock, ports, self._on_tester)

@@ -49,7 +49,9 @@ class VirtualClock(Clock):
 
     is_virtual = True
 
-    def __init__(self, speed: float = inf, *, is_isolated: bool = True, start_ns: int = START_NS) -> None:
+    def __init__(
+        self, speed: float = inf, *, is_isolated: bool = True, start_ns: int = START_NS
+    ) -> None:
         """``speed`` limits how many times as fast as real time the time advances.
 
         Unless it ``is_isolated``, the system takes part in the ROS graph, and publishes its time.

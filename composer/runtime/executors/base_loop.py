@@ -52,13 +52,12 @@ class TimerQueue:
     """Scheduled calls, for use by one thread.
 
     A sorted list with the next call last, not a heap: taking that call and, if there are few,
-    inserting it again needs no search. A periodic call is inserted again each time. In virtual
-    time, calls that are due in the same nanosecond are due at the same time, as in stamps.
+    inserting it again needs no search. A periodic call is inserted again each time.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._has_ticks = clock.is_virtual
+        self._has_ticks = clock.has_ticks
         self._entries: list[tuple[float, int, ScheduledCall]] = []  # ascending: -due_s, -order
         self._order = itertools.count(0, -1)  # calls due at the same time keep their order
         self._sweep_at = _SWEEP_SIZE

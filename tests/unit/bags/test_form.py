@@ -188,13 +188,13 @@ def test_what_a_killed_process_has_written_can_be_read(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", _ENDLESS, str(folder)]) as process:
         size = 0
         until_s = time.monotonic() + 20.0
-        while size < 1000 and time.monotonic() < until_s:  # the first chunk, after a second
+        while size < 2000 and time.monotonic() < until_s:  # the first chunk, after a second
             size = sum(path.stat().st_size for path in folder.glob("*.mcap"))
             time.sleep(0.02)
         os.kill(process.pid, signal.SIGKILL)
     bag = open_bag(folder)
     numbers = [item.recorded_ns for item in read(bag)]
-    assert len(numbers) > 100
+    assert len(numbers) > 10
     assert numbers == list(range(1, len(numbers) + 1))
     assert "is not complete (its end is missing or damaged)" in bag.warnings[0]
 
