@@ -54,6 +54,8 @@ _INTENDED: dict[str, tuple[str, ...]] = {
     "memory": ("state",),
     "components": ("nodes",),
     "links": ("connections",),
+    "xyz": ("translation_m",),
+    "rpy": ("rotation_rad",),
 }
 
 _ADVICE: dict[tuple[str, str], str] = {
@@ -158,6 +160,10 @@ def type_hint(schema: dict[str, Any], found: object) -> str | None:
         case bool() | int() | float() if allowed.keys() == {"string"}:
             return "quote it if it is a string"
         case list() if allowed.keys() == {"object"}:
+            keys = schema.get("properties", {})
+            if len(found) == len(keys) and not any(isinstance(item, dict) for item in found):
+                pairs = zip(keys, found, strict=True)
+                return f"write {{{', '.join(f'{key}: {item}' for key, item in pairs)}}}"
             return "write 'name: ...' for each, without a dash"
         case None if allowed.keys() == {"object"}:
             return "an empty map is written '{}'"
