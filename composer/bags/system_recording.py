@@ -16,12 +16,14 @@ from composer.bags.definitions import full_definition
 from composer.bags.recorder import Recorder
 from composer.bags.ring import Ring
 from composer.bags.writer import BagWriter, split_limits
+from composer.base.diagnostics import suggestion
 from composer.interfaces import Interfaces
 from composer.model import Isolation, Port, System
+from composer.model.names import matches_wildcard
 from composer.model.recording import Recording
 from composer.runtime.clock.clock import Clock
 from composer.runtime.intra_process.topic import CopyingTarget
-from composer.runtime.supervision.events import Event, NodeFailed
+from composer.runtime.supervision.events import BroughtUp, Event, NodeFailed
 
 #: The attachment with facts, and the time at which the process of the system began to start.
 FACTS, STARTED = "recording.json", "started_ns"
@@ -72,6 +74,7 @@ class SystemRecording:
         self._say = say
         self._interfaces = Interfaces.installed()
         self._faults: list[str] = []
+        self._published: set[str] = set()
         self._ring: Ring | None = None
         self._writer: BagWriter | None = None
         if recording.ring_s is None:
@@ -98,6 +101,7 @@ class SystemRecording:
 
     def target(self, port: Port) -> Any:
         """Return what receives the messages of a publisher; None if its topic is not recorded."""
+        self._published.add(port.full_name)
         if not self._settings.includes(port.full_name):
             return None
         type_name = port.interface.value
@@ -114,12 +118,24 @@ class SystemRecording:
         self._recorder.call_later(0.0, lambda: done(*self._save("requested")))
 
     def on_event(self, event: Event) -> None:
-        """Write the last seconds soon if a node has failed; once for faults that come together."""
+        """Write the last seconds soon if a node has failed; once for faults that come together.
+
+        After the bring-up, say which patterns match no topic.
+        """
+        if isinstance(event, BroughtUp):
+            self._check_topics()
         if self._ring is None or not isinstance(event, NodeFailed):
             return
         if not self._faults:
             self._recorder.call_later(_AFTER_FAULT_S, self._save_faults)
         self._faults.append(str(event))
+
+    def _check_topics(self) -> None:
+        for pattern in self._settings.topics:
+            if not any(matches_wildcard(pattern.value, name) for name in self._published):
+                hint = suggestion(pattern.value, self._published)
+                text = f"no node of this process publishes '{pattern}', which 'recording' lists"
+                self._say(f"warning: {text}" if hint is None else f"warning: {text}; {hint}")
 
     def _save_faults(self) -> None:
         faults, self._faults = self._faults, []

@@ -21,7 +21,7 @@ from tests.ros.support.in_process import Peer
 
 COUNTING = """\
 system: counting
-recording: {{folder: {folder}, topics: [/numbers, "/m*"], exclude: [/mute], {more}}}
+recording: {{folder: {folder}, topics: [/numbers, "/m*", /nambers], exclude: [/mute], {more}}}
 nodes:
   counter:
     behavior: counter:Counter
@@ -137,7 +137,7 @@ def test_what_cannot_be_recorded_is_named(bags: Path) -> None:
     assert f"cannot write to {bags}" in error("run", _system(bags, "ring_s: 1"))
     bags.unlink()
     with running(bags.parent / "log", str(_system(bags))) as run:
-        run.wait_for("1 of 1 nodes active")
+        run.wait_for("publishes '/nambers', which 'recording' lists; did you mean '/numbers'?")
         assert "it records all the time" in error("record", "counting", "--now")
         run.stop()
 
