@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from composer.bags.bag import Bag
     from composer.bags.editing import Selection
 
-bag_app = command_group("Inspect, cut, join and compare bags of ROS 2: MCAP, and sqlite3.")
+bag_app = command_group("Inspect, cut, join and compare bags of ROS 2.")
 
 
 @bag_app.command("info", epilog=examples("compose bag info recording"))
@@ -122,10 +122,10 @@ def diff(
     time_tolerance: TimeTolerance = None,
     ignore: Ignore = None,
 ) -> None:
-    """Compare two bags, field by field, and print the first difference of each topic.
+    """Compare two bags, field by field.
 
-    The n-th message of a topic is compared with its n-th message in the other bag. Times count from
-    the first message of each bag.
+    The n-th message of a topic is compared with its n-th message in the other bag, and the first
+    difference of each topic is printed. Times count from the first message of each bag.
 
     Exit code 1 if there are differences.
     """
