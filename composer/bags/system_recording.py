@@ -87,10 +87,18 @@ class SystemRecording:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Record during a ``with`` block; say at the end what was recorded."""
-        with self._recorder:
-            yield
+        """Record during a ``with`` block; say at the end what was recorded.
+
+        A run that does not start leaves no bag.
+        """
         recorder, writer = self._recorder, self._writer
+        try:
+            with recorder:
+                yield
+        except BaseException:
+            if writer is not None and not writer.count:
+                writer.discard()
+            raise
         if recorder.problem is not None:
             self._say(f"the recording is not complete: {recorder.problem}")
         dropped = f", {recorder.dropped} dropped" if recorder.dropped else ""

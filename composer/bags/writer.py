@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -140,6 +141,10 @@ class BagWriter:
         if not file.stream.closed:
             with self._errors():
                 self._finish(file)
+
+    def discard(self) -> None:
+        """Delete the bag, after :meth:`close`."""
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def _is_full(self, file: _File, recorded_ns: int) -> bool:
         duration_s = (recorded_ns - file.start_ns) / NANOSECONDS

@@ -139,6 +139,8 @@ def test_what_cannot_be_recorded_is_named(bags: Path) -> None:
     with running(bags.parent / "log", str(_system(bags))) as run:
         run.wait_for("publishes '/nambers', which 'recording' lists; did you mean '/numbers'?")
         assert "it records all the time" in error("record", "counting", "--now")
+        assert "already runs" in error("run", bags.parent / "counting.yaml")
+        assert len(list(bags.iterdir())) == 1  # a run that does not start leaves no bag
         run.stop()
 
 
@@ -169,7 +171,7 @@ def test_the_graph_is_recorded(tmp_path: Path) -> None:
         if found == {"/map", "/chatter"} and process.poll() is None:
             break
         assert process.poll() is None
-    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGTERM)
     output, text = process.communicate(timeout=60.0)
     assert process.returncode == 0, text
     assert f" 0 dropped: {folder}\n" in output
