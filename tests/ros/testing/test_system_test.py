@@ -174,3 +174,27 @@ def test_a_test_may_use_the_time_of_the_computer() -> None:
     with SystemTest(SYSTEMS / "minimal.yaml") as system:
         time.sleep(0)
         assert [line.text for line in system.log] == ["started"]
+
+
+TIMED = """\
+system: timed
+nodes:
+  source:
+    publishers: {scan: {type: std_msgs/msg/String, topic: /scan, qos: {deadline_ms: 200}}}
+    timers: {tick: {period_ms: 100, publish: {scan: {data: x}}}}
+  sink:
+    subscriptions: {scan: {type: std_msgs/msg/String, topic: /scan, qos: {deadline_ms: 200}}}
+"""
+
+
+def test_lost_messages_miss_the_deadline_of_the_subscription_only(tmp_path: Path) -> None:
+    path = tmp_path / "timed.yaml"
+    path.write_text(TIMED, encoding="utf-8")
+    with SystemTest(path) as system:
+        system.advance(1.05)
+        assert not system.log
+        system.drop("/scan")
+        system.advance(0.2)
+        [line] = system.log
+        assert (line.node, round(line.time_s, 3)) == ("/sink", 1.2)
+        assert "nothing was received within its deadline of 200 ms" in line.text
