@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from composer.behavior import BehaviorError, TransitionFailed
 from composer.model import TF_TYPE, BehaviorReference, Node, Port, PortKind
+from composer.model.lifecycle import ACTIVE, FINALIZED, INACTIVE, TRANSITIONS, UNCONFIGURED
 from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
 from composer.runtime.executors.tasks import within
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
@@ -27,15 +28,6 @@ from composer.testing.behavior_ports import ClientPort, PublisherPort, ServicePo
 from composer.testing.failures import TestFailure
 from composer.testing.message_classes import MessageClasses
 
-#: The states in which a transition may start, the state meanwhile, and the one after it.
-TRANSITIONS: Mapping[str, tuple[tuple[str, ...], str, str]] = {
-    "configure": (("unconfigured",), "configuring", "inactive"),
-    "activate": (("inactive",), "activating", "active"),
-    "deactivate": (("active",), "deactivating", "inactive"),
-    "cleanup": (("inactive",), "cleaningup", "unconfigured"),
-    "shutdown": (("unconfigured", "inactive", "active"), "shuttingdown", "finalized"),
-}
-
 
 class TestNode:
     """One life of a node with a behavior."""
@@ -51,7 +43,7 @@ class TestNode:
         self._gates = (context.gate, always_on_gate)
         self._entities = PortSet()
         self._behavior: Any = None  # None once it was discarded after an error
-        self.state = "unconfigured"
+        self.state = UNCONFIGURED
         #: The ports, by name; empty before *configure*.
         self.ports: dict[str, Any] = {}
         #: What answers the clients, by their names.
@@ -82,7 +74,8 @@ class TestNode:
     async def change(self, transition: str) -> BaseException | None:
         """Run a transition that is possible; return what made it fail."""
         start = self.state
-        _, self.state, end = TRANSITIONS[transition]
+        end = TRANSITIONS[transition].goal
+        self.state = TRANSITIONS[transition].during
         cause: BaseException | None = None
         try:
             await self._in_time(self._work(transition, start))
@@ -107,7 +100,7 @@ class TestNode:
             gate.outgoing = True
             if self.transforms is not None:
                 self.transforms.begin()
-        elif start == "active":
+        elif start == ACTIVE:
             await self._deactivate(gate, tuple(self._entities.gated))
         if transition in ("cleanup", "shutdown"):
             await self._deactivate(always_on_gate, self._entities.always_on)
@@ -130,10 +123,10 @@ class TestNode:
             if is_closing(second):
                 raise
             self._context.log.error(f"on_error: {describe(second)}")
-            return "finalized"
+            return FINALIZED
         finally:
             self._behavior = None
-        return "unconfigured"
+        return UNCONFIGURED
 
     async def _in_time(self, work: Coroutine[Any, Any, None]) -> None:
         loop = self._context.loop
@@ -171,9 +164,9 @@ class TestNode:
         """Open or close the gates for a primary state."""
         self.state = state
         self._context.note(f"the node is {state}")
-        is_configured = state in ("inactive", "active")
+        is_configured = state in (INACTIVE, ACTIVE)
         for gate, ports, is_open in (
-            (self._gates[0], self._entities.gated, state == "active"),
+            (self._gates[0], self._entities.gated, state == ACTIVE),
             (self._gates[1], self._entities.always_on, is_configured),
         ):
             gate.state = state

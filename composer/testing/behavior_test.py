@@ -23,6 +23,7 @@ from typing import Any, Self, TypeVar, cast
 from composer.behavior import Logger
 from composer.model import LogLevel, Port, PortKind
 from composer.model.geometry import Quaternion, Vector
+from composer.model.lifecycle import TRANSITIONS, available_transitions
 from composer.runtime.clock.virtual import START_NS, VirtualClock
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
@@ -30,7 +31,7 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.testing.behavior_context import TestContext, VirtualLoop
 from composer.testing.behavior_goals import ActionServerPort, ServedGoal
-from composer.testing.behavior_node import TRANSITIONS, TestNode
+from composer.testing.behavior_node import TestNode
 from composer.testing.behavior_ports import ServicePort
 from composer.testing.declarations import ParameterSet, load_node_type
 from composer.testing.failures import LogLine, Received, TestFailure, Timeline, short, unknown
@@ -107,7 +108,7 @@ class BehaviorTest:
         """Deactivate, clean up and shut down, as the end of a system does."""
         try:
             for transition in ("deactivate", "cleanup", "shutdown"):
-                if self._node.state in TRANSITIONS[transition][0]:
+                if transition in available_transitions(self._node.state):
                     self.transition(transition)
         except BaseException:
             if kind is None:  # else the test has failed before
@@ -277,8 +278,11 @@ class BehaviorTest:
         """
         if transition not in TRANSITIONS:
             raise unknown(f"there is no transition '{transition}'", transition, TRANSITIONS)
-        if self._node.state not in TRANSITIONS[transition][0]:
-            raise self._failure(f"cannot {transition} the node: it is {self._node.state}")
+        available = available_transitions(self._node.state)
+        if transition not in available:
+            names = ", ".join(available) or "none"
+            text = f"cannot {transition} the node: it is {self._node.state}"
+            raise self._failure(f"{text}; available transitions: {names}")
         limit_s = 2 * self._model.supervision.timeout_ms / 1000.0
         changed = self._loop.run_task(self._node.change(transition))
         cause = self._wait_for(changed, limit_s, f"'{transition}'")
