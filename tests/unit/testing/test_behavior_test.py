@@ -323,6 +323,19 @@ def test_a_server_that_appears_is_used(tank_type: str) -> None:
         assert tank.behavior.calls[-2:] == ("deactivate", "CallCancelled")
 
 
+def test_a_coroutine_that_lets_no_time_pass_fails(tank_type: str) -> None:
+    async def busy(_: Any) -> None:
+        while True:
+            await tank.sleep(0.0)
+
+    tank = BehaviorTest(tank_type)
+    tank.answer("valve", busy)
+    tank.transition("configure")
+    tank.transition("activate")
+    with pytest.raises(TestFailure, match="20,000 calls at 0 s: no time passes"):
+        tank.send("open")
+
+
 @pytest.mark.parametrize(
     ("answer", "kind", "seen", "at_s"),
     [
