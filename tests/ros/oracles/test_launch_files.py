@@ -194,9 +194,12 @@ def test_imported_launch_files_behave_as_under_launch(
     expected = recorded(tmp_path)
     done = run("-m", "composer", "import", "launch", file, *arguments, "-o", "system.yaml")
     assert done.returncode == 0, done.stderr
+    text = (tmp_path / "system.yaml").read_text()
+    ready = rf"package: probe\1ready_timeout_ms: {1000 * LIMIT_S:g}\1"  # on a busy machine
+    (tmp_path / "system.yaml").write_text(re.sub(r"package: probe(, |\n +)", ready, text))
     done = run("-m", "composer", "run", "system.yaml")
     assert done.returncode == exit_code, done.stderr
     # It may end before the system has noticed that it is up.
     ended = "/last ended: (activate failed: )?its process exited with status 0"
     assert re.search(ended, done.stderr), done.stderr
-    assert recorded(tmp_path) == expected, (tmp_path / "system.yaml").read_text()
+    assert recorded(tmp_path) == expected, text
