@@ -9,8 +9,8 @@ from benchmarks.figures import Row
 from benchmarks.processes import wall_time_s
 
 ROOT = Path(__file__).parents[1]
-#: A minute of a robot, and an hour with a restart every few seconds; in seconds. The second one
-#: ends while all nodes are up.
+#: A minute of a robot, and an hour with a restart every few seconds. The hour ends while all
+#: nodes are up.
 LASTING_S = {"pipeline": 60.0, "supervised": 3602.0}
 ROUNDS = 3
 

@@ -28,6 +28,7 @@ from tests.properties.mutation import mutated, spliced
 from tests.properties.validating import (
     INTERFACES,
     ROOT,
+    SCENARIOS,
     SHIPPED,
     check_diagnostics,
     contents,
@@ -35,7 +36,7 @@ from tests.properties.validating import (
 )
 
 CONTENTS = contents()
-TEXTS = [path.read_text(encoding="utf-8") for path in SHIPPED]
+TEXTS = [path.read_text(encoding="utf-8") for path in (*SHIPPED, *SCENARIOS)]
 SETTINGS = [
     "nodes: [nodes]\ninterfaces: [interfaces, more]\nstrict: true\n"
     "select: [RC3]\nignore: [qos-implicit, RC412]\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ from composer.language.tree import plain
 from tests.examples import examples
 from tests.properties.mutation import mutated
 
+ROOT = Path(__file__).parents[2]
 STRICT = extend(
     Draft7Validator,
     type_checker=Draft7Validator.TYPE_CHECKER.redefine(
@@ -27,7 +29,7 @@ STRICT = extend(
 VALIDATORS = {name: STRICT(schema(name)) for name in SCHEMAS}
 FILES = [
     plain(tree)
-    for folder in (systems_folder(), nodes_folder())
+    for folder in (systems_folder(), nodes_folder(), ROOT / "scenarios")
     for path in sorted(folder.glob("*.yaml"))
     for tree, _, _ in [read_document(path)]
     if tree is not None

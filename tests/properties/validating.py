@@ -21,6 +21,7 @@ INTERFACES = Interfaces.load([interfaces_folder()])
 SHIPPED = tuple(
     path for folder in (systems_folder(), nodes_folder()) for path in sorted(folder.glob("*.yaml"))
 )
+SCENARIOS = tuple(sorted((ROOT / "scenarios").glob("*.yaml")))
 #: Features that no shipped file uses.
 OTHERS = (
     {
@@ -61,7 +62,7 @@ RENDERERS = (*machine.RENDERERS.values(), text.render)
 
 def contents() -> list[Any]:
     """Return the contents of the shipped systems and node types, and of OTHERS."""
-    trees = (read_document(path)[0] for path in SHIPPED)
+    trees = (read_document(path)[0] for path in (*SHIPPED, *SCENARIOS))
     return [*(plain(tree) for tree in trees if tree is not None), *OTHERS]
 
 
