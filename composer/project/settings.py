@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 from composer.base.diagnostics import Diagnostic, Rule, Severity, error, nearest, shown, warning
 from composer.base.fast_dataclass import dataclass
@@ -23,6 +24,9 @@ FOREIGN_OWNER = warning("RC044", "foreign-owner")
 SETTINGS_FILE = "composer.yaml"
 
 _SCHEMA = "project"
+#: In one setting. There are fewer rules, each with a code and a name.
+_MAX_RULES = 500
+_Item = TypeVar("_Item", Located[str], tuple[Located[str], Severity])
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +83,23 @@ def read_settings(written: SettingsSource) -> tuple[Settings, list[Diagnostic]]:
         nodes=_folders(tree, "nodes", written.root, diagnostics),
         interfaces=_folders(tree, "interfaces", written.root, diagnostics),
         strict=flag(tree.get("strict"), default=False),
-        select=texts(tree.get("select")),
-        ignore=texts(tree.get("ignore")),
-        severity=tuple(_severities(tree)),
+        select=_limited(texts(tree.get("select")), "select", diagnostics),
+        ignore=_limited(texts(tree.get("ignore")), "ignore", diagnostics),
+        severity=_limited(tuple(_severities(tree)), "severity", diagnostics),
     )
     return settings, diagnostics
+
+
+def _limited(
+    given: tuple[_Item, ...], setting: str, diagnostics: list[Diagnostic]
+) -> tuple[_Item, ...]:
+    """Return the first entries of a setting about rules, and report if there are more."""
+    if len(given) > _MAX_RULES:
+        item = given[_MAX_RULES]
+        name = item[0] if isinstance(item, tuple) else item
+        message = f"'{setting}' has more than {_MAX_RULES} entries; there are fewer rules"
+        diagnostics.append(Diagnostic(BAD_SETTING, message, name.span))
+    return given[:_MAX_RULES]
 
 
 def is_inside(path: Path, root: Path) -> bool:

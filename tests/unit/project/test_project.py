@@ -76,6 +76,10 @@ def test_settings_override_the_defaults(tmp_path: Path) -> None:
             (1, 12, "'RC202' is an error, which cannot be made an info"),
         ),
         ("severity: {RC2: info}", (1, 12, "there is no rule 'RC2'")),
+        (
+            f"ignore: [{'qos-implicit, ' * 501}]",
+            (1, 7010, "'ignore' has more than 500 entries; there are fewer rules"),
+        ),
         ("[", (1, 1, "this '[' is not closed")),
     ],
 )
