@@ -23,6 +23,8 @@ _MARK = "COMPOSE_ARGUMENT_{}_END"
 _MARKED = re.compile(r"COMPOSE_ARGUMENT_(\w+?)_END")
 _OPPOSITES = {"true": "false", "false": "true", "True": "False", "False": "True"}
 
+#: A value of each argument; None for any.
+_Group = tuple[str | None, ...]
 #: The report of a visit: ``nodes``, ``left_out``, ``arguments``, and ``compared`` constants.
 Visit = dict[str, Any]
 
@@ -134,14 +136,15 @@ def _tried_values(
     for name, texts in tuple(values.items()):
         for other in texts[1:]:  # a branch may compare other arguments
             found = _attempted(visit, {**given, name: other})
+            decides = not isinstance(found, str) and _node_names(found) != _node_names(base)
+            if decides:
+                tried.deciding.add(name)
             problem = found if isinstance(found, str) else _dependent_section(found, base)
-            if problem or isinstance(found, str):
+            if isinstance(found, str) or (problem and not decides):
                 refused.add((name, other))
                 tried.problems[name] = f"with '{other}', {problem}"
                 continue
             tried.visits[name, other] = found
-            if _node_names(found) != _node_names(base):
-                tried.deciding.add(name)
             for key, more in _alternatives(found, base).items():
                 values[key] = list(dict.fromkeys([*values.get(key, ()), *more]))
     for name in tried.problems:
@@ -337,12 +340,15 @@ def condition(visits: Sequence[Mapping[str, str]], present: Iterable[int]) -> di
             names = fewer
     if not names:
         return {}
-    groups = {tuple(item[name] for name in names): False for item in visits}
+    groups: dict[_Group, bool] = {tuple(item[name] for name in names): False for item in visits}
     for number in numbers:
         groups[tuple(visits[number][name] for name in names)] = True
     constants = {name: sorted({item[name] for item in visits} - {mark(name)}) for name in names}
-    there = [group for group, is_there in groups.items() if is_there]
-    absent = [group for group, is_there in groups.items() if not is_there]
+    numbers_of_values = [len({item[name] for item in visits}) for name in names]
+    there = _merged([group for group, is_there in groups.items() if is_there], numbers_of_values)
+    absent = _merged(
+        [group for group, is_there in groups.items() if not is_there], numbers_of_values
+    )
     present_if = " or ".join(_terms(constants, there))
     absent_if = " or ".join(_terms(constants, absent))
     are_known = all(
@@ -370,12 +376,26 @@ def _are_enough(
     )
 
 
-def _terms(
-    constants: Mapping[str, Sequence[str]], groups: Iterable[Sequence[str]]
-) -> Iterator[str]:
+def _merged(groups: Sequence[_Group], numbers_of_values: Sequence[int]) -> list[_Group]:
+    """Return the groups with None in place of all values of an argument, if the rest is equal."""
+    merged = [*groups]
+    for position, number in enumerate(numbers_of_values):
+        by_rest: dict[_Group, list[_Group]] = {}
+        for group in merged:
+            rest = (*group[:position], None, *group[position + 1 :])
+            by_rest.setdefault(rest, []).append(group)
+        merged = []
+        for rest, same in by_rest.items():
+            merged += [rest] if len(same) == number else same
+    return merged
+
+
+def _terms(constants: Mapping[str, Sequence[str]], groups: Iterable[_Group]) -> Iterator[str]:
     for group in groups:
         pairs = zip(constants, group, strict=True)
-        yield " and ".join(_term(name, value, constants[name]) for name, value in pairs)
+        yield " and ".join(
+            _term(name, value, constants[name]) for name, value in pairs if value is not None
+        )
 
 
 def _term(name: str, value: str, constants: Sequence[str]) -> str:

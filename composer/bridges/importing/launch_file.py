@@ -11,7 +11,7 @@ from composer.base.characters import escape_lines
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
 from composer.bridges.importing.writing import free_name
 from composer.language.document.scalars import NumberRefused, resolve_plain
-from composer.language.expressions import compile_expression
+from composer.language.expressions import ExpressionError, compile_expression
 from composer.language.tree import Plain
 from composer.launch.variants import (
     condition,
@@ -49,7 +49,7 @@ def describe_launch_file(
         for argument, problem in report["resolved"].items()
     )
     lost: list[str] = []
-    sections = _sections([item for visit in visits for item in visit["nodes"]], lost)
+    sections = _sections_of_all(report, lost)
     items = [*_items(report)]
     names_in_use = _names_in_use(report["arguments"], items)
     arguments = [item for item in report["arguments"] if item["name"] in names_in_use]
@@ -101,13 +101,29 @@ def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             samples |= item.pop("samples")
         sections = {name for item in present.values() for name in item.pop("sections")}
         for item, numbers in unified_groups(present, values):
-            yield {
-                **item,
-                "sections": sections,
-                "present": frozenset(numbers),
-                "condition": condition(values, numbers),
-                "samples": samples,
-            }
+            for part in _expressible(values, numbers):
+                yield {
+                    **item,
+                    "sections": sections,
+                    "present": frozenset(part),
+                    "condition": condition(values, part),
+                    "samples": samples,
+                }
+
+
+def _expressible(values: Sequence[Mapping[str, str]], numbers: list[int]) -> list[list[int]]:
+    """Return the visits in parts, so that the condition of each is a short enough expression."""
+    middle = len(numbers) // 2
+    try:
+        for text in condition(values, numbers).values():
+            compile_expression(text)
+    except ExpressionError:
+        if middle:
+            return [
+                *_expressible(values, numbers[:middle]),
+                *_expressible(values, numbers[middle:]),
+            ]
+    return [numbers]
 
 
 def _sample(value: Any, defaults: Mapping[str, str]) -> Any:
@@ -301,6 +317,17 @@ def _declared(
             left_out.append(f"parameter {name} of {full_name}: its type is not known")
         else:
             yield FoundParameter(name, kind, value)
+
+
+def _sections_of_all(report: Mapping[str, Any], lost: list[str]) -> dict[str, dict[str, Plain]]:
+    """Return the parameters of nodes inside programs; where arguments change them, the defaults."""
+    base = _sections(report["base"], lost)
+    items = [item for visit in report["visits"] for item in visit["nodes"]]
+    found = _sections(items, [])
+    for name, values in base.items():
+        if changed := sorted(key for key in values if key not in found.get(name, {})):
+            lost.append(f"parameters of {name} with other arguments: {', '.join(changed)}")
+    return {**found, **base}
 
 
 def _sections(

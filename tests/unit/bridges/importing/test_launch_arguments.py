@@ -223,6 +223,17 @@ def test_parameters_of_inner_nodes_do_not_depend_on_arguments(robot: str) -> Non
     assert [text for text in left_out if text in expected] == expected[:-1]
 
 
+def test_parameters_of_inner_nodes_have_the_values_of_the_defaults() -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        inner = {"enabled": values["slam"] == "true", "rate": 5.0}
+        slam = [node("slam")] if values["slam"] == "true" else []
+        return [node("nav", sections={"/costmap": inner}), *slam]
+
+    system, left_out = visited(nodes, argument("slam", "false"))
+    assert conditions(system["nodes"]["slam"]) == {"if": "slam"}
+    assert "parameters of /costmap with other arguments: enabled" in left_out
+
+
 def test_constants_that_are_compared_and_choices_are_tried(tmp_path: Path) -> None:
     def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
         burger = [node("small")] if values["model.name"] == "burger" else [node("large")]
@@ -326,6 +337,21 @@ C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
 )
 def test_the_condition_is_short(present: list[int], expected: dict[str, str]) -> None:
     assert condition([A, B, C, D], present) == expected
+
+
+def test_a_condition_that_would_be_too_long_is_divided(tmp_path: Path) -> None:
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        is_odd = [*values.values()].count("true") % 2 == 1
+        return [node("odd"), node("nav")] if is_odd else [node("nav")]
+
+    names = "abcdef"
+    system, _ = visited(nodes, *[argument(name, "false") for name in names])
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
+    for number, expected in ((0, 1), (1, 2), (2, 1), (5, 2)):
+        arguments = tuple(f"{name}=true" for name in names[:number])
+        result = load(tmp_path / "s.yaml", overrides=OverrideOptions(arguments=arguments))
+        assert result.system is not None
+        assert len(result.system.nodes) == expected
 
 
 def test_a_condition_has_no_double_negation() -> None:
