@@ -8,7 +8,9 @@ from functools import partial
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
+from composer.behavior import GoalRejected
 from composer.model.names import PROGRAM_LOGGER
+from composer.runtime.executors.futures import Future
 from composer.runtime.ros.messages import to_plain
 from composer.runtime.supervision.events import BroughtUp, Event, Logged
 from composer.testing.failures import LogLine, Received, Timeline, short
@@ -68,16 +70,40 @@ class Observation:
             self.history.append(event)
         self.timeline.add(event.elapsed_s, partial(_text, event))
 
-    def on_answer(self, name: str, status: str, message: Any) -> None:
-        """Receive the response or the result to what the test has sent."""
+    def on_response(self, service: str, response: Future[Any]) -> None:
+        """Receive the response to a request of the test."""
+        error = _error(response)
+        self._answer(service, error or "responded", None if error else response.result())
+
+    def on_goal_answered(self, action: str, sent: Future[Any]) -> None:
+        """Receive whether a goal of the test was accepted, and follow it to its result."""
+        if isinstance(sent.exception(), GoalRejected):
+            self._answer(action, "rejected", None)
+        elif error := _error(sent):
+            self._answer(action, error, None)
+        else:
+            sent.result().result().add_done_callback(partial(self._on_result, action))
+
+    def on_action(self, text: str) -> None:
+        """Note what the test does."""
+        self.timeline.add(self._now_s(), lambda: f"test: {text}")
+
+    def _on_result(self, action: str, outcome: Future[Any]) -> None:
+        error = _error(outcome)
+        status = error or outcome.result().status
+        self._answer(action, status, None if error else outcome.result().result)
+
+    def _answer(self, name: str, status: str, message: Any) -> None:
         answer = Answer(self._now_s(), name, status, message)
         self.history.append(answer)
         content = "" if message is None else f": {short(to_plain(message))}"
         self.timeline.add(answer.time_s, lambda: f"{name} {status}{content}")
 
-    def on_action(self, text: str) -> None:
-        """Note what the test does."""
-        self.timeline.add(self._now_s(), lambda: f"test: {text}")
+
+def _error(future: Future[Any]) -> str:
+    """Return why a call has failed; empty if it has not."""
+    error = future.exception()
+    return "was canceled" if future.cancelled() else "" if error is None else f"failed: {error}"
 
 
 def _text(event: Event) -> str:

@@ -24,8 +24,6 @@ from typing import Any, Self, TypeVar
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from composer.base.diagnostics import suggestion
-from composer.behavior import GoalRejected
 from composer.model import LogLevel, ParameterType, PortKind, System
 from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.clock.virtual import START_NS, VirtualClock
@@ -37,12 +35,12 @@ from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.supervision.events import Event, Outcome
 from composer.testing import faults
-from composer.testing.failures import LogLine, Received, TestFailure, short
+from composer.testing.failures import LogLine, Received, TestFailure, short, unknown
 from composer.testing.faults import Faults, TopicFault
 from composer.testing.goal import Goal
 from composer.testing.observation import Answer, Observation
 from composer.testing.system_run import SystemRun, load_system
-from composer.testing.tester import TESTER, Tester, port_name, with_tester
+from composer.testing.tester import TESTER, Tester, port_to, with_tester
 
 _PARAMETER_WITHIN_S = 5.0
 
@@ -236,7 +234,7 @@ class SystemTest:
         converted = _converted(request or {}, client.service_type.Request, service)
         self._observation.on_action(f"called {service} with {short(to_plain(converted))}")
         called: Future[Any] = client.call(converted, timeout_ms=timeout_s * 1000.0)
-        called.add_done_callback(partial(self._on_response, service))
+        called.add_done_callback(partial(self._observation.on_response, service))
         return called
 
     def send_goal(self, action: str, goal: Any = None) -> Goal:
@@ -249,7 +247,7 @@ class SystemTest:
         self._observation.on_action(f"sent {short(to_plain(converted))} to {action}")
         feedback: list[Any] = []
         sent = client.send_goal(converted, on_feedback=feedback.append)
-        sent.add_done_callback(partial(self._on_goal_answer, action))
+        sent.add_done_callback(partial(self._observation.on_goal_answered, action))
         return Goal(self.wait_for, action, sent, feedback)
 
     def set_parameter(self, node: str, name: str, value: Any) -> None:
@@ -279,24 +277,6 @@ class SystemTest:
         outcome = self._run_on(found, found.lifecycle.change(transition), timeout_s, what)
         if not outcome.success:
             raise self._failure(f"{what} failed: {outcome.reason}")
-
-    def _on_response(self, service: str, response: Future[Any]) -> None:
-        error = _error(response)
-        message = None if error else response.result()
-        self._observation.on_answer(service, error or "responded", message)
-
-    def _on_goal_answer(self, action: str, sent: Future[Any]) -> None:
-        error = _error(sent)
-        if error:
-            is_rejected = isinstance(sent.exception(), GoalRejected)
-            self._observation.on_answer(action, "rejected" if is_rejected else error, None)
-        else:
-            sent.result().result().add_done_callback(partial(self._on_result, action))
-
-    def _on_result(self, action: str, outcome: Future[Any]) -> None:
-        error = _error(outcome)
-        status = error or outcome.result().status
-        self._observation.on_answer(action, status, None if error else outcome.result().result)
 
     # --- faults
 
@@ -379,17 +359,11 @@ class SystemTest:
         nodes = {key: node for key, node in self._run.host.nodes.items() if key != TESTER}
         by_name = {node.full_name: node for node in nodes.values()} | nodes
         if name not in by_name:
-            raise self._unknown(f"the system has no node '{name}'", name, nodes)
+            raise unknown(f"the system has no node '{name}'", name, nodes)
         return by_name[name]
 
     def _port(self, kind: PortKind, full_name: str) -> str:
-        name = port_name(kind, full_name)
-        tester = self._run.host.nodes[TESTER].model
-        if tester.port(name) is None:
-            names = [port.full_name for port in tester.ports if port.kind is kind]
-            text = f"no node of the system has a {_OTHER_ENDS[kind]} '{full_name}'"
-            raise self._unknown(text, full_name, names)
-        return name
+        return port_to(self._run.host.nodes[TESTER].model, kind, full_name)
 
     def _disturb(
         self, topic: str, disturb: faults.Disturb, count: float, for_s: float, what: str
@@ -408,28 +382,10 @@ class SystemTest:
         self._observation.on_action(f"let {node} {what}")
         self._faults.before_next_handler(model.name.value, handler, act)
 
-    def _unknown(self, text: str, name: str, names: Iterable[str]) -> TestFailure:
-        hint = suggestion(name, list(names))
-        return TestFailure(text if hint is None else f"{text}; {hint}")
-
     def _failure(self, text: str) -> TestFailure:
         if self.outcome is not None:
             text = f"{text}; the system has ended: {self.outcome.reason}"
         return TestFailure(text, self.timeline())
-
-
-_OTHER_ENDS = {
-    PortKind.SUBSCRIPTION: "publisher on",
-    PortKind.PUBLISHER: "subscription to",
-    PortKind.CLIENT: "service",
-    PortKind.ACTION_CLIENT: "action server",
-}
-
-
-def _error(future: Future[Any]) -> str:
-    """Return why a call has failed; empty if it has not."""
-    error = future.exception()
-    return "was canceled" if future.cancelled() else "" if error is None else f"failed: {error}"
 
 
 def _converted(content: Any, kind: Any, where: str) -> Any:

@@ -24,6 +24,7 @@ from composer.model import (
     channels,
 )
 from composer.model.qos import Durability, History, Liveliness, Reliability
+from composer.testing.failures import unknown
 
 #: The key and the name of the node.
 TESTER: Final = "compose_test"
@@ -51,8 +52,26 @@ class Tester(Behavior):
         return lambda message: self.on_message(topic, message)
 
 
-def port_name(kind: PortKind, full_name: str) -> str:
-    """Return the name of the tester's port."""
+#: What a node of the system has at the other end of a port of the test, in failures.
+_OTHER_ENDS = {
+    PortKind.SUBSCRIPTION: "publisher on",
+    PortKind.PUBLISHER: "subscription to",
+    PortKind.CLIENT: "service",
+    PortKind.ACTION_CLIENT: "action server",
+}
+
+
+def port_to(tester: Node, kind: PortKind, full_name: str) -> str:
+    """Return the name of the test's port to a topic, service or action. Raises TestFailure."""
+    name = _port_name(kind, full_name)
+    if tester.port(name) is None:
+        names = [port.full_name for port in tester.ports if port.kind is kind]
+        text = f"no node of the system has a {_OTHER_ENDS[kind]} '{full_name}'"
+        raise unknown(text, full_name, names)
+    return name
+
+
+def _port_name(kind: PortKind, full_name: str) -> str:
     return f"{kind}:{full_name}"
 
 
@@ -126,7 +145,7 @@ def _port(
         ],
         **changes,
     )
-    name = Located(port_name(kind, first.full_name), first.span)
+    name = Located(_port_name(kind, first.full_name), first.span)
     return Port(
         kind,
         name,

@@ -7,9 +7,10 @@ from typing import Annotated
 import typer
 
 from composer.cli.support.errors import FAILED
+from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import examples
 from composer.cli.support.results import as_json
-from composer.cli.support.system_arguments import Arguments, SystemName, load_system
+from composer.cli.support.system_arguments import SystemName, load_system
 from composer.cli.support.terminal import say, write, write_raw
 
 EPILOG = examples(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import Autostart, AutostartTo, Namespace, Settings, examples
 from composer.cli.support.process import (
     end_now,
@@ -18,7 +19,6 @@ from composer.cli.support.process import (
 )
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
-    Arguments,
     ShowWarnings,
     complete_system,
     example_systems,

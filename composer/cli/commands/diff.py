@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from composer.cli.support.errors import FAILED
+from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import (
     Autostart,
     AutostartTo,
@@ -21,7 +22,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
-from composer.cli.support.system_arguments import Arguments, SystemName, runnable_system
+from composer.cli.support.system_arguments import SystemName, runnable_system
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:

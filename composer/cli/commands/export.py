@@ -14,10 +14,11 @@ import typer
 from composer.cli.commands.export_images import Force, add_image_commands, exported_system
 from composer.cli.commands.export_stubs import add_stubs_command
 from composer.cli.support.errors import CommandError
+from composer.cli.support.name_values import Arguments, declared_arguments
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
 from composer.cli.support.results import as_json
-from composer.cli.support.system_arguments import Arguments, SystemName, declared_arguments
+from composer.cli.support.system_arguments import SystemName
 from composer.cli.support.terminal import write
 
 if TYPE_CHECKING:

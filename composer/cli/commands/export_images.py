@@ -11,14 +11,10 @@ import typer
 
 from composer.cli.support.errors import CommandError
 from composer.cli.support.hosts import files_to_copy, write_staying
+from composer.cli.support.name_values import Arguments
 from composer.cli.support.new_files import write_and_say
 from composer.cli.support.options import examples
-from composer.cli.support.system_arguments import (
-    Arguments,
-    RunnableSystem,
-    SystemName,
-    runnable_system,
-)
+from composer.cli.support.system_arguments import RunnableSystem, SystemName, runnable_system
 from composer.cli.support.terminal import lines, write, write_raw
 
 if TYPE_CHECKING:

@@ -10,14 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import CommandError, UsageError
+from composer.cli.support.name_values import complete_system_or_argument, split_arguments
 from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
-from composer.cli.support.system_arguments import (
-    complete_system_or_argument,
-    load_system,
-    split_arguments,
-    system_file,
-)
+from composer.cli.support.system_arguments import load_system, system_file
 from composer.cli.support.terminal import say, write_bytes
 from composer.graph.diagram_options import FORMATS_BY_SUFFIX, Format, View
 

@@ -20,6 +20,7 @@ from composer.cli.support.hosts import (
     require_hosts,
     write_staying,
 )
+from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import (
     START_OPTIONS,
     AllOrNothing,
@@ -34,12 +35,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.process import compose_command
 from composer.cli.support.ros import require_ros
-from composer.cli.support.system_arguments import (
-    Arguments,
-    ShowWarnings,
-    SystemName,
-    runnable_system,
-)
+from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.terminal import lines, say, write
 from composer.model.names import PROGRAM_LOGGER
 

@@ -23,9 +23,10 @@ from composer.cli.support.bags import (
     tolerances,
 )
 from composer.cli.support.errors import FAILED, CommandError, UsageError
+from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Settings, Timeout, examples, finite
 from composer.cli.support.ros import require_interfaces, require_modules, require_ros, ros_session
-from composer.cli.support.system_arguments import Arguments, complete_system, runnable_system
+from composer.cli.support.system_arguments import complete_system, runnable_system
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:

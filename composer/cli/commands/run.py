@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import os
 import signal
-import sys
-from contextlib import ExitStack, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from composer.cli.commands.export_stubs import update_typings
-from composer.cli.support.errors import CONFIG, CommandError, UsageError
+from composer.cli.support.errors import CONFIG, UsageError
+from composer.cli.support.host_run import run_host
+from composer.cli.support.name_values import Arguments, print_arguments
 from composer.cli.support.options import (
     START_OPTIONS,
     AllOrNothing,
@@ -38,13 +37,7 @@ from composer.cli.support.ros import (
     require_ros,
 )
 from composer.cli.support.run_time import Time, run_clock
-from composer.cli.support.system_arguments import (
-    Arguments,
-    ShowWarnings,
-    SystemName,
-    print_arguments,
-    runnable_system,
-)
+from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
@@ -53,7 +46,6 @@ if TYPE_CHECKING:
     from composer.plan import Plan
     from composer.runtime.clock.clock import Clock
     from composer.runtime.host_options import HostOptions
-    from composer.runtime.supervision.events import Outcome
 
 EPILOG = examples(
     "compose run pipeline                                  run an example system until Ctrl-C",
@@ -305,7 +297,7 @@ def run(
     shown += ["--", system, *declared.arguments]
     recording = _recording(part, all_of_it=record, clock=host_options.clock)
     host_options = replace(host_options, recorder=recording)
-    outcome = _run(part, (up, down), host_options, recording, shown if dashboard else None)
+    outcome = run_host(part, (up, down), host_options, recording, shown if dashboard else None)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
@@ -364,69 +356,6 @@ def _recording(system: System, *, all_of_it: bool, clock: Clock) -> SystemRecord
         from composer.bags.system_recording import SystemRecording
 
         return SystemRecording(system, settings, clock, say)
-
-
-def _run(
-    system: System,
-    plans: tuple[Plan, Plan],
-    options: HostOptions,
-    recording: SystemRecording | None,
-    dashboard: list[str] | None,
-) -> Outcome:
-    """Run the system, with its plans up and down, and a dashboard if its arguments are given."""
-    gc.disable()  # until the host has its nodes
-    from composer.cli.support.console import queued_output
-    from composer.cli.support.line_format import console_format
-    from composer.cli.support.process import end_now, shown_address
-    from composer.cli.support.progress import Progress, run_log, severity_of, summary
-    from composer.model.names import join
-    from composer.runtime.host import Host
-    from composer.runtime.process import StartRefused
-    from composer.runtime.process.instance_lock import ALREADY_RUNS, AlreadyRunning
-    from composer.runtime.process.signals import ALIVE, READY, STOPPING, ServiceManager
-    from composer.runtime.supervision.events import BroughtUp, Event, Logged, NodeFailed, Stopping
-
-    with ExitStack() as stack:
-        stack.enter_context(queued_output())
-        is_part = "/" in system.name.value  # a process of a system: robot/perception
-        name = join(system.namespace, system.name.value)
-        is_child = bool(options.report_key)  # its lines go to the process that has started it
-        log = stack.enter_context(run_log(name, part=is_part, forwarded=is_child))
-        address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
-        progress = Progress(sys.stderr, console_format(), address)
-        if recording is not None:
-            stack.enter_context(recording.running())
-
-        service_manager = ServiceManager()
-
-        def report(event: Event) -> None:
-            # The process that has started this one prints the states of its nodes, and which have
-            # failed: it decides what follows.
-            is_known = not isinstance(event, Logged) and severity_of(event) == "INFO"
-            is_known = is_known or (isinstance(event, NodeFailed) and not event.is_tolerated)
-            if not is_child or not is_known:
-                progress.show(event)
-            log.show(event)
-            if recording is not None:
-                recording.on_event(event)
-            if isinstance(event, BroughtUp | Stopping):
-                state = READY if isinstance(event, BroughtUp) else STOPPING
-                service_manager.send(state, f"STATUS={event}")
-
-        options = replace(options, on_alive=partial(service_manager.send, ALIVE))
-        up, down = plans
-        host = Host(system, up, down, options, report)
-        try:
-            outcome = host.run()
-        except StartRefused as refusal:
-            if options.report_key and isinstance(refusal, AlreadyRunning):
-                raise typer.Exit(ALREADY_RUNS) from refusal
-            raise CommandError(str(refusal), hint=refusal.hint) from refusal
-        if options.process is None or sys.stderr.isatty():
-            say(summary(outcome))
-    if outcome.hung:
-        end_now(outcome.exit_code)
-    return outcome
 
 
 def _options(

@@ -15,14 +15,13 @@ from composer.base.fast_dataclass import dataclass
 from composer.cli.commands.export_stubs import update_typings
 from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import FAILED, UsageError
+from composer.cli.support.name_values import complete_system_or_argument, split_arguments
 from composer.cli.support.options import examples
 from composer.cli.support.system_arguments import (
-    complete_system_or_argument,
     example_systems,
     nearest_path,
     path_exists,
     project_systems,
-    split_arguments,
 )
 from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
