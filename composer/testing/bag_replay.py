@@ -49,8 +49,9 @@ class Replay:
         """
         names = frozenset(topic.name for topic in self.topics) & golden.summary.topics.keys()
         if not names:
-            known = ", ".join(topic.name for topic in self.topics) or "none"
-            raise BagError("the bag has no topic that the system publishes", f"those are: {known}")
+            published = ", ".join(topic.name for topic in self.topics) or "nothing"
+            text = "the bag has no topic that the system publishes"
+            raise BagError(text, f"the system publishes {published}")
         end_ns = self.played[-1].recorded_ns
         found = differences(
             golden.messages(names, self.start_ns, end_ns),
@@ -112,9 +113,10 @@ def inputs(system: System, bag: Bag, is_wanted: Callable[[str], bool]) -> frozen
     received = {item.name: item.sinks[0].port for item in topics if item.sinks and not item.sources}
     found = {name for name in bag.summary.topics if name in received and is_wanted(name)}
     if not found:
-        known = ", ".join(sorted(received)) or "none; leave nodes out with --replace"
-        text = f"no topic of the bag is one that {system.name} receives and does not publish"
-        raise BagError(text, f"those are: {known}")
+        hint = "leave out the nodes that publish topics of the bag: --replace NODE"
+        if received:
+            hint = f"{system.name} only receives {', '.join(sorted(received))}"
+        raise BagError(f"the bag has no topic that {system.name} only receives", hint)
     for name in sorted(found):
         types = bag.summary.topics[name].type_name, received[name].interface.value
         if types[0] != types[1]:
