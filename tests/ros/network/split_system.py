@@ -30,6 +30,8 @@ class Detector(Behavior):
 """
 _SYSTEM = """
 system: robot
+arguments:
+  content: {default: picture}
 lifecycle: {on_failure: restart, restart: {backoff_ms: 300}}
 hosts:
 HOSTS
@@ -39,7 +41,7 @@ processes:
 nodes:
   camera:
     publishers: {image: {type: std_msgs/msg/String, qos: command}}
-    timers: {tick: {period_ms: 200, publish: {image: {data: picture}}}}
+    timers: {tick: {period_ms: 200, publish: {image: {data: "${content}"}}}}
   detector:
     behavior: detector:Detector
     subscriptions: {image: {type: std_msgs/msg/String, qos: command}}

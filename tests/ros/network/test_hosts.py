@@ -96,10 +96,10 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
             assert logged.count("[detector] looking") == 1
         assert is_late or "/camera finalized" in logged
 
-        options = ("--namespace", "/lab", "--log-level", "warn")
+        options = ("content=photo", "--namespace", "/lab", "--log-level", "debug")
         with system.up(*options) as up:  # whatever ends it, nothing is left
             up.wait_for("/lab/camera active")
-            up.wait_for("3 of 3 nodes active")
+            up.wait_for("] found photo")
             commands = [words for words in system.all_processes() if "--process" in words]
             assert all(" ".join(options) in words for words in commands)
             up.kill()
