@@ -30,7 +30,7 @@ def environments() -> dict[str, tuple[list[str], list[str]]]:
     interfaces = [*_build_requirements(ROOT / "interfaces"), *BUILD_PROGRAMS]
     return {
         # pytest for the tests of projects that compose new writes.
-        "run": (["ros", "dashboard"], [*build, "pytest>=9.0"]),
+        "run": (["ros", "dashboard", "bags"], [*build, "pytest>=9.0"]),
         "dev": (["ros", "dev", "docs"], build),
         "test": (["test"], build),
         "interfaces": ([], interfaces),

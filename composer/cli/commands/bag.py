@@ -161,7 +161,7 @@ def _write(
     folder: Path,
     split: tuple[float | None, float | None],
 ) -> None:
-    with bag_errors(writes=True):
+    with bag_errors():
         from composer.bags.editing import write_bag
         from composer.bags.writer import split_limits
 

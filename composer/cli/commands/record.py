@@ -88,7 +88,7 @@ def record(
         _save(system, timeout)
         return
     with (
-        bag_errors(writes=True),
+        bag_errors(),
         ros_session("compose record", timeout, carries_messages=True) as (
             session,
             deadline,

@@ -129,7 +129,7 @@ def replay(
         if value:
             with_or_without = "without" if system is not None else "with"
             raise UsageError(f"{name} can only be used {with_or_without} SYSTEM")
-    with bag_errors(writes=output is not None):
+    with bag_errors():
         chosen = selection(topics, start, duration)
         found = opened(bag)
         if system is None:

@@ -352,7 +352,7 @@ def _recording(system: System, *, all_of_it: bool, clock: Clock) -> SystemRecord
         return None
     from composer.cli.support.bags import bag_errors
 
-    with bag_errors(writes=True):
+    with bag_errors():
         from composer.bags.system_recording import SystemRecording
 
         return SystemRecording(system, settings, clock, say)

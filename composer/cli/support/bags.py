@@ -104,13 +104,12 @@ Ignore = Annotated[
 
 
 @contextmanager
-def bag_errors(*, writes: bool = False) -> Iterator[None]:
+def bag_errors() -> Iterator[None]:
     """Turn a BagError into a CommandError, also if a library of the extra is not installed."""
     from composer.bags.bag import BagError, require
 
     try:
-        if writes:
-            require("mcap")
+        require("mcap")
         yield
     except BagError as error:
         raise CommandError(str(error), hint=error.hint) from error
