@@ -10,12 +10,11 @@ from rclpy.subscription import Subscription
 from composer.bags.bag import BagTopic
 from composer.bags.definitions import full_definition
 from composer.bags.recorder import Recorder
-from composer.client.messages.topics import strictest_compatible_qos
 from composer.client.messages.values import InvalidValueError, class_of
 from composer.client.session import Session
 from composer.interfaces import Interfaces
 from composer.model.names import is_hidden
-from composer.model.qos import QosProfile, incompatibilities
+from composer.model.qos import QosProfile, incompatibilities, strictest_compatible
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.ros_graph.endpoints import TopicInfo
 
@@ -81,7 +80,7 @@ class GraphRecording:
         type_hash = info.publishers[0].type_hash
         topic = BagTopic(info.name, types[0], offers, definition, type_hash=type_hash)
         put = self._recorder.source(topic).put
-        profile = strictest_compatible_qos(list(offers), _DEPTH)
+        profile = strictest_compatible(list(offers), _DEPTH)
         subscription = self._session.subscribe(
             message_class, info.name, partial(put), rclpy_profile(profile), raw=True
         )

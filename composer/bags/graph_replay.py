@@ -16,7 +16,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.messages.topics import wait_until_acknowledged
 from composer.client.messages.values import InvalidValueError, class_of
 from composer.client.session import Deadline, Session
-from composer.model.qos import Durability, QosProfile, Reliability
+from composer.model.qos import QosProfile, strongest
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 #: As of Gazebo and rosbag2.
@@ -106,10 +106,8 @@ def offered(profiles: Iterable[QosProfile]) -> QosProfile:
     found = tuple(profiles)
     if len(set(found)) == 1:
         return found[0]
-    reliable = not found or any(item.reliability is Reliability.RELIABLE for item in found)
-    latched = any(item.durability is Durability.TRANSIENT_LOCAL for item in found)
-    return QosProfile(
-        depth=max((item.depth for item in found), default=QosProfile().depth),
-        reliability=Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
-        durability=Durability.TRANSIENT_LOCAL if latched else Durability.VOLATILE,
-    )
+    if not found:
+        return QosProfile()
+    reliability, durability = strongest(found)
+    depth = max(item.depth for item in found)
+    return QosProfile(depth=depth, reliability=reliability, durability=durability)

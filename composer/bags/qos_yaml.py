@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 
 import yaml
 
+from composer.bags.bag import NANOSECONDS
 from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
 
 P = TypeVar("P", bound=StrEnum)
 
-_NANOSECONDS = 1_000_000_000
 _PER_MILLISECOND = 1_000_000
 #: rmw's RMW_DURATION_INFINITE.
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
@@ -92,7 +92,7 @@ def _policy(values: Mapping[str, Any], name: str, default: P) -> P:
 def _duration(milliseconds: float | None) -> dict[str, int]:
     if milliseconds is None:
         return dict(_INFINITE)
-    seconds, nanoseconds = divmod(round(milliseconds * _PER_MILLISECOND), _NANOSECONDS)
+    seconds, nanoseconds = divmod(round(milliseconds * _PER_MILLISECOND), NANOSECONDS)
     return {"sec": seconds, "nsec": nanoseconds}
 
 
@@ -105,4 +105,4 @@ def _milliseconds(duration: object) -> float | None:
         return None
     if seconds >= _NO_LIMIT_S:
         return None
-    return (seconds * _NANOSECONDS + nanoseconds) / _PER_MILLISECOND or None
+    return (seconds * NANOSECONDS + nanoseconds) / _PER_MILLISECOND or None

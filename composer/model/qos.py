@@ -6,7 +6,7 @@ Policies and values are spelled as rclpy spells them; durations are in milliseco
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 
 from composer.base.fast_dataclass import dataclass
@@ -74,6 +74,28 @@ PRESETS: Mapping[str, QosProfile] = {
     "parameters": QosProfile(depth=1000),
     "system_default": QosProfile(),
 }
+
+
+def strongest(profiles: Iterable[QosProfile]) -> tuple[Reliability, Durability]:
+    """Return the policies of an offer that satisfies the reliability and durability of all."""
+    found = tuple(profiles)
+    reliable = any(item.reliability is Reliability.RELIABLE for item in found)
+    latched = any(item.durability is Durability.TRANSIENT_LOCAL for item in found)
+    return (
+        Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
+        Durability.TRANSIENT_LOCAL if latched else Durability.VOLATILE,
+    )
+
+
+def strictest_compatible(offers: Sequence[QosProfile], depth: int) -> QosProfile:
+    """Return the strictest profile of a subscription that is compatible with every offer."""
+    reliable = all(offer.reliability is Reliability.RELIABLE for offer in offers)
+    transient = all(offer.durability is Durability.TRANSIENT_LOCAL for offer in offers)
+    return QosProfile(
+        depth=depth,
+        reliability=Reliability.RELIABLE if offers and reliable else Reliability.BEST_EFFORT,
+        durability=Durability.TRANSIENT_LOCAL if offers and transient else Durability.VOLATILE,
+    )
 
 
 @dataclass(frozen=True, slots=True)

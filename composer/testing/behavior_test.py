@@ -34,7 +34,15 @@ from composer.testing.behavior_goals import ActionServerPort, ServedGoal
 from composer.testing.behavior_node import TestNode
 from composer.testing.behavior_ports import ServicePort
 from composer.testing.declarations import ParameterSet, load_node_type
-from composer.testing.failures import LogLine, Received, TestFailure, Timeline, short, unknown
+from composer.testing.failures import (
+    LogLine,
+    Received,
+    TestFailure,
+    Timeline,
+    short,
+    unknown,
+    unmet,
+)
 from composer.testing.goal import Goal
 from composer.testing.message_classes import MessageClasses
 
@@ -131,9 +139,7 @@ class BehaviorTest:
         Raises TestFailure after ``timeout_s``, and what handlers and ``condition`` raise.
         """
         if not self._loop.run_until(condition, self._clock.monotonic() + timeout_s):
-            name = getattr(condition, "__name__", "<lambda>")
-            what = "the condition was" if name == "<lambda>" else f"{name} was"
-            raise self._failure(f"{what} not true within {timeout_s:g} s")
+            raise self._failure(unmet(condition, timeout_s))
 
     def sleep(self, seconds: float) -> Future[None]:
         """Return what an ``async`` function of :meth:`answer` awaits to let time pass."""

@@ -89,6 +89,13 @@ def unknown(text: str, name: str, names: Iterable[str]) -> TestFailure:
     return TestFailure(text if hint is None else f"{text}; {hint}")
 
 
+def unmet(condition: Callable[[], object], timeout_s: float) -> str:
+    """Return the text for a condition that was not true in time."""
+    name = getattr(condition, "__name__", "<lambda>")
+    what = "the condition" if name == "<lambda>" else name
+    return f"{what} was not true within {timeout_s:g} s"
+
+
 _LENGTH = 120
 
 

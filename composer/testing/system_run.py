@@ -62,7 +62,11 @@ class SystemRun:
         self._variables = dict(os.environ)
         os.environ.update(ISOLATION, ROS_DOMAIN_ID=str(1 + os.getpid() % _DOMAINS))
         self.clock.start(self._thread)
-        self.wait(lambda: is_up() or self.outcome is not None, inf)
+        try:
+            self.wait(lambda: is_up() or self.outcome is not None, inf)
+        except BaseException:  # such as KeyboardInterrupt
+            self.end()
+            raise
         if not is_up():
             self.end()
 

@@ -35,7 +35,7 @@ from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.supervision.events import Event, Outcome
 from composer.testing import faults
-from composer.testing.failures import LogLine, Received, TestFailure, short, unknown
+from composer.testing.failures import LogLine, Received, TestFailure, short, unknown, unmet
 from composer.testing.faults import Faults, TopicFault
 from composer.testing.goal import Goal
 from composer.testing.observation import Answer, Observation
@@ -126,9 +126,7 @@ class SystemTest:
         Raises TestFailure after ``timeout_s``, and what ``condition`` raises.
         """
         if not self._run.wait(condition, timeout_s):
-            name = getattr(condition, "__name__", "<lambda>")
-            what = "the condition was" if name == "<lambda>" else f"{name} was"
-            raise self._failure(f"{what} not true within {timeout_s:g} s")
+            raise self._failure(unmet(condition, timeout_s))
 
     # --- what the system does
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -23,14 +23,11 @@ from composer.model import (
     System,
     channels,
 )
-from composer.model.qos import Durability, History, Liveliness, Reliability
+from composer.model.qos import History, QosProfile, strictest_compatible, strongest
 from composer.testing.failures import unknown
 
 #: The key and the name of the node.
 TESTER: Final = "compose_test"
-#: From the weakest to the strongest.
-_RELIABILITIES = (Reliability.BEST_EFFORT, Reliability.RELIABLE)
-_DURABILITIES = (Durability.VOLATILE, Durability.TRANSIENT_LOCAL)
 _NO_SERVICES = Introspection(
     parameters=False, rosout=False, type_description=False, lifecycle_services=False
 )
@@ -109,42 +106,31 @@ def _ports(system: System) -> Iterator[Port]:
         sinks = [end.port for end in channel.sinks]
         if channel.kind is ChannelKind.TOPIC:
             if sources:
-                yield _port(PortKind.SUBSCRIPTION, sources, min, _RECORDED)
+                yield _port(PortKind.SUBSCRIPTION, sources, _recording(sources))
             if sinks:
-                yield _port(PortKind.PUBLISHER, sinks, max, {})
+                yield _port(PortKind.PUBLISHER, sinks, _offering(sinks))
         elif len(sources) == 1:
             is_service = channel.kind is ChannelKind.SERVICE
-            yield _port(PortKind.CLIENT if is_service else PortKind.ACTION_CLIENT, sources, max, {})
+            kind = PortKind.CLIENT if is_service else PortKind.ACTION_CLIENT
+            yield _port(kind, sources, sources[0].qos.profile)
 
 
-#: A subscription of a test keeps all messages, and requests nothing in time.
-_RECORDED: Mapping[str, Any] = {
-    "history": History.KEEP_ALL,
-    "deadline_ms": None,
-    "liveliness": Liveliness.AUTOMATIC,
-    "liveliness_lease_duration_ms": None,
-}
+def _recording(publishers: Sequence[Port]) -> QosProfile:
+    """Return the profile of a subscription that keeps all messages of these publishers."""
+    offers = [port.qos.profile for port in publishers]
+    return replace(strictest_compatible(offers, offers[0].depth), history=History.KEEP_ALL)
 
 
-def _port(
-    kind: PortKind,
-    others: Sequence[Port],
-    strength: Callable[[Iterable[int]], int],
-    changes: Mapping[str, Any],
-) -> Port:
-    """Return a port that matches all ``others``, with the weakest or the strongest policies."""
+def _offering(subscriptions: Sequence[Port]) -> QosProfile:
+    """Return the profile of a publisher to these subscriptions."""
+    requests = [port.qos.profile for port in subscriptions]
+    reliability, durability = strongest(requests)
+    return replace(requests[0], reliability=reliability, durability=durability)
+
+
+def _port(kind: PortKind, others: Sequence[Port], profile: QosProfile) -> Port:
+    """Return the port of the test at the other end of ``others``."""
     first = others[0]
-    profiles = [port.qos.profile for port in others]
-    profile = replace(
-        first.qos.profile,
-        reliability=_RELIABILITIES[
-            strength(_RELIABILITIES.index(profile.reliability) for profile in profiles)
-        ],
-        durability=_DURABILITIES[
-            strength(_DURABILITIES.index(profile.durability) for profile in profiles)
-        ],
-        **changes,
-    )
     name = Located(_port_name(kind, first.full_name), first.span)
     return Port(
         kind,

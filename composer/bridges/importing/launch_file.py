@@ -13,8 +13,8 @@ from composer.bridges.importing.writing import free_name
 from composer.language.document.scalars import NumberRefused, resolve_plain
 from composer.language.expressions import ExpressionError, compile_expression
 from composer.language.tree import Plain
+from composer.launch.conditions import condition
 from composer.launch.variants import (
-    condition,
     identifier,
     inner_sections,
     is_switch,

@@ -13,7 +13,7 @@ import typer
 
 from composer.cli.commands.export_stubs import update_typings
 from composer.cli.support.errors import CONFIG, UsageError
-from composer.cli.support.host_run import run_host
+from composer.cli.support.host_run import Time, run_clock, run_host
 from composer.cli.support.name_values import Arguments, print_arguments
 from composer.cli.support.options import (
     START_OPTIONS,
@@ -36,7 +36,6 @@ from composer.cli.support.ros import (
     require_modules,
     require_ros,
 )
-from composer.cli.support.run_time import Time, run_clock
 from composer.cli.support.system_arguments import ShowWarnings, SystemName, runnable_system
 from composer.cli.support.terminal import say, write
 

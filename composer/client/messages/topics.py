@@ -18,7 +18,7 @@ from composer.client.graph_names import GraphNames, full_name, type_mismatch_hin
 from composer.client.messages.values import Build, InvalidValueError, class_of
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.model.qos import Durability, QosProfile, Reliability
+from composer.model.qos import Durability, QosProfile, strictest_compatible
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.ros_graph.endpoints import TopicInfo
 
@@ -76,7 +76,7 @@ class Topics:
 
     def compatible_qos(self, name: str) -> QosProfile:
         """Return the strictest profile that all publishers of a topic satisfy."""
-        return strictest_compatible_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
+        return strictest_compatible(self._offers(name), _SUBSCRIPTION_DEPTH)
 
     def measuring_qos(self, name: str) -> QosProfile:
         """Return such a profile with which no messages from before the subscription arrive."""
@@ -127,26 +127,12 @@ class TopicSubscription:
         return taken
 
 
-def strictest_compatible_qos(offers: list[QosProfile], depth: int) -> QosProfile:
-    """Return the strictest profile of a subscription that is compatible with every offer.
-
-    See the offer/request rule in :mod:`composer.model.qos`.
-    """
-    reliable = all(offer.reliability is Reliability.RELIABLE for offer in offers)
-    transient = all(offer.durability is Durability.TRANSIENT_LOCAL for offer in offers)
-    return QosProfile(
-        depth=depth,
-        reliability=Reliability.RELIABLE if offers and reliable else Reliability.BEST_EFFORT,
-        durability=Durability.TRANSIENT_LOCAL if offers and transient else Durability.VOLATILE,
-    )
-
-
 def measuring_qos(offers: list[QosProfile], depth: int) -> QosProfile:
     """Return the strictest compatible profile for measurements: latched messages do not arrive.
 
     They would arrive at once, whenever they were published.
     """
-    return replace(strictest_compatible_qos(offers, depth), durability=Durability.VOLATILE)
+    return replace(strictest_compatible(offers, depth), durability=Durability.VOLATILE)
 
 
 def publish(session: Session, deadline: Deadline, publication: Publication) -> Iterator[Any]:

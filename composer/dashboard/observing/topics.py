@@ -14,7 +14,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.dashboard.observing.topology import Topology
 from composer.dashboard.protocol.messages import RequestError
 from composer.model import PortKind
-from composer.model.qos import Durability, QosProfile, Reliability
+from composer.model.qos import Durability, QosProfile, Reliability, strictest_compatible
 from composer.runtime.metrics.message_rate import MessageRate
 
 if TYPE_CHECKING:
@@ -167,10 +167,10 @@ class TopicReader:
 
     def _wanted_profile(self, publishers: list[ObservedEndpoint], type_name: str) -> QosProfile:
         """Return the strictest profile that all publishers satisfy, except for large messages."""
-        from composer.client.messages.topics import measuring_qos, strictest_compatible_qos
+        from composer.client.messages.topics import measuring_qos
 
         offers = [end.qos for end in publishers if end.qos is not None]
-        strictest = strictest_compatible_qos if self.latched else measuring_qos
+        strictest = strictest_compatible if self.latched else measuring_qos
         profile = strictest(offers, self._depth)
         return large_profile(profile) if self._is_large or type_name in LARGE_TYPES else profile
 

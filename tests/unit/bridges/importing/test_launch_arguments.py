@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
 from composer.language.tree import plain
-from composer.launch.variants import all_visits, condition, mark
+from composer.launch.conditions import condition
+from composer.launch.variants import all_visits, mark
 from composer.loading import load, load_files
 from composer.model.resolve import OverrideOptions
 from tests.examples import examples
