@@ -1,4 +1,4 @@
-"""The definitions of messages in bags: as text, with those of all messages in them."""
+"""The definitions of messages in bags: texts that include the nested messages."""
 
 from __future__ import annotations
 

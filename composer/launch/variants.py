@@ -104,7 +104,7 @@ def _with_any_other(name: str, value: str, compared: Collection[str]) -> list[st
 class _Tried(NamedTuple):
     """What visits with one other value each have shown of the arguments.
 
-    ``values`` are those of arguments with several values, ``problems`` say why others are left
+    ``values`` has the values of arguments with several, ``problems`` say why others are left
     out. ``compared`` are the constants in conditions, ``deciding`` the arguments of which a value
     changes which nodes there are.
     """
@@ -294,9 +294,9 @@ def _are_values(trees: Sequence[Any], texts: Sequence[str], *, is_switch: bool) 
 def unified_groups(
     trees: Mapping[int, Any], values: Sequence[Mapping[str, str]]
 ) -> list[tuple[Any, list[int]]]:
-    """Return as few trees as possible for those of several visits, each with its visits.
+    """Merge the trees of several visits into as few as possible; return each with its visits.
 
-    ``values`` are those of all visits.
+    ``values`` has the arguments of all visits.
     """
     switches = _switches(values)
 

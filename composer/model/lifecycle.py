@@ -1,6 +1,6 @@
 """The lifecycle of ROS 2 nodes: states and transitions, for everything that names them.
 
-See design.ros2.org/articles/node_lifecycle.html. Ids are those of lifecycle_msgs/msg/Transition.
+See design.ros2.org/articles/node_lifecycle.html. Ids are as in lifecycle_msgs/msg/Transition.
 """
 
 from __future__ import annotations

@@ -51,7 +51,8 @@ class Action:
 
     ``name`` is a topic, service or action with its full name, or the key of a node; of a parameter,
     ``node.parameter``. ``content`` is a message, a request, a goal, or the fields that ``corrupt``
-    sets; ``value`` that of a parameter, or a transition. ``options`` are the other keys.
+    sets; ``value`` is the value of a parameter, or the name of a transition. ``options`` are the
+    other keys.
     """
 
     verb: Verb
@@ -179,6 +180,6 @@ class Scenario:
 
     @property
     def all_expectations(self) -> tuple[Expectation, ...]:
-        """The expectations of all steps, and those of the whole run."""
+        """The expectations of all steps and of the whole run."""
         of_steps = [item for step in self.steps for item in step.expectations]
         return (*of_steps, *self.expectations)

@@ -186,7 +186,7 @@ class _Checks:
 
 
 def _ignores_above(root: Path) -> _Ignores:
-    """Return the patterns of git that apply to ``root``: those of its repository and of folders."""
+    """Return the patterns of git that apply to ``root``, from its repository and from folders."""
     folders = (root, *root.parents)
     repository = next((path for path in folders if (path / ".git").exists()), root)
     above = [path for path in root.parents if path.is_relative_to(repository)]

@@ -115,7 +115,7 @@ def _different_qos(
 
 
 def _compared_policies(port: Port, created: CreatedPort) -> list[str]:
-    """Return the policies to compare: those of the file, and overrides that the class ignores."""
+    """Return the policies to compare: from the file, and overrides that the class ignores."""
     policies = _POLICIES if port.qos.explicit else ()
     overridden, ignored = port.qos.overridden, port.qos.overridden - created.overridable
     return [

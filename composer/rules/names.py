@@ -85,7 +85,7 @@ def _is_invalid(namespace: str) -> bool:
 
 
 def _outer(namespace: str) -> Iterator[str]:
-    """Yield the namespaces around a namespace, those of a possible length."""
+    """Yield the namespaces around a namespace that have a possible length."""
     outer = namespace[: MAXIMUM_NAMESPACE_LENGTH + 1]
     while outer := outer.rpartition("/")[0]:
         yield outer

@@ -64,7 +64,7 @@ class HostOptions:
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
     by ``clock``; by default, from when the host is created. ``clock`` is the clock of the system.
     With ``seed``, which is 0 by default in virtual time, random numbers are the same in each run.
-    ``instruments`` are those of a test. ``recorder`` receives what is published.
+    ``instruments`` belong to a test. ``recorder`` receives what is published.
     """
 
     run_for_s: float | None = None

@@ -25,7 +25,7 @@ def time_of(entry: Entry) -> float:
 class Matcher:
     """Finds the events of one condition in the entries of a history, one by one.
 
-    ``keys`` are those of the nodes by their full names. Times in expressions count from
+    ``keys`` are the keys of the nodes by their full names. Times in expressions count from
     ``start_s``.
     """
 

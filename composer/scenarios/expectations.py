@@ -34,8 +34,8 @@ class Failure:
 class Record:
     """What a run has reported.
 
-    ``keys`` are those of the nodes by their full names; the scenario begins at ``start_s`` and ends
-    at ``end_s``, in the time of the entries.
+    ``keys`` are the keys of the nodes by their full names. The scenario begins at ``start_s`` and
+    ends at ``end_s``, in the time of the entries.
     """
 
     history: Sequence[Entry]

@@ -48,7 +48,7 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How scenarios are run. ``seed`` takes precedence over those of the scenarios.
+    """How scenarios are run. ``seed`` takes precedence over the seeds of the scenarios.
 
     With ``traced``, the results have a trace, by which runs can be compared.
     """

@@ -96,7 +96,7 @@ class ServicePort(RunningPort):
         self._pending: set[Future[Any]] = set()
 
     def call(self, request: Any) -> Future[Any]:
-        """Return the future of the response. It fails as that of a client of the process."""
+        """Return the future of the response. It fails as a call in the process does."""
         answer: Future[Any] = Future()
         self._pending.add(answer)
         answer.add_done_callback(self._pending.discard)

@@ -1,4 +1,4 @@
-"""The message classes of a test: those of ROS where they are installed, plain ones elsewhere.
+"""The message classes of a test: from ROS where it is installed, plain classes elsewhere.
 
 A plain class has the fields, defaults and constants of the definition: so a behavior that imports
 no message package needs no ROS.

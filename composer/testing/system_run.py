@@ -31,7 +31,7 @@ _DOMAINS = 100
 
 
 class SystemRun:
-    """One run. The clock of ``options`` is that of the system.
+    """One run, by the clock of ``options``.
 
     In virtual time, the thread that creates the clock calls all methods, and nothing in the system
     runs until it waits.

@@ -50,7 +50,7 @@ T = TypeVar("T")
 class SystemTest:
     """One run of a system. Use it as a context manager, once.
 
-    ``system`` is a file, or a model that is already loaded. ``arguments`` are those of the system,
+    ``system`` is a file, or a model that is already loaded. ``arguments`` are for the system,
     ``settings`` values of parameters by ``node.parameter``. With ``real_time``, the system has the
     time of the computer. Runs with the same ``seed`` have the same random numbers. For the replay
     of a bag, virtual time begins at ``start_ns`` (nanoseconds since 1970), and calls that are due

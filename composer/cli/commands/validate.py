@@ -113,9 +113,9 @@ def validate(
 ) -> None:
     """Check systems and node types.
 
-    Nothing is started, and ROS is not needed. All combinations of arguments are checked; those of
-    which NAME=VALUE is given, with this value only. Settings for a whole project can be set in its
-    composer.yaml: strict, select, ignore, severity, nodes and interfaces.
+    Nothing is started, and ROS is not needed. All combinations of arguments are checked. An
+    argument that is given as NAME=VALUE has only this value. Settings for a whole project can be
+    set in its composer.yaml: strict, select, ignore, severity, nodes and interfaces.
 
     The formats json, sarif and github always have all diagnostics.
 

@@ -217,13 +217,13 @@ def require_dashboard(command: str) -> None:
 
 
 def foxglove_line(url: str) -> str:
-    """Return the line with the address for Foxglove, given that of the page."""
+    """Return the line with the address for Foxglove; ``url`` is the address of the page."""
     address = url.replace("http://", "ws://", 1).replace("/?", "/foxglove?", 1)
     return f"Foxglove and Lichtblick: {address}"
 
 
 def address_lines(url: str) -> str:
-    """Return the lines with the addresses of a dashboard among those of other things."""
+    """Return the lines with the address of a dashboard, and its address for Foxglove."""
     return f"dashboard: {url}\n{foxglove_line(url)}"
 
 

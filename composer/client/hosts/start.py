@@ -135,7 +135,7 @@ async def compare_all(
     question: Question,
     here: Inventory,
 ) -> None:
-    """Compare the inventories of all hosts with that of this computer. Raises HostsDiffer."""
+    """Compare the inventories of all hosts with this computer's. Raises HostsDiffer."""
 
     async def compare(host: Host) -> list[tuple[str, str | None]]:
         there = await _ask(host, connections[host.name.value], question)

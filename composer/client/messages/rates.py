@@ -6,6 +6,7 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Mapping
+from contextlib import ExitStack
 from itertools import pairwise
 
 from composer.base.fast_dataclass import dataclass
@@ -57,6 +58,7 @@ class RateWindow:
 
 
 _DEPTH = 1000
+#: A message has its time already, so it may wait: polling costs less than a wake-up for each.
 _POLL_PERIOD_S = 0.002
 
 
@@ -70,14 +72,15 @@ def measure_rates(
     found = {topic: _sample(session, topic, types) for topic, types in topics.items()}
     sampled = {topic: samples for topic, samples in found.items() if samples is not None}
     rates = {topic: MessageRate() for topic in sampled}
-    end_s = time.monotonic() + duration_s
-    while time.monotonic() < end_s:
-        for topic, samples in sampled.items():
-            for sample in samples.take(_DEPTH):
-                rates[topic].add(sample.at_s)
-        time.sleep(_POLL_PERIOD_S)
-    for samples in sampled.values():
-        samples.close()
+    with ExitStack() as stack:
+        for samples in sampled.values():
+            stack.callback(samples.close)
+        end_s = time.monotonic() + duration_s
+        while time.monotonic() < end_s:
+            for topic, samples in sampled.items():
+                for sample in samples.take(_DEPTH):
+                    rates[topic].add(sample.at_s)
+            time.sleep(_POLL_PERIOD_S)
     known = {topic: rate.hertz for topic, rate in rates.items()}
     return {topic: hertz for topic, hertz in known.items() if hertz is not None}
 

@@ -72,7 +72,7 @@ def with_processes(report: SystemReport, others: Mapping[str, SystemReport]) -> 
 
 
 def of_whole_systems(reports: Mapping[str, AnyReport]) -> dict[str, AnyReport]:
-    """Return reports by their names, without those of processes whose nodes another one has."""
+    """Return reports by their names, without processes whose nodes another report has."""
     answered = [report for report in reports.values() if report is not None]
     others = {name for report in answered for name in report.processes.values()}
     return {name: report for name, report in reports.items() if name not in others}

@@ -124,7 +124,7 @@ class LocalRouter:
     ) -> None:
         """``shared`` has the channels with ports at both endpoints, and why they need DDS, if any.
 
-        ``instruments`` are those of a test; ``recorder`` receives what is published. rclpy must be
+        ``instruments`` belong to a test; ``recorder`` receives what is published. rclpy must be
         initialized.
         """
         self._instruments = instruments
@@ -175,7 +175,7 @@ class LocalRouter:
     ) -> Remove:
         """Pass local publications to ``receiver``; return a function that stops that.
 
-        ``leases`` are those of the publishers, if the runtime monitors them.
+        ``leases`` has the leases of the publishers, if the runtime monitors them.
         """
         topic = self._topics.get(channel_of(port))
         if topic is None:

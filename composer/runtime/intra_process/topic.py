@@ -40,7 +40,7 @@ class LocalSubscription:
         receiver: Receiver,
         leases: Leases | None = None,
     ) -> None:
-        """``leases`` are those of its publishers, if the runtime monitors them."""
+        """``leases`` has the leases of its publishers, if the runtime monitors them."""
         self.message_type = message_type
         self.profile = port.qos.profile
         self.isolated = port.isolation is Isolation.COPY

@@ -223,7 +223,7 @@ class ManagerQueries:
     def _node_parameters(self, query: ParametersQuery) -> ParametersAnswer | None:
         """Return descriptions and values of the parameters of the system's nodes and manager.
 
-        Other nodes are left out, and so are those of other processes, which have parameter services
+        Other nodes are left out, also nodes of other processes, which have parameter services
         of their own.
         """
         done = threading.Event()

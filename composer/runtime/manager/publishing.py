@@ -44,7 +44,7 @@ from composer.runtime.supervision.status import Status
 
 #: Most values are as in the message before, and making them again takes most of the time.
 _KEPT_VALUES = 8192
-#: The name of the node is that of its status.
+#: The name of a node is the name of its status.
 _NODE_FIELDS = tuple(
     field.name
     for field in fields(NodeReport)

@@ -40,7 +40,7 @@ class NodeOptions:
     ``system_is_up`` is false during the bring-up, when errors do not count as faults: some nodes
     wait for others.
     ``make_library_node(node)`` returns the rclpy node that the libraries of its behavior use.
-    ``instruments`` are those of a test.
+    ``instruments`` belong to a test.
     """
 
     router: LocalRouter
