@@ -57,6 +57,7 @@ class QuerySocket:
         self._answers = answers
         self._on_error = on_error
         self._answering = threading.Lock()
+        self._is_closed = False
         self._places = threading.Semaphore(_MAX_CONNECTIONS)
         self._path = socket_path(system)
         self._listener = None if self._path is None else _listen(self._path)
@@ -75,12 +76,12 @@ class QuerySocket:
             self._path.unlink()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)  # wakes up accept
+        self._is_closed = True
         end_s = COMPUTER.monotonic() + timeout_s
         self._thread.join(timeout_s)
         self._listener.close()
-        self._answering.acquire(
-            timeout=max(0.0, end_s - COMPUTER.monotonic())
-        )  # kept: no more answers
+        if self._answering.acquire(timeout=max(0.0, end_s - COMPUTER.monotonic())):
+            self._answering.release()
 
     def _serve(self, listener: socket.socket) -> None:
         while True:
@@ -112,7 +113,7 @@ class QuerySocket:
         except ProtocolError:  # of another version, whose command joins the graph itself
             return
         with self._answering:
-            if _has_given_up(connection):
+            if self._is_closed or _has_given_up(connection):
                 return  # an answer may take half a second, for which the next commands would wait
             answer = self._answers[type(query)](query)
         document = "" if answer is None else encode(answer)

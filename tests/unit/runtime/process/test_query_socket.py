@@ -183,6 +183,7 @@ def test_a_query_whose_command_has_given_up_is_skipped(
 
 def test_a_slow_command_blocks_only_itself(serve: Callable[..., list[Exception]]) -> None:
     """Neither one that sends slowly nor one that does not read its answer."""
+    before = set(threading.enumerate())
     topics = tuple((f"/topic_{number}", ()) for number in range(20_000))
     serve(lambda: {**VIEW, "topic": topics})
     with ExitStack() as stack:
@@ -194,9 +195,32 @@ def test_a_slow_command_blocks_only_itself(serve: Callable[..., list[Exception]]
         assert read_graph("/robot", LIMIT_S) is not None
     # Each ends within its limit, and with it its thread; a busy machine needs longer.
     end_s = time.monotonic() + 3 * LIMIT_S
-    while any(thread.name == "query" for thread in threading.enumerate()):
+    while any(thread.name == "query" for thread in set(threading.enumerate()) - before):
         assert time.monotonic() < end_s
         time.sleep(0.01)
+
+
+def test_a_query_that_arrives_after_closing_ends() -> None:
+    """Its thread was left for the rest of the process."""
+    before = set(threading.enumerate())
+    server = QuerySocket("/robot", {GraphQuery: lambda _: GraphAnswer(VIEW)}, lambda _: None)
+    end_s = time.monotonic() + LIMIT_S
+
+    def threads() -> list[str]:
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+        return [thread.name for thread in set(threading.enumerate()) - before]
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+        connection.settimeout(LIMIT_S)
+        connection.connect(str(socket_path("/robot")))
+        while "query" not in threads():
+            pass
+        server.close(LIMIT_S)
+        connection.sendall(f"{encode(GraphQuery())}\n".encode())
+        while "query" in threads():
+            pass
+        assert connection.recv(1) == b""
 
 
 def test_a_command_that_sends_slowly_is_left_in_the_end(
