@@ -16,7 +16,7 @@ Messages that a handler receives or has published are shared: do not change them
 
 ``from composer.typed import PlannerBehavior`` in place of :class:`Behavior` gives editors and type
 checkers the types of the ports and parameters of node type ``planner``, as written
-by ``compose export stubs``.
+by ``compose stubs``.
 
 Every handler may be ``async def``. Lifecycle handlers return nothing. An exception makes the
 transition fail: :class:`TransitionFailed` refuses it, and the node keeps its state; any other

@@ -1,6 +1,6 @@
 """Base classes of behaviors that know their node type, for editors and type checkers.
 
-``compose export stubs`` writes ``typings/composer/typed.pyi`` with a class for each node type: its
+``compose stubs`` writes ``typings/composer/typed.pyi`` with a class for each node type: its
 publishers, clients, parameters and handlers. While code runs, each is plain
 :class:`composer.behavior.Behavior`, so neither ROS nor the stubs are needed::
 

@@ -60,7 +60,7 @@ def ask() -> Answers:
         for part in ("nodes", "interfaces"):
             shutil.copytree(ROOT / part, folder / part)
         with chdir(folder):
-            compose(["export", "stubs"])
+            compose(["stubs"])
         server = LanguageServer(SERVER, folder, _SETTINGS)
         try:
             return _answers(server, folder / "nodes/shown.py")

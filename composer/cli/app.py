@@ -22,7 +22,8 @@ COMMANDS = {
         *("run", "down", "ps", "top", "logs", "record", "replay", "dashboard", "hosts"),
     ),
     "Commands for files": (
-        *("validate", "test", "config", "graph", "diff", "new", "import", "export", "bag"),
+        *("validate", "test", "config", "graph", "diff", "stubs"),
+        *("new", "import", "export", "bag"),
     ),
     "Commands for ROS 2": (
         "lifecycle",

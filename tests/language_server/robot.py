@@ -128,6 +128,6 @@ def make_project(folder: Path) -> Path:
     root = folder / "my_robot"
     (root / "nodes/tracker.yaml").write_text(_NODE_TYPE)
     (root / "nodes/tracker.py").write_text(RIGHT)
-    done = compose("export", "stubs", str(root))
+    done = compose("stubs", str(root))
     assert done.code == 0, done.err
     return root

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.commands.export_images import Force, add_image_commands, exported_system
-from composer.cli.commands.export_stubs import add_stubs_command
 from composer.cli.support.errors import CommandError
 from composer.cli.support.name_values import Arguments, declared_arguments
 from composer.cli.support.new_files import write_and_say, write_output
@@ -140,9 +139,6 @@ def export_sros2(
 
     declared = exported_system(system, arguments, namespace=namespace).system
     write_output(policy(declared), output, replace=force)
-
-
-add_stubs_command(export_app)
 
 
 class SchemaName(StrEnum):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.commands.export_stubs import update_typings
+from composer.cli.commands.stubs import update_typings
 from composer.cli.support.errors import CONFIG, UsageError
 from composer.cli.support.host_run import Time, run_clock, run_host
 from composer.cli.support.name_values import Arguments, print_arguments

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.base.fast_dataclass import dataclass
-from composer.cli.commands.export_stubs import update_typings
+from composer.cli.commands.stubs import update_typings
 from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.name_values import complete_system_or_argument, split_arguments

@@ -1,4 +1,4 @@
-"""``compose export stubs``: what it writes, replaces, removes and keeps."""
+"""``compose stubs``: what it writes, replaces, removes and keeps."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def classes(project: Path) -> list[str]:
 
 def test_stubs_of_the_project_are_written_and_are_up_to_date(project: Path) -> None:
     (project / "systems/extra.yaml").write_text(SYSTEM)
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert (done.code, done.out) == (0, "")
     assert "'typings': " in done.err
     assert " files written" in done.err
@@ -59,8 +59,8 @@ def test_stubs_of_the_project_are_written_and_are_up_to_date(project: Path) -> N
     for name, text in files.items():
         assert text.startswith(HEADER.encode()), name
         ast.parse(text)
-    assert compose("export", "stubs", "--check").code == 0
-    assert compose("export", "stubs").err == "'typings' is up to date\n"
+    assert compose("stubs", "--check").code == 0
+    assert compose("stubs").err == "'typings' is up to date\n"
 
 
 def test_a_behavior_runs_and_is_tested_without_the_stubs(project: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_behavior_runs_and_is_tested_without_the_stubs(project: Path) -> None:
 
 def test_only_the_given_systems_add_classes(project: Path) -> None:
     (project / "systems/extra.yaml").write_text(SYSTEM)
-    done = compose("export", "stubs", "systems/my_robot.yaml", "-o", "elsewhere")
+    done = compose("stubs", "systems/my_robot.yaml", "-o", "elsewhere")
     assert done.code == 0, done.err
     assert not (project / "typings").exists()
     (project / "elsewhere").rename(project / "typings")
@@ -86,7 +86,7 @@ def test_the_output_depends_on_the_files_only(project: Path) -> None:
     (project / "systems/extra.yaml").write_text(SYSTEM)
     written = []
     for seed in ("1", "2"):
-        command = [sys.executable, "-P", "-m", "composer", "export", "stubs", "-o", seed]
+        command = [sys.executable, "-P", "-m", "composer", "stubs", "-o", seed]
         environment = {**os.environ, "PYTHONHASHSEED": seed}
         subprocess.run(command, check=True, env=environment, capture_output=True)
         written.append(contents(project / seed))
@@ -94,21 +94,21 @@ def test_the_output_depends_on_the_files_only(project: Path) -> None:
 
 
 def test_check_names_what_would_change(project: Path) -> None:
-    assert compose("export", "stubs").code == 0
+    assert compose("stubs").code == 0
     before = contents(project / "typings")
     text = (project / "nodes/counter.yaml").read_text()
     (project / "nodes/counter.yaml").write_text(text.replace("rate_hz:", "rate:", 1))
-    done = compose("export", "stubs", "--check")
+    done = compose("stubs", "--check")
     assert (done.code, done.out) == (1, f"{TYPED}\n")
     assert "'typings' is out of date" in done.err
     assert contents(project / "typings") == before
-    done = compose("export", "stubs", "-o", "other", "--check")
+    done = compose("stubs", "-o", "other", "--check")
     assert done.code == 1
     assert not (project / "other").exists()
 
 
 def test_only_files_of_the_command_are_replaced_and_removed(project: Path) -> None:
-    assert compose("export", "stubs").code == 0
+    assert compose("stubs").code == 0
     folder = project / "typings"
     (folder / "mine.pyi").write_text("X: int\n")
     (folder / "std_msgs/extra.pyi").write_text("Y: int\n")
@@ -116,7 +116,7 @@ def test_only_files_of_the_command_are_replaced_and_removed(project: Path) -> No
     (folder / "old_msgs/msg.pyi").write_text(HEADER)
     (folder / "rclpy/node.pyi").write_text("class Node: ...\n")
     (folder / "std_msgs/msg.pyi").write_text(HEADER + "changed\n")
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert "note: 'typings/rclpy/node.pyi' is not a file of this command: it is kept" in done.err
     assert "'typings': 1 file written, 1 removed" in done.err
     files = contents(folder)
@@ -125,7 +125,7 @@ def test_only_files_of_the_command_are_replaced_and_removed(project: Path) -> No
     assert files["rclpy/node.pyi"] == b"class Node: ...\n"
     assert not (folder / "old_msgs").exists()
     assert b"changed" not in files["std_msgs/msg.pyi"]
-    assert compose("export", "stubs", "--check").code == 0
+    assert compose("stubs", "--check").code == 0
 
 
 def test_symbolic_links_are_not_followed(project: Path, tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_symbolic_links_are_not_followed(project: Path, tmp_path: Path) -> None:
     (folder / "std_msgs").symlink_to(outside / "std_msgs")
     (folder / "rclpy/node.pyi").symlink_to(outside / "file.pyi")
     (folder / "stale.pyi").symlink_to(outside / "file.pyi")
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert done.code == 0, done.err
     assert "'typings/std_msgs/msg.pyi' is not a file of this command: it is kept" in done.err
     assert contents(outside) == {
@@ -155,7 +155,7 @@ def test_a_node_type_with_errors_is_written_as_far_as_it_is_known(project: Path)
         "parameters:\n  gain: {type: dubble}\n  rate.max: {type: double}\nunknown: 1\n"
     )
     (project / "nodes/broken.yaml").write_text("node: [\n")
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert done.code == 0
     assert "note: 'nodes/broken.yaml' cannot be read: see 'compose validate'" in done.err
     text = (project / TYPED).read_text()
@@ -167,7 +167,7 @@ def test_a_node_type_with_errors_is_written_as_far_as_it_is_known(project: Path)
 
 def test_of_two_nodes_with_one_class_name_the_first_is_written(project: Path) -> None:
     (project / "systems/extra.yaml").write_text(SYSTEM.replace("filter_node:\n", "counter:\n"))
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert (
         "note: 'counter' of 'systems/extra.yaml' differs from 'counter' of 'nodes/counter.yaml', "
         "which has the class of that name" in done.err
@@ -183,7 +183,7 @@ def test_validate_and_run_update_the_folder(project: Path, command: tuple[str, .
     )
     assert "typings" not in compose(*command).err
     assert not (project / "typings").exists()
-    assert compose("export", "stubs").code == 0
+    assert compose("stubs").code == 0
     assert "typings" not in compose(*command).err
     text = (project / "nodes/counter.yaml").read_text()
     (project / "nodes/counter.yaml").write_text(
@@ -193,11 +193,11 @@ def test_validate_and_run_update_the_folder(project: Path, command: tuple[str, .
     assert "'typings' is up to date again: 1 file written" in done.err
     assert "def more(self)" in (project / TYPED).read_text()
     assert classes(project) == ["CounterBehavior", "FilterNodeBehavior"]
-    assert compose("export", "stubs", "--check").code == 0
+    assert compose("stubs", "--check").code == 0
 
 
 def test_the_folder_is_not_updated_while_a_node_type_cannot_be_read(project: Path) -> None:
-    assert compose("export", "stubs").code == 0
+    assert compose("stubs").code == 0
     (project / "nodes/counter.yaml").write_text("node: [\n")
     done = compose("validate", ".")
     assert done.code == 1
@@ -218,7 +218,7 @@ def test_a_folder_that_cannot_be_written_is_one_note(
     def refuse(**_: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    assert compose("export", "stubs").code == 0
+    assert compose("stubs").code == 0
     (project / TYPED).write_text(HEADER)
     monkeypatch.setattr(tempfile, "mkstemp", refuse)
     done = compose("validate", ".")
@@ -227,28 +227,28 @@ def test_a_folder_that_cannot_be_written_is_one_note(
         f"note: 'typings' was not updated: cannot write '{project / TYPED}': Read-only file system"
     )
     assert note in done.err.splitlines()
-    assert (compose("export", "stubs").code, (project / TYPED).read_text()) == (1, HEADER)
+    assert (compose("stubs").code, (project / TYPED).read_text()) == (1, HEADER)
 
 
 def test_a_file_in_the_place_of_the_folder_is_an_error(project: Path) -> None:
     (project / "typings").write_text("")
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert done.code == 1
     assert "typings" in done.err
     assert "internal error" not in done.err
 
 
 def test_paths_must_exist_and_be_of_one_project(project: Path, tmp_path: Path) -> None:
-    assert compose("export", "stubs", "nowhere").code == 2
-    assert compose("export", "stubs", "a" * 5000).code == 2
-    assert compose("export", "stubs", "systems", str(tmp_path)).code == 2
+    assert compose("stubs", "nowhere").code == 2
+    assert compose("stubs", "a" * 5000).code == 2
+    assert compose("stubs", "systems", str(tmp_path)).code == 2
 
 
 def test_a_folder_without_a_project_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = compose("export", "stubs")
+    done = compose("stubs")
     assert done.code == 2
     assert "there is no system and no node type" in done.err
     assert not (tmp_path / "typings").exists()

@@ -1,6 +1,6 @@
 # Type stubs of rclpy 7.1 (ROS 2 Jazzy), which itself is only partly typed and does not say which
 # message type a publisher, a client or an action has. `compose validate` gives these to the type
-# checker, so that it can check classes that use rclpy where ROS is not installed; `compose export stubs`
+# checker, so that it can check classes that use rclpy where ROS is not installed; `compose stubs`
 # writes them for editors. A test (tests/ros/hosting/test_rclpy_stubs.py) compares them with rclpy.
 #
 # - Publishers, clients, ... are generic over the generated classes of messages; see `_ros`.

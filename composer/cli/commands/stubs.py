@@ -1,4 +1,4 @@
-"""``compose export stubs``: types of messages, ports and parameters, for editors."""
+"""``compose stubs``: types of messages, ports and parameters, for editors."""
 
 from __future__ import annotations
 
@@ -23,15 +23,12 @@ if TYPE_CHECKING:
     from composer.python_code.stubs.folder import FolderChanges
 
 
-def add_stubs_command(app: typer.Typer) -> None:
-    """Add the command to ``compose export``."""
-    epilog = examples(
-        "compose export stubs                    write 'typings' in the root of the project",
-        "compose export stubs --check            fail if it is out of date, for CI",
-        "compose export stubs -o build/typings   write another folder",
-        "compose export stubs ../other_robot     write the stubs of another project",
-    )
-    app.command("stubs", epilog=epilog)(stubs)
+EPILOG = examples(
+    "compose stubs                    write 'typings' in the root of the project",
+    "compose stubs --check            fail if it is out of date, for CI",
+    "compose stubs -o build/typings   write another folder",
+    "compose stubs ../other_robot     write the stubs of another project",
+)
 
 
 def stubs(
@@ -96,7 +93,7 @@ def stubs(
     elif check:
         write(lines(f"{shown}/{name}" for name in sorted(changed)))
         option = "" if output is None else f" -o {shown}"
-        raise CommandError(f"'{shown}' is out of date", hint=f"run 'compose export stubs{option}'")
+        raise CommandError(f"'{shown}' is out of date", hint=f"run 'compose stubs{option}'")
     else:
         _write_changes(folder, changes)
         say(f"'{shown}': {_counted(changes)}")
