@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from composer.project import Project
 
 EPILOG = examples(
+    "compose validate                                all files of the current folder",
     "compose validate systems nodes",
     "compose validate systems/pipeline.yaml --strict",
     "compose validate mapping.yaml lidar=ouster      with this value of an argument only",
@@ -62,9 +63,9 @@ def validate(
     paths: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="PATH... [NAME=VALUE]...",
+            metavar="[PATH]... [NAME=VALUE]...",
             help="Files, folders to search for systems and node types, or - for stdin, and"
-            " arguments of the systems.",
+            " arguments of the systems. Default: the current folder.",
             autocompletion=complete_system_or_argument,
         ),
     ] = None,
@@ -124,10 +125,8 @@ def validate(
     if explain is not None:
         _explain(explain)
         return
-    if not paths:
-        raise UsageError("specify files or folders", hint="for example: compose validate systems")
-    names, arguments = split_arguments(paths)
-    checked = _check([Path(name) for name in names], stdin_name, arguments)
+    names, arguments = split_arguments(paths or [])
+    checked = _check([Path(name) for name in names or ["."]], stdin_name, arguments)
     diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
     _print(diagnostics, output_format or _default_format(), max_diagnostics)
     suffix = "" if diagnostics else ": no problems found"
@@ -135,7 +134,7 @@ def validate(
     for project in checked.projects:
         update_typings(project)
     if checked.foreign:
-        say(f"skipped, without 'system:' or 'node:': {_listed(checked.foreign)}")
+        say(f"skipped, without 'system:', 'node:' or 'scenario:': {_listed(checked.foreign)}")
     is_strict = checked.strict if strict is None else strict
     if any(_is_error(item, is_strict) for item in diagnostics):
         raise typer.Exit(FAILED)

@@ -51,17 +51,21 @@ def test_a_diagnostic_has_a_location_a_caret_and_a_hint(folder: Path) -> None:
     assert done.err == "2 files checked\n"
 
 
-def test_a_folder_is_searched_for_systems_and_node_types_only(folder: Path) -> None:
+@pytest.mark.parametrize("paths", [[], ["."]])
+def test_a_folder_is_searched_for_systems_and_node_types_only(
+    folder: Path, paths: list[str]
+) -> None:
     Path("nodes").mkdir()
     Path("nodes/camera.yaml").write_text("node: camera\n")
     Path("fine.yaml").write_text("system: fine\nnodes:\n  one: {type: camera}\n")
     Path(".github").mkdir()
     Path(".github/workflow.yaml").write_text("on: push\n")
     Path("compose.yaml").write_text("services: {}\n")
-    done = compose("validate", ".")
+    done = compose("validate", *paths)
     assert done.code == 0
     assert done.err == (
-        "2 files checked: no problems found\nskipped, without 'system:' or 'node:': compose.yaml\n"
+        "2 files checked: no problems found\n"
+        "skipped, without 'system:', 'node:' or 'scenario:': compose.yaml\n"
     )
 
 

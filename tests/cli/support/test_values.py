@@ -59,7 +59,6 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
     [
         ("topic echo /x --field transforms[x].header", "is not a path of fields and indices"),
         ("topic echo /x --filter 'message.data >'", "--filter: "),
-        ("validate", "specify files or folders"),
         ("topic pub /x std_msgs/msg/String {} --stdin", "not both"),
         ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
         ("lifecycle set planner", "specify a transition of 'planner'"),
