@@ -221,11 +221,11 @@ def parameter_settings(
         response = responses[service]
         if response is not None and len(response.descriptors) == len(listed):
             descriptions = map(description, listed, response.descriptors)
-            found[node] = {item.name: settings_of(item) for item in descriptions}
+            found[node] = {item.name: _settings_of(item) for item in descriptions}
     return found
 
 
-def settings_of(item: ParameterDescription) -> dict[str, Plain]:
+def _settings_of(item: ParameterDescription) -> dict[str, Plain]:
     """Return the declaration of a parameter as in YAML, without its value."""
     settings: dict[str, Plain] = {
         "minimum": item.minimum,

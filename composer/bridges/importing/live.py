@@ -1,16 +1,15 @@
-"""Describe nodes of the ROS graph, and a class from the node that its constructor has made."""
+"""Describe the nodes of the ROS graph."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
-from typing import Any
 
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
 from composer.model.names import parameter_name_problem, split_node_name, topic_name_problem
-from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
+from composer.model.qos import PRESETS, QosProfile
 from composer.model.resolve.parameters import rclpy_type
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
 
@@ -62,10 +61,6 @@ def describe_graph(
         "The ROS graph does not show the depth of queues.",
     )
     return FoundSystem(name, tuple(found), comments, tuple(left_out))
-
-
-def _is_of_every_node(parameter: str) -> bool:
-    return parameter.startswith(_OF_EVERY_NODE)
 
 
 def _is_selected(node: ObservedNode, selected: tuple[str, ...]) -> bool:
@@ -137,7 +132,7 @@ def _parameters(
         left_out.append(f"parameters of {node.full_name}: it did not respond")
         return
     for name, value in node.parameters.items():
-        if _is_of_every_node(name) or (name == USE_SIM_TIME and not value):
+        if name.startswith(_OF_EVERY_NODE) or (name == USE_SIM_TIME and not value):
             continue
         described = dict(settings.get(name, {}))
         kind = described.pop("type", None) or rclpy_type(value)
@@ -167,57 +162,3 @@ def _node_comments(node: ObservedNode) -> tuple[str, ...]:
             f"Loaded by {node.container}; with 'component' and 'container', a system loads it."
         )
     return tuple(comments)
-
-
-def describe_constructed(text: str, found: Mapping[str, Any]) -> FoundNode:
-    """Return the node of a class ``module:Class`` from its description as JSON."""
-    name, namespace = found["name"], found["namespace"]
-    own = f"{namespace}/{name}"
-    parameters = tuple(
-        FoundParameter(key, str(settings["type"]), settings["value"], _without(settings))
-        for key, settings in found["parameters"].items()
-        if not _is_of_every_node(key) and key != USE_SIM_TIME and settings.get("value") is not None
-    )
-    return FoundNode(
-        name=name,
-        keys={"class": text},
-        ports=tuple(_constructed_ports(found["ports"], own, namespace)),
-        parameters=parameters,
-        comments=(f"From the constructor of {text}, by 'compose import class --construct'.",),
-    )
-
-
-def _without(settings: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in settings.items() if key not in ("type", "value")}
-
-
-def _constructed_ports(
-    found: Iterable[Mapping[str, Any]], own: str, namespace: str
-) -> Iterable[FoundPort]:
-    """Yield the ports, with names that are below the namespace written relative to it."""
-    seen: set[tuple[PortKind, str]] = set()
-    for item in found:
-        kind, name = PortKind(item["kind"]), item["name"]
-        is_known = (kind, name) in seen or ObservedEndpoint(kind, name, item["type"]).is_for_tools
-        if not is_known:
-            seen.add((kind, name))
-            qos = _profile(item["qos"]) if kind.channel is ChannelKind.TOPIC else None
-            private, relative = name.removeprefix(own), name.removeprefix(f"{namespace}/")
-            shown = f"~{private}" if name.startswith(f"{own}/") else relative
-            yield FoundPort(kind, shown, item["type"], qos)
-
-
-def _profile(item: Mapping[str, Any]) -> QosProfile:
-    """Return a profile; what the middleware decides has the default of rclpy."""
-    kinds = {
-        "history": History,
-        "reliability": Reliability,
-        "durability": Durability,
-        "liveliness": Liveliness,
-    }
-    values: dict[str, Any] = {
-        name: kinds[name](value) if name in kinds else value
-        for name, value in item.items()
-        if name not in kinds or value in {member.value for member in kinds[name]}
-    }
-    return QosProfile(**values)

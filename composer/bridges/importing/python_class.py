@@ -100,7 +100,7 @@ def _check(source: BehaviorSource, text: str, folder: Path) -> None:
     if not source.classes:
         raise ClassNotFound(
             f"the source of '{text}' cannot be read: it is compiled or made at run time",
-            "use --construct to run its constructor",
+            "run it as the 'class' of a node, and use 'compose import live'",
         )
     if source.complete and not source.is_rclpy_node:
         raise ClassNotFound(

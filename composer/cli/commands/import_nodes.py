@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -20,12 +20,9 @@ from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import NewFile, Timeout, command_group, examples
-from composer.cli.support.ros import require_launch, require_ros, ros_session
+from composer.cli.support.ros import require_launch, ros_session
 from composer.cli.support.terminal import lines, say
 from composer.model.names import node_name_problem
-
-if TYPE_CHECKING:
-    from composer.bridges.importing.found import FoundNode
 
 #: The name of an exception of the composer at the end of a traceback; its text says it all.
 _OWN_EXCEPTION = re.compile(r"^composer\.[\w.]+: ")
@@ -113,7 +110,6 @@ def live(
     "class",
     epilog=examples(
         "compose import class demo_nodes_py.topics.talker:Talker -o nodes/talker.yaml",
-        "compose import class driver:Driver --construct        run its constructor once",
     ),
 )
 def import_class(
@@ -124,21 +120,12 @@ def import_class(
         ),
     ],
     *,
-    construct: Annotated[
-        bool,
-        typer.Option(
-            "--construct",
-            help="Construct the class once, in a process of its own; do not read its source.",
-        ),
-    ] = False,
     output: NewFile = None,
-    timeout: Timeout = 30.0,
 ) -> None:
     """Describe an rclpy node class as a node type.
 
     The source is read, and no code of it runs: the topics, services, actions and parameters that it
-    creates with literal names are declared. What only running would show is listed. With
-    --construct, the constructor runs, and all that it creates is declared.
+    creates with literal names are declared. What only running would show is listed.
 
     The module is searched for in this folder, among the node types of the project, and on
     Python's module search path.
@@ -148,14 +135,10 @@ def import_class(
 
     if output is not None:
         _node_name(output.stem)
-    unknown: tuple[str, ...] = ()
-    if construct:
-        found = _constructed(reference, timeout)
-    else:
-        try:
-            found, unknown = describe_class(reference, Path.cwd())
-        except ClassNotFound as error:
-            raise CommandError(str(error), hint=error.hint) from error
+    try:
+        found, unknown = describe_class(reference, Path.cwd())
+    except ClassNotFound as error:
+        raise CommandError(str(error), hint=error.hint) from error
     type_name = found.name if output is None else output.stem
     write_output(write_node_type(type_name, found), output)
     if unknown:
@@ -177,17 +160,6 @@ def _is_found(reference: str, output: Path) -> bool:
     span = Span(SourceFile("", reference), 1, 1)
     located = Located(reference, span)
     return find_behavior(BehaviorReference(located, output.absolute().parent)).module_found
-
-
-def _constructed(reference: str, timeout_s: float) -> FoundNode:
-    """Construct a class in a process of its own. Raises CommandError."""
-    require_ros("compose import class --construct")
-    from composer.bridges.importing.live import describe_constructed
-
-    module = "composer.client.constructed_class"
-    what = f"constructing '{reference}'"
-    text = _run_user_process(what, module, [reference, str(Path.cwd())], timeout_s)
-    return describe_constructed(reference, json.loads(text))
 
 
 @import_app.command(
@@ -267,7 +239,7 @@ def _report_left_out(left_out: tuple[str, ...]) -> None:
 def _run_user_process(what: str, module: str, arguments: Sequence[str], timeout_s: float) -> str:
     """Run a module of the composer; return what it writes to the file that is its first argument.
 
-    ``what`` describes it, as in "constructing 'driver:Driver'". The user reads before it runs that
+    ``what`` describes it, as in "evaluating 'robot.launch.py'". The user reads before it runs that
     it will. The time limit begins again when the process touches the file ``progress`` next to its
     report. Raises CommandError with the last line of its output if it fails or takes too long.
     """
