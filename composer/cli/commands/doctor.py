@@ -7,19 +7,12 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from importlib.util import find_spec
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.errors import FAILED, CommandError, UsageError
-from composer.cli.support.hosts import (
-    check_workspaces,
-    load_for_hosts,
-    reported_problems,
-    require_hosts,
-)
+from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.results import as_json
@@ -29,13 +22,11 @@ from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.doctor import CheckResult, Level
-    from composer.loading.reported import LoadResult
     from composer.model import System
 
 EPILOG = examples(
     "compose doctor",
     "compose doctor robot.yaml   check the discovery of a system as well",
-    "compose doctor robot.yaml --hosts   from each computer of the system",
     "compose doctor --json",
     "compose doctor --strict     treat warnings as errors, for CI",
 )
@@ -54,10 +45,6 @@ def doctor(
     ] = None,
     arguments: Arguments = None,
     *,
-    hosts: Annotated[
-        bool,
-        typer.Option("--hosts", help="Check the other computers of the system as well, by ssh."),
-    ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Treat warnings as errors.")] = False,
     json: Json = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
@@ -75,20 +62,13 @@ def doctor(
     """
     from composer.client.doctor import Level
 
-    if hosts:
-        if system is None:
-            raise UsageError("--hosts needs a system", hint="compose doctor robot.yaml --hosts")
-        require_hosts("compose doctor --hosts")
     results = []
     declared = (
         None
         if system is None
         else runnable_system(system, arguments, warnings=ShowWarnings.NONE).system
     )
-    # Loaded before the checks: they take seconds, and their results would be lost.
-    loaded = load_for_hosts(system, arguments) if hosts and system is not None else None
-    elsewhere = () if loaded is None else _check_hosts(loaded, timeout)
-    for result in chain(_check_all(declared, timeout), elsewhere):
+    for result in _check_all(declared, timeout):
         results.append(result)
         if not json:
             write(_text(result))
@@ -98,19 +78,6 @@ def doctor(
     say(f"{_counted(errors, 'error')}, {_counted(warnings, 'warning')}")
     if errors or (strict and warnings):
         raise typer.Exit(FAILED)
-
-
-def _check_hosts(loaded: tuple[LoadResult, System, Path], timeout: float) -> Iterator[CheckResult]:
-    """Check the other computers of a system, while its discovery server runs."""
-    result, system, relative = loaded
-    from composer.client.doctor.hosts import check_hosts
-    from composer.client.hosts.start import remote_processes
-
-    used = {item.host.name.value: item.host for item in remote_processes(system)}
-    others = list(used.values())
-    check_workspaces(others)
-    with reported_problems(), _started_server(system):
-        yield from check_hosts(others, result.project.root, relative, timeout)
 
 
 def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:

@@ -47,8 +47,7 @@ _POLL_S = 0.02
 hosts_app = command_group(
     """Run a system on several computers.
 
-    The system declares its 'hosts', and which process runs on which host. 'compose doctor --hosts'
-    checks the other computers.
+    The system declares its 'hosts', and which process runs on which host.
     """
 )
 

@@ -92,10 +92,3 @@ def test_problems_are_counted_and_have_remedies(monkeypatch: pytest.MonkeyPatch)
     assert compose("doctor").err.endswith(", 1 warning\n")
     found = json.loads(compose("doctor", "--json").out)
     assert all(item["remedy"] for item in found if item["level"] != "ok")
-
-
-def test_hosts_are_looked_up_before_the_checks() -> None:
-    pytest.importorskip("asyncssh", reason="asyncssh is not installed")
-    done = compose("doctor", "minimal", "--hosts")
-    assert (done.code, done.out) == (1, "")
-    assert "has no 'hosts'" in done.err

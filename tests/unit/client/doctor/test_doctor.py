@@ -17,7 +17,7 @@ from composer.client.doctor.installation import (
 )
 from composer.client.doctor.network import check_declared_discovery, check_network
 from composer.interfaces import Interfaces
-from composer.model import Discovery, DiscoveryKind, Host
+from composer.model import Discovery, DiscoveryKind
 
 
 def problems(results: list[CheckResult]) -> list[tuple[str, str]]:
@@ -186,18 +186,3 @@ def test_an_environment_that_overrides_the_discovery_is_reported() -> None:
     (result,) = check_declared_discovery(declared("peers", peers="10.0.0.1"), environment)
     assert result.level is Level.WARNING
     assert "ROS_DISCOVERY_SERVER is set to '10.9.9.9:1'" in result.message
-
-
-def test_the_results_of_a_host_name_it() -> None:
-    hosts = pytest.importorskip("composer.client.doctor.hosts", reason="asyncssh is not installed")
-    text = '[{"area": "qos", "level": "note", "message": "is odd", "remedy": "change it"}]'
-    span = Span(SourceFile("robot.yaml"), 1, 1)
-    host = Host(Located("jetson", span), span, Located("10.0.0.2", span))
-    (result,) = hosts.read_results(host, text)
-    assert (result.level, result.message, result.remedy) == (
-        Level.NOTE,
-        "jetson: is odd",
-        "change it",
-    )
-    with pytest.raises(ValueError, match="not a valid Level"):
-        hosts.read_results(host, text.replace("note", "odd"))
