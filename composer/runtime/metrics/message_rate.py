@@ -101,6 +101,7 @@ class CountedRate:
             self._rate.last_s = at_s
         elif count > self._count:
             self._rate.add(at_s, missed=count - self._count - 1)
+            self._rate.forget_before(at_s - _WINDOW_S)
         self._count = count
 
     def current_hz(self, now_s: float) -> float | None:

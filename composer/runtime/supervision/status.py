@@ -28,7 +28,7 @@ class _NodeRates:
         self._clock = clock
         self._sent, self._received = CountedRate(), CountedRate()
         self._at_s = self._busy_s = 0.0
-        self.current: dict[str, float | None] = {}
+        self._busy: float | None = None
 
     def read(self, counters: Statistics) -> None:
         """Read the counters."""
@@ -41,11 +41,15 @@ class _NodeRates:
 
         self._sent.read(counters.sent, time_of(counters.last_sent_s))
         self._received.read(counters.received, time_of(counters.last_received_s))
-        passed_s = self._at_s - before_s
-        self.current = {
+        if 0.0 < before_s < self._at_s:
+            self._busy = max(0.0, self._busy_s - before_busy_s) / (self._at_s - before_s)
+
+    def current(self) -> dict[str, float | None]:
+        """Return the rates at the last reading; nobody asks for most of them."""
+        return {
             "sent_hz": self._sent.current_hz(self._at_s),
             "received_hz": self._received.current_hz(self._at_s),
-            "busy": max(0.0, self._busy_s - before_busy_s) / passed_s if before_s else None,
+            "busy": self._busy,
         }
 
 
@@ -190,7 +194,7 @@ class Status:
         return replace(node, **reported) if reported else node
 
     def _counted(self, name: str, node: NodeReport, counters: Statistics) -> NodeReport:
-        rates = self._rates[name].current if name in self._rates else {}
+        rates = self._rates[name].current() if name in self._rates else {}
         return replace(
             node,
             **rates,  # type: ignore[arg-type]  # of fields that are floats
