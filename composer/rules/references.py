@@ -49,8 +49,10 @@ def absence(system: System, section: str, name: str, noun: str) -> Absence:
         return Absence(f"which is not {noun} of this system")
     text = f"which its '{left_out.key}' leaves out"
     labels = (Label(left_out.span, "left out here"),)
-    condition = f"{left_out.key}: {left_out.condition}"
-    hint = f"write '{condition}' here too, or remove the condition" if left_out.condition else None
+    condition = f"'{left_out.key}: {left_out.condition}'"
+    if "'" in left_out.condition:
+        condition = f'{left_out.key}: "{left_out.condition}"'
+    hint = f"write {condition} here too, or remove the condition" if left_out.condition else None
     return Absence(text, labels, hint)
 
 
@@ -108,11 +110,13 @@ def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
         if is_unresolved(name.value) or context.system.node(name.value) is not None:
             continue
         verb = "has the container" if dependency.is_container else "depends on"
+        why = absence(context.system, "nodes", name.value, "a node")
         yield Diagnostic(
             UNKNOWN_NODE,
-            f"node '{node.name}' {verb} '{name}', which is not a node of this system",
+            f"node '{node.name}' {verb} '{name}', {why.text}",
             name.span,
-            hint=suggestion(name.value, context.once(_node_names)),
+            why.labels,
+            why.hint or suggestion(name.value, context.once(_node_names)),
             subjects=unknown_subjects("node", name.value, context.once(_node_names)),
         )
 

@@ -183,6 +183,12 @@ def test_arguments_choose_the_nodes(tmp_path: Path) -> None:
             "undeclared-name: node 'simulator' runs on 'fast', which its 'unless' leaves"
             " out (with simulation=true)",
         ]),
+        # a container that is only there with some arguments
+        ("nodes:\n", "nodes:\n  box: {if: simulation, external: true}\n"
+         "  part: {component: {package: a, plugin: B}, container: box}\n", [
+            "not-installed: package 'a' is not installed",
+            "unknown-node: node 'part' has the container 'box', which its 'if' leaves out",
+        ]),
     ],
 )  # fmt: skip
 def test_mistakes_name_the_arguments_with_which_they_happen(
@@ -222,6 +228,8 @@ connections:
         ("image, if: cameras,", "image,", ["unknown-node"]),
         (", arguments: {topic: a}", "", ["missing-variable"]),
         ("front_more]", "front_mor]", ["unknown-node"]),
+        # without the file, nobody knows which nodes it has
+        ("file: part.yaml", "file: parts.yaml", ["invalid-include"]),
     ],
 )
 def test_an_include_may_be_left_out(old: str, new: str, rules: list[str], tmp_path: Path) -> None:

@@ -17,12 +17,13 @@ from composer.language.rules import CYCLE, EMPTY_COLLECTION, MISSING_VARIABLE
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import SYSTEM, with_intended_sections
 from composer.language.tree import Entry, LeftOut, Mapping, Tree, plain
-from composer.language.tree_values import entries, items
+from composer.language.tree_values import entries, items, plain_text
 from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
 from composer.model.assembly.limits import IncludeLimits, exceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
 from composer.model.assembly.namespacing import PREFIXED, add_namespace
 from composer.model.assembly.references import (
+    WILDCARD,
     expand_references,
     without_empty_processes,
     without_left_out,
@@ -145,15 +146,21 @@ class IncludeResolver:
             self._stack.pop()
 
     def _nodes_of(self, absent: LeftOut, item: Tree, includer: SystemFile) -> Iterator[LeftOut]:
-        """Yield the nodes of an include that is left out. Its errors are not reported."""
+        """Yield the nodes of an include that is left out. Its errors are not reported.
+
+        If its file is unavailable, any name with its prefix may be one of its nodes.
+        """
         diagnostics, is_partial = len(self.diagnostics), self.is_partial
         part = self._part(item, includer)
         del self.diagnostics[diagnostics:]
         self.is_partial = is_partial
-        if part is not None:
-            for node in entries(part.tree.get("nodes")):
-                yield replace(absent, section="nodes", name=node.name, include=None)
-            yield from part.left_out
+        if part is None:
+            prefix = plain_text(item.get("prefix")) if isinstance(item, Mapping) else ""
+            yield replace(absent, section="nodes", name=f"{prefix}{WILDCARD}", include=None)
+            return
+        for node in entries(part.tree.get("nodes")):
+            yield replace(absent, section="nodes", name=node.name, include=None)
+        yield from part.left_out
 
     def _merge_included(self, file: SystemFile, include: Include) -> Mapping:
         span = include.file.span

@@ -17,9 +17,9 @@ WILDCARD = "*"
 #: Where a system names nodes, and where it names ports of nodes.
 _NODES = (
     ("nodes", "*", "lifecycle", "depends_on"),
-    ("nodes", "*", "container"),
     ("processes", "*", "nodes"),
 )
+_CONTAINER = ("nodes", "*", "container")
 _PORTS = tuple(("connections", "*", end) for end in ("from", "to", "server", "clients"))
 _CHAINS = ("chains", "*", "through")
 
@@ -33,7 +33,7 @@ def add_prefix(tree: Mapping, prefix: str) -> Mapping:
     def prefixed(name: Scalar) -> tuple[Scalar, ...]:
         return (with_prefix(name, prefix),)
 
-    for path in (*_NODES, *_PORTS, _CHAINS):
+    for path in (*_NODES, _CONTAINER, *_PORTS, _CHAINS):
         tree = changed_at(tree, path, partial(_changed, change=prefixed))
     return tree
 
@@ -49,18 +49,18 @@ def expand_references(tree: Mapping, left_out: Iterable[LeftOut], limits: Includ
     """Return a system with the names of nodes in place of patterns. Raises Stopped.
 
     Nodes that are left out go out of lists and of patterns. At the end of a connection, one of them
-    stays if no other node is there: the connection would end nowhere. Chains have no patterns,
-    because their ports have an order.
+    stays if no other node is there: the connection would end nowhere. So does a container. Chains
+    have no patterns, because their ports have an order.
     """
     absent = tuple(item.name for item in left_out if item.section == "nodes")
     wildcards = _Wildcards(
         tuple(entry.name for entry in entries(tree.get("nodes"))), absent, limits
     )
     for path in _NODES:
-        tree = changed_at(tree, path, partial(_changed, change=wildcards.nodes))
+        tree = changed_at(tree, path, wildcards.nodes)
     for path in _PORTS:
         tree = changed_at(tree, path, wildcards.end)
-    return tree
+    return changed_at(tree, _CONTAINER, wildcards.container)
 
 
 def without_empty_processes(tree: Mapping, left_out: Iterable[LeftOut]) -> Mapping:
@@ -132,8 +132,12 @@ class _Wildcards:
     limits: IncludeLimits
     _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
-    def nodes(self, reference: Scalar) -> tuple[Scalar, ...]:
-        return self._matching(reference, str(reference.value), "")
+    def nodes(self, tree: Tree) -> Tree:
+        return _changed(tree, self._names)
+
+    def container(self, tree: Tree) -> Tree:
+        """Return the container of a component, as it is if it is left out."""
+        return self.nodes(tree) if not isinstance(tree, Scalar) or self._names(tree) else tree
 
     def end(self, tree: Tree) -> Tree:
         """Return the end of a connection; as it is if there are names and none stays."""
@@ -141,6 +145,9 @@ class _Wildcards:
         is_empty = isinstance(changed, Sequence) and not changed.items
         has_name = any(WILDCARD not in str(plain(item)) for item in (items(tree) or (tree,)))
         return tree if is_empty and has_name else changed
+
+    def _names(self, reference: Scalar) -> tuple[Scalar, ...]:
+        return self._matching(reference, str(reference.value), "")
 
     def _ports(self, reference: Scalar) -> tuple[Scalar, ...]:
         node, dot, port = str(reference.value).rpartition(".")
