@@ -228,7 +228,7 @@ connections:
         ("image, if: cameras,", "image,", ["unknown-node"]),
         (", arguments: {topic: a}", "", ["missing-variable"]),
         ("front_more]", "front_mor]", ["unknown-node"]),
-        # without the file, nobody knows which nodes it has
+        # without the file, no node of it has a known name
         ("file: part.yaml", "file: parts.yaml", ["invalid-include"]),
     ],
 )

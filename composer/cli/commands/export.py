@@ -147,6 +147,7 @@ class SchemaName(StrEnum):
     SYSTEM = "system"
     NODE = "node"
     PROJECT = "project"
+    SCENARIO = "scenario"
     REPORT = "report"
 
 
@@ -155,13 +156,15 @@ class SchemaName(StrEnum):
     epilog=examples(
         "compose export schema system > schemas/system.schema.json",
         "compose export schema node > schemas/node.schema.json",
+        "compose export schema scenario > schemas/scenario.schema.json",
         "compose export schema project      the schema of composer.yaml",
         "compose export schema report       the schema of 'compose validate --format json'",
     ),
 )
 def export_schema(
     name: Annotated[
-        SchemaName, typer.Argument(metavar="NAME", help="system, node, project or report.")
+        SchemaName,
+        typer.Argument(metavar="NAME", help="system, node, scenario, project or report."),
     ],
 ) -> None:
     """Print a JSON Schema (draft-07) for editors.

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from composer.language.schema import REPORT, SCHEMAS
 from tests.cli.compose import compose
 
 
@@ -32,7 +33,7 @@ def test_unknown_rules_and_schemas_are_usage_errors() -> None:
     assert compose("export", "schema", "nodes").code == 2
 
 
-@pytest.mark.parametrize("name", ["system", "node", "project", "report"])
+@pytest.mark.parametrize("name", [*SCHEMAS, REPORT])
 def test_a_schema_is_printed_as_json(name: str) -> None:
     content = json.loads(compose("export", "schema", name).out)
     assert "draft-07" in content["$schema"]
