@@ -1,4 +1,4 @@
-"""Uses of the API of behaviors: too early, with unknown keys, or awaited without need."""
+"""Uses of the API of behaviors: too early, or with unknown keys."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ from composer.python_code.nodes import array_length, published_port, reached_met
 from composer.python_code.problems import Family, Problem
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
 from composer.python_code.syntax import Method
-from composer.python_code.trees import SCOPES, argument, dotted, span_of, walk
+from composer.python_code.trees import SCOPES, dotted, span_of, walk
 
 #: The attributes that the composer sets after the constructor.
 _SET_LATER = frozenset(
     {"clock", "fail", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES}
 )
-#: Texts that show that a file may run an event loop of asyncio, such as in a thread.
-_RUNS_ASYNCIO = ("asyncio.run", "run_until_complete", "run_forever", "asyncio.Runner")
 
 
 def behavior_problems(code: Code) -> Iterator[Problem]:
@@ -32,8 +30,6 @@ def behavior_problems(code: Code) -> Iterator[Problem]:
     for scope in code.scopes:
         for node in scope.nodes:
             match node:
-                case ast.Await(value=ast.Call() as call):
-                    yield from _awaited(call, scope)
                 case ast.Subscript(value=ast.Attribute() as owner, slice=index):
                     yield from _key(dotted(owner), index, scope)
                 case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Attribute() as value):
@@ -81,16 +77,6 @@ def _early_calls(handler: str, method: Method, code: Code) -> Iterator[Problem]:
         elif call.name.endswith((".call", ".send_goal")):
             message += "this raises CallCancelled"
             yield Problem(Family.EARLY, message, call.span, hint)
-
-
-def _awaited(call: ast.Call, scope: NodeScope) -> Iterator[Problem]:
-    full = scope.full_name(call.func)
-    is_pause = scope.constant(argument(call, 0, "delay")) == 0  # that needs no event loop
-    text = scope.source.text
-    if full.startswith("asyncio.") and not is_pause and not any(x in text for x in _RUNS_ASYNCIO):
-        message = f"'{full}' needs the event loop of asyncio, which does not run here"
-        hint = "use self.clock.sleep" if full == "asyncio.sleep" else None
-        yield scope.problem(Family.ASYNCIO, message, call.func, hint)
 
 
 def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
