@@ -9,7 +9,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
-from composer.base.diagnostics import Diagnostic, Rule, Severity, error, nearest, shown, warning
+from composer.base.diagnostics import (
+    Diagnostic,
+    Rule,
+    Severity,
+    error,
+    nearest,
+    shown,
+    suggestion,
+    warning,
+)
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span, shown_path
 from composer.language.document import read_document
@@ -24,6 +33,7 @@ FOREIGN_OWNER = warning("RC044", "foreign-owner")
 SETTINGS_FILE = "composer.yaml"
 
 _SCHEMA = "project"
+_MISSING = "does not exist"
 #: In one setting. There are fewer rules, each with a code and a name.
 _MAX_RULES = 500
 _Item = TypeVar("_Item", Located[str], tuple[Located[str], Severity])
@@ -143,21 +153,35 @@ def _folders(
         problem = _problem(folder, root)
         if problem is None:
             found.append(folder.resolve())
-        else:
-            message = f"'{shown(text.value)}' {problem}"
-            hint = "use a folder below the folder of this file"
-            subjects = (("folder", name),)
-            diagnostics.append(
-                Diagnostic(BAD_SETTING, message, text.span, hint=hint, subjects=subjects)
+            continue
+        # Git keeps no empty folders: a project without node types is complete without this one.
+        is_missing = problem == _MISSING
+        diagnostics.append(
+            Diagnostic(
+                replace(BAD_SETTING, severity=Severity.WARNING) if is_missing else BAD_SETTING,
+                f"'{shown(text.value)}' {problem}",
+                text.span,
+                hint=_similar(folder) if is_missing else "use a folder below that of this file",
+                subjects=() if is_missing else (("folder", name),),
             )
+        )
     return tuple(found)
+
+
+def _similar(folder: Path) -> str | None:
+    try:
+        return suggestion(folder.name, [x.name for x in folder.parent.iterdir() if x.is_dir()])
+    except OSError:
+        return None
 
 
 def _problem(folder: Path, root: Path) -> str | None:
     try:
         if not folder.resolve().is_relative_to(root):
             return "is outside the project"
-        return None if folder.is_dir() else "is not a folder"
+        if folder.is_dir():
+            return None
+        return "is not a folder" if folder.exists() else _MISSING
     except (OSError, RuntimeError, ValueError):  # too long, a loop of links or not a valid path
         return "is not a folder"
 

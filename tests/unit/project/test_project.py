@@ -61,9 +61,9 @@ def test_settings_override_the_defaults(tmp_path: Path) -> None:
     [
         ("nodes: [../elsewhere]", (1, 9, "'../elsewhere' is outside the project")),
         ("nodes: [link]", (1, 9, "'link' is outside the project")),
-        ("nodes:\n  - missing", (2, 5, "'missing' is not a folder")),
+        ("nodes:\n  - missing", (2, 5, "'missing' does not exist")),
         ("nodes: [a.yaml]", (1, 9, "'a.yaml' is not a folder")),
-        ('nodes: ["\\t"]', (1, 9, "'\\t' is not a folder")),
+        ('nodes: ["\\t"]', (1, 9, "'\\t' does not exist")),
         ("nodes: nodes", (1, 8, "expected a list for 'nodes', found the string 'nodes'")),
         ("select: [1]", (1, 10, "expected a string in 'select', found the number 1")),
         ("ignore: [no-rule-at-all]", (1, 10, "there is no rule 'no-rule-at-all'")),

@@ -178,11 +178,14 @@ def test_a_missing_package_of_a_port_is_an_error_in_files_of_any_name(
     )
 
 
-def test_a_missing_folder_of_node_types_is_reported_once(tmp_path: Path) -> None:
+def test_a_missing_folder_of_node_types_is_a_warning(tmp_path: Path) -> None:
     (tmp_path / "composer.yaml").write_text("nodes: [node_types]\n", encoding="utf-8")
-    (tmp_path / "nodes").mkdir()
-    (tmp_path / "nodes" / "motor.yaml").write_text("node: motor\non_activate: {log: started}\n")
+    (tmp_path / "node_type").mkdir()
+    (tmp_path / "node_type" / "motor.yaml").write_text("node: motor\non_activate: {log: x}\n")
     (tmp_path / "system.yaml").write_text("system: demo\nnodes: {motor: {type: motor}}\n")
-    results = load_files([tmp_path / "system.yaml", tmp_path / "nodes" / "motor.yaml"])
+    (tmp_path / "other.yaml").write_text("system: demo\nnodes: {motor: {on_activate: {log: x}}}\n")
+    results = load_files([tmp_path / "system.yaml", tmp_path / "node_type" / "motor.yaml"])
     found = [*collect_diagnostics(results), *project_diagnostics(results)]
-    assert [item.rule.name for item in found] == ["bad-setting"]
+    assert [item.rule.name for item in found] == ["bad-setting", "unknown-node-type"]
+    [warning] = load(tmp_path / "other.yaml").diagnostics
+    assert (warning.severity, warning.hint) == (Severity.WARNING, "did you mean 'node_type'?")
