@@ -28,20 +28,34 @@ from composer.client.systems import local_queries
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.requests import GraphAnswer, GraphQuery, GraphView
+from tests.cli.compose import compose
 
 
-def complete(*words: str) -> list[str]:
-    environment = {
-        **os.environ,
+def environment_of(words: tuple[str, ...]) -> dict[str, str]:
+    """Return what bash sets to complete the last word after ``compose``."""
+    return {
         "_COMPOSE_COMPLETE": "complete_bash",
         "COMP_WORDS": " ".join(["compose", *words]),
         "COMP_CWORD": str(len(words)),
     }
+
+
+def complete(*words: str) -> list[str]:
+    with pytest.MonkeyPatch.context() as environment:
+        for name, value in environment_of(words).items():
+            environment.setenv(name, value)
+        done = compose()
+    assert (done.code, done.err) == (0, "")
+    return done.out.split()
+
+
+def test_a_program_of_its_own_completes() -> None:
     code = "import sys; from composer.cli import main; sys.exit(main())"
+    environment = {**os.environ, **environment_of(("run", "--auto"))}
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
     )
-    return done.stdout.split()
+    assert done.stdout.split() == ["--autostart"]
 
 
 def test_commands_options_and_choices_are_completed() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from composer.python_code.trees import Function
 from composer.rules.behaviors import endless_loops
-from tests.unit.support.checking import diagnostics_in
+from tests.unit.support.checking import diagnostics_in, diagnostics_of_each
 
 SYSTEM = "system: demo\nnodes:\n  a: {behavior: code:Code, timers: {tick: {period_ms: 1000}}}\n"
 
@@ -41,26 +41,21 @@ FINE = {
 }
 
 
-def messages(statement: str, imports: str, folder: Path) -> list[str]:
-    kind = "async def" if "await" in statement else "def"
-    source = (
-        f"{imports}\n\n\nclass Code:\n    {kind} on_tick(self):\n        {statement}\n\n"
-        "    def helper(self):\n        time.sleep(1.0)\n\n    def unused(self):\n        input()\n"
-    )
-    (folder / "code.py").write_text(source, encoding="utf-8")
-    found = diagnostics_in(SYSTEM, folder)
-    return [item.message for item in found if item.rule.name == "blocking-call"]
-
-
-@pytest.mark.parametrize(("statement", "imports"), BLOCKING.items())
-def test_blocking_calls_are_reported(statement: str, imports: str, tmp_path: Path) -> None:
-    [message] = messages(statement, imports, tmp_path)
-    assert message.startswith("handler 'on_tick' of 'Code' blocks in '")
-
-
-@pytest.mark.parametrize(("statement", "imports"), FINE.items())
-def test_other_calls_are_not_reported(statement: str, imports: str, tmp_path: Path) -> None:
-    assert messages(statement, imports, tmp_path) == []
+def test_calls_that_block_and_others(tmp_path: Path) -> None:
+    statements = BLOCKING | FINE
+    projects = []
+    for statement, imports in statements.items():
+        kind = "async def" if "await" in statement else "def"
+        code = (
+            f"{imports}\n\n\nclass Code:\n    {kind} on_tick(self):\n        {statement}\n\n"
+            "    def helper(self):\n        time.sleep(1.0)\n\n"
+            "    def unused(self):\n        input()\n"
+        )
+        projects.append({"system.yaml": SYSTEM, "code.py": code})
+    for statement, found in zip(statements, diagnostics_of_each(projects, tmp_path), strict=True):
+        messages = [item.message for item in found if item.rule.name == "blocking-call"]
+        assert len(messages) == (statement in BLOCKING), statement
+        assert all(text.startswith("handler 'on_tick' of 'Code' blocks in '") for text in messages)
 
 
 def test_a_call_reached_by_two_handlers_is_reported_once(tmp_path: Path) -> None:

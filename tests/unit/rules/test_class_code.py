@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Severity
-from tests.unit.support.checking import diagnostics_in, quoted
+from tests.unit.support.checking import diagnostics_in, diagnostics_of_each, quoted
 from tests.unit.support.statements import Statements, diagnostics_of
 
 CLASS = Statements.read("class")
@@ -79,43 +79,44 @@ PUBLISHED = (
 )
 
 
-@pytest.mark.parametrize(
-    ("line", "rule"),
-    [
-        ("parameters: {offset: {type: double, default: 1.0}}", None),
-        ("parameters: {offset: {type: integer, default: 1}}", "class-parameter"),
-        ("parameters: {gains: {type: double_array, default: [1.0]}}", None),
-        ("parameters: {gains: {type: double, default: 1.0}}", "class-parameter"),
-        ("parameters: {any: {type: string, default: a}}", None),
-        ("parameters: {arm.length: {type: double, default: 1.0}}", None),
-        ("parameters: {length: {type: double, default: 1.0}}", "class-parameter"),
-        ("parameters: {use_sim_time: {type: bool, default: true}}", None),
-        ("publishers: {text: {type: std_msgs/msg/String, topic: ~/text, external: true}}", None),
-        ("publishers: {text: {type: std_msgs/msg/Int32, topic: ~/text, external: true}}",
-         "class-port"),
-        ("publishers: {text: {type: std_msgs/msg/Int32, topic: text, external: true}}", None),
-        (PUBLISHED % "command", None),
-        (PUBLISHED % "{extends: command, lifespan_ms: 100}", None),
-        (PUBLISHED % "{extends: command, depth: 1}", None),
-        (PUBLISHED % "{extends: command, deadline_ms: 100}", "class-port"),
-        (PUBLISHED % "state", "class-port"),
-        ("subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}",
-         None),
-        ("subscriptions: {scan: {type: std_msgs/msg/String, qos: command, external: true}}",
-         "class-port"),
-        ("subscriptions: {fast: {type: std_msgs/msg/String, qos: state, external: true}}",
-         "class-port"),
-        ("subscriptions: {any: {type: std_msgs/msg/String, qos: state, external: true}}", None),
-    ],
-)  # fmt: skip
-def test_parameters_and_ports_agree_with_the_class(
-    line: str, rule: str | None, tmp_path: Path
-) -> None:
-    (tmp_path / "declaring.py").write_text(DECLARING, encoding="utf-8")
-    system = f"system: a\nnodes:\n  n:\n    class: declaring:Declaring\n    {line}\n"
+#: Lines of a node, and the rules about its class that they break.
+DECLARED: list[tuple[str, list[str]]] = [
+    ("parameters: {offset: {type: double, default: 1.0}}", []),
+    ("parameters: {offset: {type: integer, default: 1}}", ["class-parameter"]),
+    ("parameters: {gains: {type: double_array, default: [1.0]}}", []),
+    ("parameters: {gains: {type: double, default: 1.0}}", ["class-parameter"]),
+    ("parameters: {any: {type: string, default: a}}", []),
+    ("parameters: {arm.length: {type: double, default: 1.0}}", []),
+    ("parameters: {length: {type: double, default: 1.0}}", ["class-parameter"]),
+    ("parameters: {use_sim_time: {type: bool, default: true}}", []),
+    ("publishers: {text: {type: std_msgs/msg/String, topic: ~/text, external: true}}", []),
+    ("publishers: {text: {type: std_msgs/msg/Int32, topic: ~/text, external: true}}",
+     ["class-port"]),
+    ("publishers: {text: {type: std_msgs/msg/Int32, topic: text, external: true}}", []),
+    (PUBLISHED % "command", []),
+    (PUBLISHED % "{extends: command, lifespan_ms: 100}", []),
+    (PUBLISHED % "{extends: command, depth: 1}", []),
+    (PUBLISHED % "{extends: command, deadline_ms: 100}", ["class-port"]),
+    (PUBLISHED % "state", ["class-port"]),
+    ("subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}",
+     []),
+    ("subscriptions: {scan: {type: std_msgs/msg/String, qos: command, external: true}}",
+     ["class-port"]),
+    ("subscriptions: {fast: {type: std_msgs/msg/String, qos: state, external: true}}",
+     ["class-port"]),
+    ("subscriptions: {any: {type: std_msgs/msg/String, qos: state, external: true}}", []),
+]  # fmt: skip
+
+
+def test_parameters_and_ports_agree_with_the_class(tmp_path: Path) -> None:
+    system = "system: a\nnodes:\n  n:\n    class: declaring:Declaring\n    %s\n"
+    projects = [{"system.yaml": system % line, "declaring.py": DECLARING} for line, _ in DECLARED]
     rules = {"class-parameter", "class-port"}
-    found = [item.rule.name for item in diagnostics_in(system, tmp_path)]
-    assert [name for name in found if name in rules] == ([rule] if rule is not None else [])
+    results = [
+        (line, [item.rule.name for item in found if item.rule.name in rules])
+        for (line, _), found in zip(DECLARED, diagnostics_of_each(projects, tmp_path), strict=True)
+    ]
+    assert results == DECLARED
 
 
 @pytest.mark.parametrize(
@@ -147,37 +148,30 @@ class Robot(Node):
         {init}
 """
 REFUSED = [
-    ('super().__init__("r", cli_args=["-r"])', "unsupported-class", Severity.ERROR),
-    ('super().__init__("r", cli_args=cli_args)', None, None),
-    ('super().__init__("r", cli_args=None)', None, None),
-    ('super().__init__("r")\n        rclpy.spin(self)', "unsupported-class", Severity.ERROR),
+    ('super().__init__("r", cli_args=["-r"])', [Severity.ERROR]),
+    ('super().__init__("r", cli_args=cli_args)', []),
+    ('super().__init__("r", cli_args=None)', []),
+    ('super().__init__("r")\n        rclpy.spin(self)', [Severity.ERROR]),
     (
         'super().__init__("r")\n        if spins:\n            rclpy.spin(self)',
-        "unsupported-class",
-        Severity.WARNING,
+        [Severity.WARNING],
     ),
-    (
-        'super().__init__("r")\n        self.x = rclpy.create_node("x")',
-        "unsupported-class",
-        Severity.ERROR,
-    ),
+    ('super().__init__("r")\n        self.x = rclpy.create_node("x")', [Severity.ERROR]),
     (
         'super().__init__("r")\n        self.x = spins and rclpy.create_node("x")',
-        "unsupported-class",
-        Severity.WARNING,
+        [Severity.WARNING],
     ),
 ]
 
 
-@pytest.mark.parametrize(("init", "rule", "severity"), REFUSED)
-def test_only_what_hosting_surely_refuses_is_an_error(
-    init: str, rule: str | None, severity: Severity | None, tmp_path: Path
-) -> None:
-    (tmp_path / "code.py").write_text(HOSTED.format(init=init), encoding="utf-8")
-    found = [
-        (item.rule.name, item.rule.severity) for item in diagnostics_in(CLASS.system, tmp_path)
+def test_only_what_hosting_surely_refuses_is_an_error(tmp_path: Path) -> None:
+    codes = [HOSTED.format(init=init) for init, _ in REFUSED]
+    results = diagnostics_of(CLASS.system, codes, tmp_path)
+    severities = [[item.rule.severity for item in found] for found in results]
+    assert list(zip(codes, severities, strict=True)) == [
+        (HOSTED.format(init=init), expected) for init, expected in REFUSED
     ]
-    assert found == ([(rule, severity)] if rule is not None else [])
+    assert {item.rule.name for found in results for item in found} == {"unsupported-class"}
 
 
 ALTERNATIVES = """\

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
 from composer.base.diagnostics import Diagnostic, Rule
-from composer.loading import load
 from composer.report.rules import all_rules, page_of
 from composer.rules import all_checks
+from tests.unit.support.checking import diagnostics_of_each
 
 
 def files_of(example: str) -> dict[str, str]:
@@ -33,30 +32,23 @@ PAGES = {rule: page_of(rule) for rule in all_rules()}
 RULES = [rule for rule, page in PAGES.items() if files_of(page.bad) and files_of(page.good)]
 
 
-def diagnostics_in(example: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Diagnostic]:
-    files = files_of(example)
-    for name, text in files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    monkeypatch.chdir(folder)
-    return load(Path(next(iter(files)))).diagnostics
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> dict[Rule, list[list[Diagnostic]]]:
+    """The diagnostics of the bad and of the good example of each rule."""
+    examples = [
+        files_of(example) for rule in RULES for example in (PAGES[rule].bad, PAGES[rule].good)
+    ]
+    results = diagnostics_of_each(examples, tmp_path_factory.mktemp("examples"))
+    return {rule: results[2 * number : 2 * number + 2] for number, rule in enumerate(RULES)}
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
-def test_bad_example_breaks_the_rule(
-    rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_bad_example_breaks_only_its_rule_and_a_good_one_none(
+    rule: Rule, reported: dict[Rule, list[list[Diagnostic]]]
 ) -> None:
-    found = diagnostics_in(PAGES[rule].bad, tmp_path, monkeypatch)
-    assert {diagnostic.rule.code for diagnostic in found} == {rule.code}
-
-
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
-def test_good_example_breaks_none(
-    rule: Rule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = diagnostics_in(PAGES[rule].good, tmp_path, monkeypatch)
-    assert [f"{diagnostic.rule.code}: {diagnostic.message}" for diagnostic in found] == []
+    bad, good = reported[rule]
+    assert {diagnostic.rule.code for diagnostic in bad} == {rule.code}
+    assert [f"{diagnostic.rule.code}: {diagnostic.message}" for diagnostic in good] == []
 
 
 def test_all_checks_have_tested_examples() -> None:

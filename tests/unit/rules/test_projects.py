@@ -11,29 +11,43 @@ import yaml
 from composer.base.diagnostics import Severity
 from composer.loading import load, load_files
 from composer.loading.reported import collect_diagnostics, project_diagnostics
-from tests.unit.support.checking import diagnostics_in, rules_broken
+from tests.unit.support.checking import (
+    diagnostics_in,
+    diagnostics_of_each,
+    rules_broken,
+    write_files,
+)
 
 PROJECTS = yaml.safe_load(Path(__file__).with_name("projects.yaml").read_text(encoding="utf-8"))
 
 
-def write(folder: Path, files: dict[str, str]) -> None:
-    for name, text in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    """The place and the rule of each diagnostic, by project."""
+    folder = tmp_path_factory.mktemp("projects")
+    files = [
+        {"system.yaml": project["system.yaml"]}
+        | {name: text for name, text in project.items() if name not in ("name", "found")}
+        for project in PROJECTS
+    ]
+    return {
+        project["name"]: [
+            f"{item.primary.file.path}:{item.primary.line} {item.rule.name}".removeprefix(
+                f"{folder / str(index)}/"
+            )
+            .removeprefix("system.yaml:")
+            .replace(f"_{index}.py", ".py")
+            for item in found
+        ]
+        for index, (project, found) in enumerate(
+            zip(PROJECTS, diagnostics_of_each(files, folder), strict=True)
+        )
+    }
 
 
 @pytest.mark.parametrize("project", PROJECTS, ids=[project["name"] for project in PROJECTS])
-def test_diagnostics(project: dict[str, Any], tmp_path: Path) -> None:
-    files = {name: text for name, text in project.items() if name not in ("name", "found")}
-    write(tmp_path, files)
-    found = [
-        f"{item.primary.file.path}:{item.primary.line} {item.rule.name}"
-        for item in load(tmp_path / "system.yaml", shown="system.yaml").diagnostics
-    ]
-    here = (f"{tmp_path}/", "system.yaml:")
-    assert [place.removeprefix(here[0]).removeprefix(here[1]) for place in found] == project[
-        "found"
-    ]
+def test_diagnostics(project: dict[str, Any], reported: dict[str, list[str]]) -> None:
+    assert reported[project["name"]] == project["found"]
 
 
 def test_a_node_type_alone_needs_no_connections(tmp_path: Path) -> None:
@@ -44,12 +58,12 @@ def test_a_node_type_alone_needs_no_connections(tmp_path: Path) -> None:
         "  input: {type: '${message_type}', qos: command, publish: {output: '{message}'}}\n"
         "publishers: {output: {type: '${message_type}', qos: command}}\n"
     )
-    write(tmp_path, {"relay.yaml": text})
+    write_files(tmp_path, {"relay.yaml": text})
     assert load(tmp_path / "relay.yaml").diagnostics == []
 
 
 def test_all_uses_of_a_renamed_field_are_labels_of_one_diagnostic(tmp_path: Path) -> None:
-    write(
+    write_files(
         tmp_path,
         {
             "interfaces/demo_msgs/msg/Zone.msg": "string area\n",
@@ -73,7 +87,7 @@ def test_a_port_in_the_wrong_section_is_reported_where_it_is_used(tmp_path: Path
         "nodes/user.yaml": f"node: user\n{server}\n"
         "timers: {tick: {period_ms: 100, call: {ask: {}}}}\n",
     }
-    write(tmp_path, files)
+    write_files(tmp_path, files)
     found = collect_diagnostics([load(tmp_path / name) for name in files])
     assert [item.rule.name for item in found] == ["wrong-port-kind", "wrong-port-kind"]
 

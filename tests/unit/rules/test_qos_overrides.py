@@ -8,7 +8,7 @@ import pytest
 
 from composer.loading import load_bytes
 from composer.model import System
-from tests.unit.support.checking import diagnostics_in, quoted
+from tests.unit.support.checking import diagnostics_in, diagnostics_of_each, quoted
 
 NODES = """\
 system: words
@@ -194,45 +194,47 @@ DURABILITY = ", qos_overriding_options=QoSOverridingOptions([QoSPolicyKind.DURAB
 COMPUTED = ", qos_overriding_options=QoSOverridingOptions(KINDS)"
 
 
-@pytest.mark.parametrize(
-    ("options", "given", "expected"),
-    [
-        ("", "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
-        (OPTS_IN, "depth: 3", None),
-        (DURABILITY, "durability: transient_local", None),
-        (DURABILITY, "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
-        (COMPUTED, "depth: 3", None),
-        (
-            OPTS_IN,
-            "deadline: 1000000",
-            "class 'Talker' creates publisher 'words' with deadline_ms unlimited, not 1.0",
-        ),
-        (
-            "",
-            "reliability: best_effort",
-            "class 'Talker' creates publisher 'words' with reliability reliable, not best_effort",
-        ),
-        (
-            OPTS_IN,
-            "reliability: best_effort",
-            "publisher 'talker.words' offers reliability best_effort on '/words', "
-            "but subscription 'listener.words' requests reliable",
-        ),
-    ],
-)
-def test_a_class_decides_whether_parameters_override_its_qos(
-    options: str, given: str, expected: str | None, tmp_path: Path
-) -> None:
-    (tmp_path / "talker.py").write_text(CLASS.format(options=options))
-    text = f"""\
+#: Options of the publisher of a class, an override, and the diagnostic.
+OVERRIDDEN = [
+    ("", "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
+    (OPTS_IN, "depth: 3", None),
+    (DURABILITY, "durability: transient_local", None),
+    (DURABILITY, "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
+    (COMPUTED, "depth: 3", None),
+    (
+        OPTS_IN,
+        "deadline: 1000000",
+        "class 'Talker' creates publisher 'words' with deadline_ms unlimited, not 1.0",
+    ),
+    (
+        "",
+        "reliability: best_effort",
+        "class 'Talker' creates publisher 'words' with reliability reliable, not best_effort",
+    ),
+    (
+        OPTS_IN,
+        "reliability: best_effort",
+        "publisher 'talker.words' offers reliability best_effort on '/words', "
+        "but subscription 'listener.words' requests reliable",
+    ),
+]
+
+
+def test_a_class_decides_whether_parameters_override_its_qos(tmp_path: Path) -> None:
+    system = f"""\
 system: words
 nodes:
   talker:
     class: "talker:Talker"
-    parameters: {{{PUBLISHER}.{given}, qos_overrides./other.publisher_id.depth: 2}}
+    parameters: {{{PUBLISHER}.%s, qos_overrides./other.publisher_id.depth: 2}}
     publishers: {{words: {{type: std_msgs/msg/String, qos: command}}}}
   listener:
     subscriptions: {{words: {{type: std_msgs/msg/String, qos: command, log: "{{message.data}}"}}}}
 """
-    found = [item.message for item in diagnostics_in(text, tmp_path)]
-    assert found == ([] if expected is None else [expected])
+    projects = [
+        {"system.yaml": system % given, "talker.py": CLASS.format(options=options)}
+        for options, given, _ in OVERRIDDEN
+    ]
+    for case, found in zip(OVERRIDDEN, diagnostics_of_each(projects, tmp_path), strict=True):
+        messages = [item.message for item in found]
+        assert messages == ([] if case[2] is None else [case[2]]), case

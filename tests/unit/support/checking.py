@@ -2,10 +2,54 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
-from composer.loading import load_bytes
+from composer.loading import load_bytes, load_files
+
+#: The module of a node.
+_MODULE = re.compile(r"""(?:class|behavior): ['"]?(\w+)(?=:)""")
+
+
+def write_files(folder: Path, files: Mapping[str, str]) -> None:
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def diagnostics_of_each(
+    projects: Iterable[Mapping[str, str]], folder: Path
+) -> list[list[Diagnostic]]:
+    """Return the diagnostics of the first file of each project.
+
+    All at once: the type checker starts once, which takes most of the time. It would start again
+    for modules of the same name, so the module of a node gets the index of the project, such as
+    ``code_0``. Each project is written to a folder that is named by its index.
+    """
+    paths = []
+    for index, files in enumerate(projects):
+        home = folder / str(index)
+        write_files(home, _with_numbered_modules(files, index))
+        paths.append(home / next(iter(files)))
+    return [result.diagnostics for result in load_files(paths)]
+
+
+def _with_numbered_modules(files: Mapping[str, str], number: int) -> dict[str, str]:
+    modules = {Path(name).stem for name in files if name.endswith(".py")}
+
+    def numbered(found: re.Match[str]) -> str:
+        return f"{found[0]}_{number}" if found[1] in modules else found[0]
+
+    used = {found[1] for text in files.values() for found in _MODULE.finditer(text)}
+    return {
+        name.replace(".py", f"_{number}.py") if Path(name).stem in used else name: _MODULE.sub(
+            numbered, text
+        )
+        for name, text in files.items()
+    }
 
 
 def diagnostics_in(text: str, folder: Path) -> list[Diagnostic]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
 from composer.base.diagnostics import Diagnostic
-from composer.loading import load_files
+from tests.unit.support.checking import diagnostics_of_each
 
 FOLDER = Path(__file__).parents[1] / "rules" / "statements"
 
@@ -30,9 +30,13 @@ class Statements:
 
     def code_with(self, place: str = "", statement: str = "") -> str:
         """Return the code with a statement in one place, and ``pass`` in the others."""
+        return self.code_with_each({place: statement})
+
+    def code_with_each(self, statements: Mapping[str, str]) -> str:
+        """Return the code with statements by place, and ``pass`` in the other places."""
 
         def fill(found: re.Match[str]) -> str:
-            text = statement if found[2] == place else "pass"
+            text = statements.get(found[2], "pass")
             return found[1] + text.replace("\n", f"\n{found[1]}")
 
         places = "|".join({*self.mistakes, *self.right})
@@ -40,17 +44,6 @@ class Statements:
 
 
 def diagnostics_of(system: str, codes: Sequence[str], folder: Path) -> list[list[Diagnostic]]:
-    """Return the diagnostics of each text, as module ``code`` of the same system.
-
-    All at once: the type checker starts once, which takes most of the time.
-    """
-    paths = []
-    for index, code in enumerate(codes):
-        home = folder / str(index)
-        home.mkdir()
-        name = f"code_{index}"
-        (home / f"{name}.py").write_text(code, encoding="utf-8")
-        path = home / "system.yaml"
-        path.write_text(system.replace(" code:", f" {name}:"), encoding="utf-8")
-        paths.append(path)
-    return [result.diagnostics for result in load_files(paths)]
+    """Return the diagnostics of each text, as module ``code`` of the same system."""
+    projects = [{"system.yaml": system, "code.py": code} for code in codes]
+    return diagnostics_of_each(projects, folder)
