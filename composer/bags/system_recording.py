@@ -20,7 +20,7 @@ from composer.base.diagnostics import suggestion
 from composer.interfaces import Interfaces
 from composer.model import Isolation, Port, System
 from composer.model.names import matches_wildcard
-from composer.model.recording import Recording
+from composer.model.system import Recording
 from composer.runtime.clock.clock import Clock
 from composer.runtime.intra_process.topic import CopyingTarget
 from composer.runtime.supervision.events import BroughtUp, Event, NodeFailed

@@ -22,7 +22,7 @@ from composer.project import Project
 from composer.project.node_types import NodeTypes
 from composer.project.settings import apply_rule_settings
 from composer.rules.ignore_comments import without_ignored
-from composer.rules.node_types import unused_node_types
+from composer.rules.implementations import unused_node_types
 
 #: What identifies a diagnostic across the systems in which it appears: its rule and place.
 Identity: TypeAlias = tuple[str, str]

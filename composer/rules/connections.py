@@ -13,9 +13,8 @@ from composer.base.spelling import vocabulary
 from composer.model import ChannelKind, PortKind, PortOfNode
 from composer.model.names import join
 from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.formatting import port_name
-from composer.rules.analysis.subjects import wiring
+from composer.rules.analysis.subjects import earlier_errors, wiring
 
 CLIENT_WITHOUT_SERVER = warning("RC322", "client-without-server")
 SUBSCRIPTION_WITHOUT_PUBLISHER = warning("RC323", "subscription-without-publisher")

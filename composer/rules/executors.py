@@ -21,10 +21,9 @@ from composer.base.source import Located, Span
 from composer.language.rules import UNUSED_DECLARATION
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
 from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.formatting import number
 from composer.rules.analysis.rates import Cause, Rates, rates
-from composer.rules.analysis.subjects import unknown_subjects, used_parameters
+from composer.rules.analysis.subjects import earlier_errors, unknown_subjects, used_parameters
 from composer.rules.references import UNDECLARED_NAME, absence
 
 EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")

@@ -13,7 +13,6 @@ from composer.language.expressions import FieldPath
 from composer.language.templates import Constant, Items, Record, Template
 from composer.model import Node
 from composer.rules.analysis.context import Context, part_of_path
-from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.expressions import (
     EVENT_NAMES,
     ExpressionSite,
@@ -21,6 +20,7 @@ from composer.rules.analysis.expressions import (
     message_templates,
     reactions,
 )
+from composer.rules.analysis.subjects import earlier_errors
 from composer.rules.types import certain_field_problems
 
 UNKNOWN_NAME = error("RC209", "unknown-name")

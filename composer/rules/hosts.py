@@ -1,14 +1,21 @@
-"""The computers that processes run on, and environment variables."""
+"""The computers that processes run on, how they discover each other, and environment variables."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
-from composer.base.diagnostics import Diagnostic, error, suggestion
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.base.source import Located
 from composer.language.rules import UNUSED_DECLARATION
-from composer.model import Host
+from composer.model import DiscoveryKind, Host
+from composer.model.discovery import (
+    host_of,
+    interface_problem,
+    is_loopback,
+    peer_problem,
+    server_problem,
+)
 from composer.model.hosts import (
     address_problem,
     domain_problem,
@@ -18,6 +25,7 @@ from composer.model.hosts import (
     workspace_problem,
 )
 from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.subjects import is_misspelled
 from composer.rules.references import UNDECLARED_NAME, absence
 
 INVALID_HOST = error("RC492", "invalid-host")
@@ -119,3 +127,96 @@ def check_environment_variable(context: Context) -> Iterator[Diagnostic]:
             if not is_unresolved(name.value) and not _VARIABLE_NAME.fullmatch(name.value):
                 text = f"'{name}' is not a name of an environment variable"
                 yield Diagnostic(ENVIRONMENT_VARIABLE, text, name.span, hint=_VARIABLE_HINT)
+
+
+INVALID_DISCOVERY = error("RC496", "invalid-discovery")
+
+_NEEDED = {DiscoveryKind.SERVER: "address", DiscoveryKind.PEERS: "peers"}
+_KIND_OF_KEY = {
+    "interfaces": DiscoveryKind.MULTICAST,
+    "address": DiscoveryKind.SERVER,
+    "port": DiscoveryKind.SERVER,
+    "start": DiscoveryKind.SERVER,
+    "peers": DiscoveryKind.PEERS,
+}
+
+
+def check_discovery_setting(context: Context) -> Iterator[Diagnostic]:
+    """Check that the keys of discovery are those of its kind."""
+    discovery = context.system.discovery
+    if discovery is None:
+        return
+    kind = discovery.kind.value
+    given = {key.value for key in discovery.given}
+    others = [key for key in discovery.given if _KIND_OF_KEY.get(key.value, kind) is not kind]
+    needed = _NEEDED.get(kind)
+    if needed is not None and needed not in given:
+        if not is_misspelled(context, needed, discovery.kind.span):
+            yield _missing_setting(discovery.kind, needed, others)
+        return
+    for key in others:
+        yield Diagnostic(
+            INVALID_DISCOVERY,
+            f"'{key}' has no effect with discovery of kind '{kind}'",
+            key.span,
+            hint=f"remove it, or set 'kind: {_KIND_OF_KEY[key.value]}'",
+        )
+
+
+def _missing_setting(
+    kind: Located[DiscoveryKind], needed: str, others: Sequence[Located[str]]
+) -> Diagnostic:
+    """Report a key that is missing, and those that have no effect because of the same mistake."""
+    hint = "list the other computers of the system"
+    if kind.value is DiscoveryKind.SERVER:
+        hint = "name the computer of the server"
+    if others:
+        hint = f"{hint}, or set 'kind: {_KIND_OF_KEY[others[0].value]}'"
+    labels = tuple(Label(key.span, "this has no effect") for key in others)
+    message = f"discovery of kind '{kind}' needs '{needed}'"
+    return Diagnostic(INVALID_DISCOVERY, message, kind.span, labels, hint)
+
+
+def check_discovery_address(context: Context) -> Iterator[Diagnostic]:
+    """Check the addresses and interfaces of discovery."""
+    discovery = context.system.discovery
+    if discovery is not None:
+        yield from _check_all("address", discovery.addresses, server_problem)
+        yield from _check_all("peer", discovery.peers, peer_problem)
+        yield from _check_all("interface", discovery.interfaces, interface_problem)
+
+
+def _check_all(
+    what: str, written: tuple[Located[str], ...], find_problem: Callable[[str], str | None]
+) -> Iterator[Diagnostic]:
+    first: dict[str, Located[str]] = {}
+    for text in written:
+        if is_unresolved(text.value):
+            continue
+        problem = find_problem(text.value)
+        earlier = first.setdefault(text.value, text)
+        if problem is not None:
+            yield Diagnostic(INVALID_DISCOVERY, f"{what} '{text}' {problem}", text.span)
+        elif earlier is not text:
+            label = Label(earlier.span, "the first one")
+            yield Diagnostic(INVALID_DISCOVERY, f"{what} '{text}' is repeated", text.span, (label,))
+
+
+def check_local_discovery(context: Context) -> Iterator[Diagnostic]:
+    """Check the addresses of discovery in a system of several computers."""
+    system = context.system
+    discovery = system.discovery
+    addresses = {host.name.value: host.address.value for host in system.hosts}
+    hosts = [process.host for process in system.processes if process.host is not None]
+    host = next((item for item in hosts if not is_loopback(addresses.get(item.value, ""))), None)
+    if discovery is None or host is None:
+        return
+    for text in (*discovery.addresses, *discovery.peers):
+        if is_loopback(host_of(text.value)):
+            yield Diagnostic(
+                INVALID_DISCOVERY,
+                f"'{text}' is not the same computer for all processes",
+                text.span,
+                (Label(host.span, "a process on another computer"),),
+                hint="use the address of the computer in the network",
+            )

@@ -25,8 +25,8 @@ from composer.model.qos_overrides import PREFIX as QOS_OVERRIDES
 from composer.model.qos_overrides import overridable_policies
 from composer.model.resolve.parameter_files import PARAMETER_FILES
 from composer.rules.analysis.context import Context, behaviors, is_unresolved, part_of_path
-from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.expressions import expression_sites
+from composer.rules.analysis.subjects import earlier_errors
 
 UNKNOWN_PARAMETER = error("RC206", "unknown-parameter")
 SIMILAR_PARAMETER = warning("RC216", "similar-parameter")

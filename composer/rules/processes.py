@@ -9,8 +9,7 @@ from composer.base.source import Located
 from composer.model import Channel
 from composer.model.names import topic_name_problem
 from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.analysis.earlier_errors import earlier_errors
-from composer.rules.analysis.subjects import NODES_OF_PROCESSES, unknown_subjects
+from composer.rules.analysis.subjects import NODES_OF_PROCESSES, earlier_errors, unknown_subjects
 from composer.rules.executors import LOST_BETWEEN_PROCESSES
 from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE, absence
 

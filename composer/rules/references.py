@@ -9,12 +9,13 @@ from composer.base.diagnostics import Diagnostic, Label, Subject, error, suggest
 from composer.base.fast_dataclass import dataclass
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
 from composer.rules.analysis.context import Context, is_unresolved, location, part_of
-from composer.rules.analysis.earlier_errors import PORT_SECTIONS, earlier_errors
 from composer.rules.analysis.expressions import sends
 from composer.rules.analysis.formatting import a, either
 from composer.rules.analysis.subjects import (
     NAMESPACES,
+    PORT_SECTIONS,
     connection_subjects,
+    earlier_errors,
     port_subject,
     unknown_subjects,
 )

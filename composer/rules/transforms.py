@@ -19,11 +19,11 @@ from composer.model import (
 )
 from composer.model.geometry import is_unit, normalized
 from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.analysis.earlier_errors import earlier_errors
 from composer.rules.analysis.expressions import message_templates
 from composer.rules.analysis.formatting import number
 from composer.rules.analysis.frames import BROADCAST, FrameUse, place, uses_of_behaviors
-from composer.rules.timers import UNLIKELY_UNIT
+from composer.rules.analysis.subjects import earlier_errors
+from composer.rules.timing import UNLIKELY_UNIT
 
 FRAME_ID_SLASH = warning("RC309", "frame-id-slash")
 TRANSFORM_SOURCE = error("RC515", "transform-source")

@@ -20,7 +20,7 @@ from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import use_of
 from composer.python_code.problems import Family, Problem
 from composer.rules.analysis.context import Context
-from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.subjects import earlier_errors
 from composer.rules.python import diagnostic, sources
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.

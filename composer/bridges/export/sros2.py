@@ -20,7 +20,7 @@ from composer.model import (
     member_system,
 )
 from composer.model.names import join
-from composer.plan.drift.snapshot import LIFECYCLE_SERVICES, LOGGER_SERVICES, PARAMETER_SERVICES
+from composer.plan.drift.drift import LIFECYCLE_SERVICES, LOGGER_SERVICES, PARAMETER_SERVICES
 
 _VERSION = "0.2.0"
 _MANAGER = "manager"

@@ -23,7 +23,7 @@ from composer.language.tree_values import (
 )
 from composer.model import Host, Process
 from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
-from composer.model.recording import Recording
+from composer.model.system import Recording
 
 
 def read_processes(tree: Tree | None) -> tuple[Process, ...]:

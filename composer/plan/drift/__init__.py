@@ -7,8 +7,11 @@ and selects those that last long enough to be reported.
 from __future__ import annotations
 
 from composer.plan.drift.compare import compare
-from composer.plan.drift.drift import Debouncer, Drift, DriftChange, DriftKind
-from composer.plan.drift.snapshot import (
+from composer.plan.drift.drift import (
+    Debouncer,
+    Drift,
+    DriftChange,
+    DriftKind,
     ObservedEndpoint,
     ObservedNode,
     ObservedProcess,

@@ -21,8 +21,7 @@ from composer.model import (
 )
 from composer.model.qos import QosProfile
 from composer.plan import bring_up
-from composer.plan.drift.drift import Drift, DriftKind
-from composer.plan.drift.snapshot import ObservedEndpoint, ObservedNode, Snapshot
+from composer.plan.drift.drift import Drift, DriftKind, ObservedEndpoint, ObservedNode, Snapshot
 
 _MANAGER = "manager"
 _NODES_HINT = "if its program creates them all, list their names under 'nodes' of the executable"

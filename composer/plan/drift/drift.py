@@ -1,13 +1,125 @@
-"""Differences between the declared and the observed system, and which of them last."""
+"""What was observed in the ROS graph, and its differences from what is declared."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from enum import StrEnum
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
+from composer.language.tree import Plain
+from composer.model import PortKind
+from composer.model.qos import QosProfile
+
+#: Services of every node for tools, with their types.
+PARAMETER_SERVICES = {
+    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+    "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
+    "get_parameters": "rcl_interfaces/srv/GetParameters",
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
+    "set_parameters": "rcl_interfaces/srv/SetParameters",
+    "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
+}
+LIFECYCLE_SERVICES = {
+    "change_state": "lifecycle_msgs/srv/ChangeState",
+    "get_state": "lifecycle_msgs/srv/GetState",
+    "get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
+    "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
+    "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
+}
+LOGGER_SERVICES = {
+    "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
+    "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
+}
+_TOOL_SERVICES = {
+    **PARAMETER_SERVICES,
+    **LIFECYCLE_SERVICES,
+    **LOGGER_SERVICES,
+    "get_type_description": "type_description_interfaces/srv/GetTypeDescription",
+}
+#: Topics of every node for tools.
+_TOOL_TOPICS = {
+    "/rosout": "rcl_interfaces/msg/Log",
+    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
+}
+_TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
+
+
+@dataclass(frozen=True, slots=True)
+class ObservedEndpoint:
+    """A publisher, subscription, service, ... of a node.
+
+    ``qos`` is the profile that the node offers or requests. Discovery reports it for topics only,
+    without history and depth; for services and actions it is None.
+    """
+
+    kind: PortKind
+    name: str
+    type: str
+    qos: QosProfile | None = None
+
+    @property
+    def is_for_tools(self) -> bool:
+        """True for the endpoints of parameters, logs and lifecycle."""
+        last = self.name.rpartition("/")[2]
+        if self.kind.channel.value == "service":
+            return _TOOL_SERVICES.get(last) == self.type
+        if self.kind.channel.value == "topic":
+            known = _TOOL_TOPICS.get(self.name) == self.type
+            return known or (last == "transition_event" and self.type == _TRANSITION_EVENT)
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class ObservedNode:
+    """A node of the graph.
+
+    ``state`` is its lifecycle state: empty if it has none, None if it did not respond.
+    ``parameters`` are its values by name, None if it did not respond. ``count`` is the number of
+    nodes with that name; ``endpoints`` contains the endpoints of all of them. ``container`` is the
+    full name of the node that has loaded it.
+    """
+
+    full_name: str
+    endpoints: tuple[ObservedEndpoint, ...] = ()
+    state: str | None = ""
+    parameters: Mapping[str, Plain] | None = field(default_factory=dict)
+    count: int = 1
+    container: str = ""
+
+    @property
+    def is_hidden(self) -> bool:
+        """True for nodes of tools: a part of their name starts with an underscore."""
+        return any(part.startswith("_") for part in self.full_name.split("/"))
+
+
+@dataclass(frozen=True, slots=True)
+class ObservedProcess:
+    """A process of a running system, with the full names of its nodes.
+
+    ``name`` is the namespace of its manager. ``host`` and ``pid`` are empty if it does not report.
+    """
+
+    name: str
+    host: str
+    pid: str
+    nodes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The nodes of the graph. Endpoints for tools are left out.
+
+    ``processes`` are those of running systems, if they were asked for.
+    """
+
+    nodes: tuple[ObservedNode, ...]
+    processes: tuple[ObservedProcess, ...] = ()
+
+    def node(self, full_name: str) -> ObservedNode | None:
+        """Return the node with that name, or None."""
+        return next((node for node in self.nodes if node.full_name == full_name), None)
 
 
 class DriftKind(StrEnum):

@@ -25,7 +25,7 @@ from composer.python_code.scopes import Scope
 from composer.python_code.syntax import scopes_in
 from composer.python_code.trees import argument, dotted, span_of
 from composer.rules.analysis.context import Context, behaviors, is_unresolved
-from composer.rules.analysis.earlier_errors import earlier_errors
+from composer.rules.analysis.subjects import earlier_errors
 
 BROADCAST = "broadcast"
 _TRANSFORMS = "self.transforms"
