@@ -9,7 +9,7 @@ from typing import Any, Self
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
 
-from composer.client.messages.rates import measure_rates
+from composer.client.messages.topics import measure_rates
 from composer.client.session import Deadline, Session
 from composer.client.systems.node_services import NodeServices
 from composer.language.tree import Plain

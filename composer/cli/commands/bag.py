@@ -28,9 +28,8 @@ from composer.cli.support.bags import (
 )
 from composer.cli.support.errors import FAILED
 from composer.cli.support.options import Json, command_group, examples
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import require_ros
-from composer.cli.support.terminal import lines, write
+from composer.cli.support.terminal import as_json, lines, write
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag

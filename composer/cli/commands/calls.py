@@ -23,9 +23,8 @@ from composer.cli.support.options import (
     finite,
     yaml_or_stdin,
 )
-from composer.cli.support.results import as_json, as_yaml
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import lines, say, write
+from composer.cli.support.terminal import as_json, as_yaml, lines, say, write
 
 service_app = command_group("List and call services.")
 action_app = command_group("List actions and send goals.")

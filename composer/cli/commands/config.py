@@ -9,9 +9,8 @@ import typer
 from composer.cli.support.errors import FAILED
 from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import examples
-from composer.cli.support.results import as_json
 from composer.cli.support.system_arguments import SystemName, load_system
-from composer.cli.support.terminal import say, write, write_raw
+from composer.cli.support.terminal import as_json, say, write, write_raw
 
 EPILOG = examples(
     "compose config systems/fleet.yaml",

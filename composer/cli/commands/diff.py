@@ -20,10 +20,9 @@ from composer.cli.support.options import (
     examples,
     finite,
 )
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import SystemName, runnable_system
-from composer.cli.support.terminal import lines, say, write
+from composer.cli.support.terminal import as_json, lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.snapshot import GraphObserver

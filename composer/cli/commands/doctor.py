@@ -15,10 +15,9 @@ import typer
 from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import ShowWarnings, complete_system, runnable_system
-from composer.cli.support.terminal import lines, say, write
+from composer.cli.support.terminal import as_json, lines, say, write
 
 if TYPE_CHECKING:
     from composer.client.doctor import CheckResult, Level

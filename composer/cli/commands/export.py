@@ -16,9 +16,8 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.name_values import Arguments, declared_arguments
 from composer.cli.support.new_files import write_and_say, write_output
 from composer.cli.support.options import Namespace, NewFile, command_group, examples
-from composer.cli.support.results import as_json
 from composer.cli.support.system_arguments import SystemName
-from composer.cli.support.terminal import write
+from composer.cli.support.terminal import as_json, write
 
 if TYPE_CHECKING:
     from composer.bridges.export.deployment import Service

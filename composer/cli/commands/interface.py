@@ -14,8 +14,7 @@ import typer
 from composer.cli.support.completion import complete_interface_package, complete_type
 from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.options import Json, command_group, examples
-from composer.cli.support.results import as_json
-from composer.cli.support.terminal import lines, say, say_raw, use_color, write
+from composer.cli.support.terminal import as_json, lines, say, say_raw, use_color, write
 
 if TYPE_CHECKING:
     from composer.interfaces import Interface, Interfaces, Message

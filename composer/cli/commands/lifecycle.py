@@ -13,9 +13,8 @@ from composer.cli.commands.system_commands import add_system_commands
 from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, command_group, examples
-from composer.cli.support.results import as_json, say_none_found
 from composer.cli.support.ros import require_ros, ros_session
-from composer.cli.support.terminal import columns, lines, say, write
+from composer.cli.support.terminal import as_json, columns, lines, say, say_none_found, write
 from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:

@@ -8,9 +8,8 @@ import typer
 
 from composer.cli.support.completion import complete_node
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
-from composer.cli.support.results import as_json, say_none_found
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import columns, write
+from composer.cli.support.terminal import as_json, columns, say_none_found, write
 from composer.model import LogLevel
 
 EPILOG = examples(

@@ -191,7 +191,7 @@ def _local(run: Run) -> str:
 
 def _listed(runs: list[Run], *, json: bool) -> str:
     if json:
-        from composer.cli.support.results import as_json
+        from composer.cli.support.terminal import as_json
 
         content = [
             {
@@ -231,7 +231,7 @@ def _records(
 
 def _print(record: Record, *, json: bool) -> None:
     if json:
-        from composer.cli.support.results import as_json
+        from composer.cli.support.terminal import as_json
 
         write(as_json(record.content()))
         return

@@ -17,9 +17,8 @@ from composer.cli.support.options import (
     command_group,
     examples,
 )
-from composer.cli.support.results import as_json, say_none_found
 from composer.cli.support.ros import graph_names, require_ros, ros_session
-from composer.cli.support.terminal import columns, lines, write
+from composer.cli.support.terminal import as_json, columns, lines, say_none_found, write
 
 NodeName = Annotated[
     str,

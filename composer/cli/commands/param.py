@@ -21,9 +21,18 @@ from composer.cli.support.options import (
     command_group,
     examples,
 )
-from composer.cli.support.results import as_json, as_yaml, say_none_found
 from composer.cli.support.ros import require_ros, ros_session
-from composer.cli.support.terminal import columns, lines, say, say_raw, use_color, write
+from composer.cli.support.terminal import (
+    as_json,
+    as_yaml,
+    columns,
+    lines,
+    say,
+    say_none_found,
+    say_raw,
+    use_color,
+    write,
+)
 
 if TYPE_CHECKING:
     from composer.client.parameters import ParameterClient

@@ -11,10 +11,9 @@ import typer
 
 from composer.cli.support.errors import FAILED
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import require_ros, ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
-from composer.cli.support.terminal import columns, lines, write
+from composer.cli.support.terminal import as_json, columns, lines, write
 
 if TYPE_CHECKING:
     from composer.runtime.protocol.codec import OtherVersionError

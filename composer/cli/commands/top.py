@@ -16,10 +16,9 @@ import typer
 from composer.base.characters import escape_lines
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
-from composer.cli.support.terminal import write, write_raw
+from composer.cli.support.terminal import as_json, write, write_raw
 
 if TYPE_CHECKING:
     from composer.cli.support.callback_tables import SortKey

@@ -28,9 +28,8 @@ from composer.cli.support.options import (
     finite,
     yaml_or_stdin,
 )
-from composer.cli.support.results import as_json
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import lines, say, write
+from composer.cli.support.terminal import as_json, lines, say, write
 from composer.model.qos import PRESETS
 
 topic_app = command_group("List, inspect, measure and publish topics.")

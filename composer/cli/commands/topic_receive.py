@@ -12,14 +12,12 @@ import typer
 from composer.cli.support.completion import complete_topic
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, finite
-from composer.cli.support.results import as_json, as_yaml, truncated
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import say, write
+from composer.cli.support.terminal import as_json, as_yaml, say, truncated, write
 from composer.model.qos import PRESETS, Durability, QosProfile, Reliability
 
 if TYPE_CHECKING:
-    from composer.client.messages.rates import RateStatistics
-    from composer.client.messages.topics import TopicSubscription
+    from composer.client.messages.topics import RateStatistics, TopicSubscription
     from composer.language.expressions import Expression
 
 _REPORT_EVERY_S = 1.0
@@ -244,8 +242,7 @@ def hz(
     limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
     with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
         from composer.client.graph_names import full_name
-        from composer.client.messages.rates import RateWindow
-        from composer.client.messages.topics import Topics, TopicSubscription
+        from composer.client.messages.topics import RateWindow, Topics, TopicSubscription
         from composer.client.session import Deadline
 
         topics = Topics(session, deadline)

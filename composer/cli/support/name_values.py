@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.completion import silent
-from composer.cli.support.results import as_json
 from composer.cli.support.system_arguments import (
     complete_system,
     example_systems,
     path_exists,
     system_file,
 )
-from composer.cli.support.terminal import say, write
+from composer.cli.support.terminal import as_json, say, write
 
 if TYPE_CHECKING:
     from composer.language.expand.arguments import Declared

@@ -12,7 +12,7 @@ from composer.dashboard.feeds import Feed
 from composer.dashboard.observing.reports import ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
-from composer.runtime.metrics.message_rate import CountedRate
+from composer.runtime.metrics.figures import CountedRate
 
 if TYPE_CHECKING:
     from composer.dashboard.observing.diagrams import Diagram

@@ -15,7 +15,7 @@ from composer.dashboard.observing.topology import Topology
 from composer.dashboard.protocol.messages import RequestError
 from composer.model import PortKind
 from composer.model.qos import Durability, QosProfile, Reliability, strictest_compatible
-from composer.runtime.metrics.message_rate import MessageRate
+from composer.runtime.metrics.figures import MessageRate
 
 if TYPE_CHECKING:
     from composer.client.shared_session import Sample, SampledTopic, SharedSession

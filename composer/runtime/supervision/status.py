@@ -13,7 +13,7 @@ from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import SystemGoals, optional_nodes, start_goals
 from composer.runtime.clock.clock import COMPUTER, Clock
-from composer.runtime.metrics.message_rate import CountedRate
+from composer.runtime.metrics.figures import CountedRate
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 

@@ -14,8 +14,7 @@ from composer.base.characters import is_safe
 from composer.cli.commands import diff, doctor, nodes, ps
 from composer.cli.commands.topic import info_text
 from composer.cli.support.progress import Progress
-from composer.cli.support.results import as_json, as_yaml
-from composer.cli.support.terminal import columns, lines, say, write
+from composer.cli.support.terminal import as_json, as_yaml, columns, lines, say, write
 from composer.client.doctor import warning
 from composer.model import LogLevel
 from composer.plan.drift.drift import Drift, DriftKind

@@ -10,8 +10,7 @@ import yaml
 from composer.cli.commands.topic_receive import without_items
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
-from composer.cli.support.results import as_json, as_yaml, truncated
-from composer.cli.support.terminal import columns
+from composer.cli.support.terminal import as_json, as_yaml, columns, truncated
 from tests.cli.compose import compose
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.client.messages.rates import RateWindow
+from composer.client.messages.topics import RateWindow
 
 
 def test_rate_statistics() -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.metrics.message_rate import CountedRate, MessageRate
+from composer.runtime.metrics.figures import CountedRate, MessageRate
 
 
 @pytest.mark.parametrize(
