@@ -30,7 +30,7 @@ EVIL = "\x1b[2J\x07evil\u202e\r\n[FATAL] [compose] forged "
 HERE = Inventory("3.11", {"numpy": "2.0"}, {}, {"a.yaml": "00"})
 LONGEST = 700
 #: 500 a second and no longer than 2000 bytes, whatever is sent.
-MOST_LINES, LONGEST_LINE = 2000, 2100
+LINES_PER_S, LONGEST_LINE = 500, 2100
 
 
 def host(folder: Path, port: int) -> Host:
@@ -135,7 +135,7 @@ def test_lines_of_a_process(tmp_path: Path) -> None:
     async def run(other: Host, connection: Any) -> None:
         process = Process(Located("vision", SPAN), SPAN, host=other.name)
         item = RemoteProcess(process, other, ("/camera",))
-        coordinator = ("/bin/sh", "-c", "exec sleep 60", "--")
+        coordinator = ("/bin/sh", "-c", "exec sleep 600", "--")
         deployed: Deployment
 
         def write(text: str) -> None:
@@ -150,13 +150,15 @@ def test_lines_of_a_process(tmp_path: Path) -> None:
         deployed = Deployment([item], options)
         await deployed.run({"jetson": connection})
 
-    asyncio.run(asyncio.wait_for(serve(tmp_path, forged_lines, run), 30.0))
+    began_s = time.monotonic()
+    asyncio.run(asyncio.wait_for(serve(tmp_path, forged_lines, run), 100.0))
+    passed_s = time.monotonic() - began_s
     assert all(text.startswith("vision@jetson | ") for text in written)
     assert {logger for _, logger, _ in logged} == {"vision", "camera"}
     assert (LogLevel.INFO, "camera", "ready") in logged
     assert (LogLevel.INFO, "vision", "[compose] ready") not in logged
     assert any(message.startswith("[planner] ") for _, _, message in logged)
-    assert 0 < len(logged) < MOST_LINES
+    assert 0 < len(logged) < LINES_PER_S * (passed_s + 2.0)
     assert max(map(len, written)) < LONGEST_LINE
 
 
