@@ -57,11 +57,11 @@ run: $(READY)
 	@echo "==> compose run $(SYSTEM)    (Ctrl-C to stop)"
 	@exec $(PYTHON) tools/run_in_foreground.py $(BIN)/compose run $(SYSTEM)
 
-# Five workers for two CPUs: tests with ROS mostly wait. Tests of a file share fixtures, so they stay together.
+# Seven workers for two CPUs: tests with ROS mostly wait. Tests of a file share fixtures, so they stay together.
 # A dead worker fails the run: xdist would wait forever for its tests.
 test: $(READY) $(STAMPS)/dev
 	@echo "==> pytest"
-	@$(BIN)/python -m pytest --numprocesses 5 $(XDIST)
+	@$(BIN)/python -m pytest --numprocesses 7 $(XDIST)
 
 # The inner loop: half of the examples that hypothesis generates otherwise.
 test-fast: $(STAMPS)/composer $(STAMPS)/dev
@@ -135,7 +135,7 @@ test-wheel: $(READY) $(STAMPS)/dev
 	@rm -f $(STAMPS)/composer $(STAMPS)/dev
 	@rm -rf build/tree && mkdir -p build/tree
 	@git archive HEAD ':!composer' | tar -x -C build/tree
-	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 5 $(XDIST) \
+	@cd build/tree && $(abspath $(BIN))/python -m pytest --numprocesses 7 $(XDIST) \
 	  --ignore tests/packaging
 
 requirements: $(STAMPS)/tools

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
 import pytest
 
-from tests.packaging.installation import Installation, without_ros
+from tests.packaging.installation import ROOT, Installation, run_step, without_ros
 
 HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
 PIP = ("-m", "pip", "--disable-pip-version-check")
 
 
@@ -23,23 +21,21 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.timeout(300))
 
 
-def _pip(python: Path | str, *arguments: str | Path) -> None:
-    subprocess.run([python, *PIP, *arguments], env=without_ros(), check=True)
-
-
 @pytest.fixture(scope="session")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built wheel."""
     folder = tmp_path_factory.mktemp("wheel")
-    _pip(sys.executable, "wheel", "-qq", "--no-deps", "--wheel-dir", folder, ROOT)
+    command = [sys.executable, *PIP, "wheel", "-qq", "--no-deps", "--wheel-dir", folder, ROOT]
+    subprocess.run(command, env=without_ros(), check=True)
     (path,) = folder.glob("*.whl")
     return path
 
 
 @pytest.fixture(scope="session")
 def installation(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
-    """An environment with the wheel and its dependencies."""
-    environment = tmp_path_factory.mktemp("environment")
-    venv.create(environment, symlinks=True)
-    _pip(sys.executable, "--python", environment, "install", "-qq", wheel)
-    return Installation(environment, tmp_path_factory.mktemp("elsewhere"))
+    """The environment that the GitHub action makes, with the wheel and its dependencies."""
+    folder = tmp_path_factory.mktemp("runner")
+    places = {"RUNNER_TEMP": str(folder), "GITHUB_ACTION_PATH": str(wheel)}
+    done = run_step("Install compose", ROOT, PYTHON=sys.executable, **places)
+    assert done.returncode == 0, done.stderr
+    return Installation(folder / "compose", tmp_path_factory.mktemp("elsewhere"))

@@ -7,7 +7,15 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import yaml
+
+ROOT = Path(__file__).parents[2]
+ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+STEPS: list[dict[str, Any]] = ACTION["runs"]["steps"]
+#: The command with which GitHub starts the shell 'bash' of a step.
+BASH = ("bash", "--noprofile", "--norc", "-eo", "pipefail", "-c")
 # Set by the ros wheels of this Python, and valid for this Python only.
 WHEEL_VARIABLES = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
 ROS_VARIABLES = ("AMENT_PREFIX_PATH", "PYTHONPATH")
@@ -29,12 +37,31 @@ def with_this_ros() -> dict[str, str]:
     return dict(os.environ) | {"PYTHONPATH": os.pathsep.join(sites)}
 
 
+def run_step(name: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a step of the GitHub action in ``folder``, as on a runner."""
+    (step,) = [step for step in STEPS if step.get("name") == name]
+    given = {key: variables.get(key, "") for key in step["env"]}
+    return subprocess.run(
+        [*BASH, step["run"]],
+        cwd=folder,
+        env=without_ros() | {"GITHUB_ACTIONS": "true"} | variables | given,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Installation:
     """A virtual environment with the wheel, and a working directory outside the project."""
 
     environment: Path
     elsewhere: Path
+
+    @property
+    def runner_temp(self) -> str:
+        """The folder of the environment, for the steps of the action."""
+        return str(self.environment.parent)
 
     @property
     def package(self) -> Path:

@@ -57,7 +57,7 @@ def test_topics() -> None:
     assert set(expected) <= set(names)
     assert not any("_action" in name for name in names)
     hidden = ("/lab/navigate/_action/feedback",)
-    assert hidden[0] in listed(hidden, "topic", "list", "--all")
+    listed(hidden, "topic", "list", "--all")
     found = json.loads(listed(expected, "topic", "list", "--json"))
     types = {item["name"]: item["types"] for item in found}
     assert types["/lab/count"] == ["std_msgs/msg/Int32"]
@@ -87,8 +87,8 @@ def test_topic_info() -> None:
         }
     ]
     one, kept = "Publisher count: 1\n", "durability: transient_local"
-    assert one in listed((one,), "topic", "info", "lab/text")
-    assert kept in listed((kept,), "topic", "info", "-v", "/lab/text")
+    listed((one,), "topic", "info", "lab/text")
+    listed((kept,), "topic", "info", "-v", "/lab/text")
 
 
 def test_echo_receives_from_a_best_effort_publisher() -> None:
@@ -114,7 +114,6 @@ def test_echo_filters_by_an_expression() -> None:
     expect_error("has no field 'x'", *unknown)
     wrong = ("topic", "echo", "/lab/count", "--filter", "message.data >")
     done = repeated(lambda done: done.returncode == 2, *wrong)
-    assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("compose: --filter: ")
 
 
@@ -210,10 +209,10 @@ def plain_subscription() -> Iterator[list[tuple[float, int]]]:
 
 def test_hz_prints_text() -> None:
     rate = "average rate: "
-    assert rate in listed((rate,), "topic", "hz", "/lab/count", "--count", "10")
+    listed((rate,), "topic", "hz", "/lab/count", "--count", "10")
     too_few = "too few messages on '/lab/count' to measure them yet"
     two = ("topic", "hz", "/lab/count", "--count", "2")
-    assert too_few in repeated(lambda done: too_few in done.stderr, *two).stderr
+    repeated(lambda done: too_few in done.stderr, *two)
 
 
 def test_measurements_can_be_filtered_and_time_out() -> None:
@@ -240,7 +239,7 @@ def test_published_messages_arrive() -> None:
     )
     # There is a warning if the talker does not acknowledge the messages within a second.
     done = repeated(lambda done: done.stderr == expected, *twice)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", expected)
+    assert (done.returncode, done.stdout) == (0, "")
     last = "number 1\n---\n"  # the talker may still publish the one before
     echo = ("topic", "echo", "/lab/received", "--once", "--field", "data")
     assert listed((last,), *echo) == last

@@ -41,11 +41,9 @@ def differences(done: subprocess.CompletedProcess[str]) -> list[str]:
 def compared(expected: list[str], *arguments: object) -> subprocess.CompletedProcess[str]:
     """Compare until these are the differences; a process may be discovered or respond late."""
     code = 1 if expected else 0
-    done = repeated(
+    return repeated(
         lambda done: (done.returncode, differences(done)) == (code, expected), "diff", *arguments
     )
-    assert (done.returncode, differences(done)) == (code, expected), done.stderr
-    return done
 
 
 def set_velocity(value: float) -> None:

@@ -219,7 +219,7 @@ def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> Non
     set_fault("configure")
     refusal = refused("lifecycle", "restart", "planner")
     assert "/fleet/planner: the restart failed: /fleet/planner: configure failed: " in refusal
-    assert "no map" in listed(("no map",), "logs", "planner", "--level", "error")
+    listed(("no map",), "logs", "planner", "--level", "error")
     expect_error("did you mean '/fleet/planner'?", "lifecycle", "restart", "planer")
     assert "no line of" not in output_of("logs", "-n", 3, "motor", "--since", "10m")
 
@@ -277,8 +277,7 @@ def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> No
     try:
         refusal = refused("lifecycle", "pause", "robot", "--timeout", 1.5)
         assert f"its process is {robot.pid}" in refusal
-        silent = "no response, its process may be busy or gone"
-        assert silent in listed((silent,), "ps")
+        listed(("no response, its process may be busy or gone",), "ps")
         silent = "system '/fleet/robot' does not respond, so its nodes are not known"
         queries = (("nodes",), ("get", "planner"), ("set", "/fleet/*", "cleanup"))
         for refusal in expect_errors(*((silent, "lifecycle", *words) for words in queries)):

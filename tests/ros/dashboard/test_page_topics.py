@@ -219,7 +219,7 @@ def test_a_request_with_lists_and_ranges(view: Page) -> None:
     form.locator(field("double_value")).fill("2.5")
     form.get_by_text("Call").click()
     expect_text(detail(view).locator(".message"), "successful.*true")
-    assert "2.5" in listed(("2.5",), "param", "get", "/lab/talker", "speed")
+    listed(("2.5",), "param", "get", "/lab/talker", "speed")
     form.locator(field("double_value")).fill("5.5")
     form.get_by_text("Call").click()
     expect_text(detail(view).locator(".message"), "successful.*false.*reason.*range")

@@ -87,3 +87,13 @@ def split(
 
 def states(system: RunningSystem) -> set[str]:
     return {system.node(name).state for name in ("camera", "detector", "arm")}
+
+
+def pid_of(system: RunningSystem, node: str) -> int:
+    pid = system.node(node).pid
+    assert pid is not None
+    return int(pid)
+
+
+def alive(pid: int) -> bool:
+    return Path("/proc", str(pid)).exists()

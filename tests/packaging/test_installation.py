@@ -1,7 +1,9 @@
-"""The wheel, installed with and without ROS."""
+"""The wheel, installed by the GitHub action, with and without ROS; the steps of the action."""
 
 from __future__ import annotations
 
+import json
+import sys
 import zipfile
 from importlib.metadata import version
 from pathlib import Path
@@ -9,7 +11,15 @@ from pathlib import Path
 import pytest
 
 from composer.bridges.export.container_image import wheel as composer_wheel
-from tests.packaging.installation import Installation, with_this_ros, without_ros
+from tests.packaging.installation import (
+    ACTION,
+    ROOT,
+    STEPS,
+    Installation,
+    run_step,
+    with_this_ros,
+    without_ros,
+)
 
 
 def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
@@ -90,3 +100,67 @@ def test_the_installed_package_is_imported(installation: Installation) -> None:
     done = installation.run("python", "-c", where, variables=with_this_ros())
 
     assert Path(done.stdout.strip()).is_relative_to(installation.package), done.stderr
+
+
+def test_it_uses_official_actions_and_no_inputs_in_scripts() -> None:
+    assert ACTION["runs"]["using"] == "composite"
+    for step in STEPS:
+        assert step.get("uses", "actions/").startswith("actions/")
+        assert "${{" not in step.get("run", "")
+        assert ("run" in step) == (step.get("shell") == "bash")
+    text = json.dumps(STEPS)
+    assert all(f"inputs.{name}" in text for name in ACTION["inputs"])
+
+
+def test_a_clean_project_passes(installation: Installation) -> None:
+    done = run_step(
+        "Validate",
+        ROOT,
+        RUNNER_TEMP=installation.runner_temp,
+        PATHS="systems\nnodes",
+        OPTIONS="--strict",
+    )
+    assert (done.returncode, done.stdout) == (0, "")
+
+
+def test_diagnostics_are_annotations_and_sarif(installation: Installation, tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {type: rely}}\n")
+    done = run_step(
+        "Validate",
+        tmp_path,
+        RUNNER_TEMP=installation.runner_temp,
+        PATHS=".",
+        SARIF_FILE="out.sarif",
+    )
+    assert done.returncode == 1
+    assert done.stdout.startswith("::error file=a.yaml,line=2,")
+    (result,) = json.loads((tmp_path / "out.sarif").read_text())["runs"][0]["results"]
+    assert result["ruleId"] == "RC201"
+
+
+def test_an_invalid_option_exits_with_status_2(installation: Installation) -> None:
+    for sarif_file in ("", "out.sarif"):
+        done = run_step(
+            "Validate",
+            installation.elsewhere,
+            RUNNER_TEMP=installation.runner_temp,
+            PATHS=str(ROOT / "systems"),
+            OPTIONS="--no-such-option",
+            SARIF_FILE=sarif_file,
+        )
+        assert done.returncode == 2
+
+
+@pytest.mark.ros
+def test_scenarios_are_run(tmp_path: Path) -> None:
+    (tmp_path / "temp").mkdir()
+    (tmp_path / "temp" / "compose").symlink_to(sys.prefix)
+    (tmp_path / "s.yaml").write_text("system: s\nnodes: {a: {on_activate: {log: up}}}\n")
+    text = "scenario: a\nsystem: s.yaml\nfor_s: 1\nexpect: [{log: down}]\n"
+    (tmp_path / "a.yaml").write_text(text)
+    done = run_step(
+        "Test", tmp_path, RUNNER_TEMP="temp", SCENARIOS="a.yaml", JUNIT_FILE="out/my results.xml"
+    )
+    assert done.returncode == 1
+    assert "expected: a line 'down' in the log" in done.stdout
+    assert (tmp_path / "out" / "my results.xml").exists()
