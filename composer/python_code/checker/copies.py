@@ -18,7 +18,15 @@ from composer.python_code.checker.file_sets import ClassEdit
 from composer.python_code.nodes import Signature
 from composer.python_code.stubs.messages import interface_modules
 from composer.python_code.syntax import Module
-from composer.python_code.trees import Function, characters, dotted, is_none, positional_arguments
+from composer.python_code.trees import (
+    Function,
+    characters,
+    dotted,
+    is_none,
+    positional_arguments,
+    public_module,
+    walk,
+)
 
 #: The line that a copy gets, so that annotations can name what they need.
 _IMPORTS = (
@@ -55,6 +63,7 @@ class Copy:
 def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool) -> Copy:
     """Return the copy of a file. ``classes`` are its classes with a known surrounding."""
     edits = _Edits(list(module.source.text.split("\n")))
+    edits.import_interfaces(module.tree)
     names: set[str] = set()
     for class_ in module.classes.values():
         edits.remove_unset_attributes(class_.node, stays_none=is_behavior)
@@ -88,6 +97,16 @@ class _Edits:
     lines: list[str]
     insertions: list[tuple[int, int, str]] = field(default_factory=list)
     added: list[tuple[int, str]] = field(default_factory=list)  # lines, after a number of lines
+
+    def import_interfaces(self, tree: ast.Module) -> None:
+        """Import interfaces from modules that have stubs: see ``public_module``."""
+        for node in walk(tree.body, closed=(ast.expr,)):
+            if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                public = public_module(node.module)
+                if public != node.module:
+                    line = self.lines[node.lineno - 1]
+                    name = public.ljust(len(node.module))
+                    self.lines[node.lineno - 1] = line.replace(node.module, name, 1)
 
     def remove_unset_attributes(self, node: ast.ClassDef, *, stays_none: bool) -> None:
         """Remove ``self.last = None`` from the constructor if another method sets a value.

@@ -28,7 +28,7 @@ from composer.python_code.stubs.behaviors import (
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
 from composer.python_code.syntax import Module
-from composer.python_code.trees import walk
+from composer.python_code.trees import public_module, walk
 from composer.typed import SUFFIX
 
 _FILES = "files"
@@ -212,7 +212,7 @@ def _imports(tree: ast.Module) -> Iterator[tuple[str, str]]:
         if isinstance(node, ast.Import):
             yield from ((item.name, "") for item in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            yield from ((node.module, item.name) for item in node.names)
+            yield from ((public_module(node.module), item.name) for item in node.names)
 
 
 def _whole(name: str) -> str:
