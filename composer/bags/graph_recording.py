@@ -15,6 +15,7 @@ from composer.client.session import Session
 from composer.interfaces import Interfaces
 from composer.model.names import is_hidden
 from composer.model.qos import QosProfile, incompatibilities, strictest_compatible
+from composer.model.recording import owner_of_topic
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.ros_graph.endpoints import TopicInfo
 
@@ -49,7 +50,7 @@ class GraphRecording:
     def update(self) -> None:
         """Subscribe to new topics, and again where a publisher does not match."""
         for name, types in self._session.graph.topics():
-            if is_hidden(name) or name in self._refused:
+            if is_hidden(owner_of_topic(name)[1]) or name in self._refused:
                 continue
             info = self._session.graph.topic(name, types)
             if info.publishers and self._is_wanted(info):
@@ -77,7 +78,8 @@ class GraphRecording:
             self._refuse(info.name, str(error))
             return
         definition = full_definition(types[0], self._interfaces)
-        type_hash = info.publishers[0].type_hash
+        # With the hash of a service event, the library rosbags cannot open the bag.
+        type_hash = "" if "/srv/" in types[0] else info.publishers[0].type_hash
         topic = BagTopic(info.name, types[0], offers, definition, type_hash=type_hash)
         put = self._recorder.source(topic).put
         profile = strictest_compatible(list(offers), _DEPTH)

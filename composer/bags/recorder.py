@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from itertools import count
 from math import inf
 from operator import itemgetter
 from typing import Any, Protocol
@@ -43,15 +44,26 @@ class Source:
     ``dropped`` counts those that came faster than they were written.
     """
 
-    __slots__ = ("_on_full", "_queue", "_time_ns", "dropped", "limit", "topic")
+    __slots__ = ("_number", "_on_full", "_queue", "_time_ns", "dropped", "limit", "topic")
 
-    def __init__(self, topic: str, time_ns: Callable[[], int], on_full: Callable[[], bool]) -> None:
-        """``on_full()`` may make room, and returns whether it has."""
+    def __init__(
+        self,
+        topic: str,
+        time_ns: Callable[[], int],
+        number: Callable[[], int],
+        on_full: Callable[[], bool],
+    ) -> None:
+        """Receive the messages of a topic.
+
+        ``number()`` counts those of all sources: in virtual time, many have the same time.
+        ``on_full()`` may make room, and returns whether it has.
+        """
         self.topic = topic
         self.dropped = 0
         self.limit = _LONGEST_QUEUE
-        self._queue: deque[tuple[int, Any]] = deque()
+        self._queue: deque[tuple[int, int, Any]] = deque()
         self._time_ns = time_ns
+        self._number = number
         self._on_full = on_full
 
     def put(self, message: Any) -> None:
@@ -59,13 +71,12 @@ class Source:
         if len(self._queue) >= self.limit and not self._on_full():
             self.dropped += 1
             return
-        self._queue.append((self._time_ns(), message))
+        self._queue.append((self._time_ns(), self._number(), message))
 
-    def taken(self) -> list[tuple[int, str, Any]]:
-        """Take what was put so far: the time, the topic and the message."""
+    def taken(self) -> list[tuple[int, int, Any, str]]:
+        """Take what was put so far: the time, the number, the message, and the topic."""
         queue = self._queue
-        items = [queue.popleft() for _ in range(len(queue))]
-        return [(at_ns, self.topic, message) for at_ns, message in items]
+        return [(*queue.popleft(), self.topic) for _ in range(len(queue))]
 
     def note_size(self, size_bytes: int) -> None:
         """Limit the queue, given the size of a message."""
@@ -84,6 +95,7 @@ class Recorder:
         self._sink = sink
         self._clock = clock
         self._sources: dict[str, Source] = {}
+        self._numbers = count()
         self._lock = threading.RLock()
         self._calls: deque[tuple[float, Callable[[], None]]] = deque()
         self._ended = threading.Event()
@@ -117,7 +129,8 @@ class Recorder:
         with self._lock:
             self._sink.add_topic(topic)
             if topic.name not in self._sources:
-                source = Source(topic.name, self._clock.time_ns, self._make_room)
+                number = self._numbers.__next__
+                source = Source(topic.name, self._clock.time_ns, number, self._make_room)
                 self._sources[topic.name] = source
             return self._sources[topic.name]
 
@@ -146,9 +159,9 @@ class Recorder:
             messages = [item for source in self._sources.values() for item in source.taken()]
             if self.problem is not None:
                 return
-            messages.sort(key=itemgetter(0))
+            messages.sort(key=itemgetter(0, 1))
             try:
-                for at_ns, topic, content in messages:
+                for at_ns, _, content, topic in messages:
                     self._write(at_ns, topic, content)
                 self._sink.flush_if_due()
             except BagError as error:

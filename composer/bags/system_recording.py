@@ -8,22 +8,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import strftime
-from typing import Any
 
 from composer import version
 from composer.bags.bag import Attachment, BagError, BagTopic
 from composer.bags.definitions import full_definition
-from composer.bags.recorder import Recorder
+from composer.bags.recorder import Recorder, Source
 from composer.bags.ring import Ring
 from composer.bags.writer import BagWriter, split_limits
-from composer.base.diagnostics import suggestion
 from composer.interfaces import Interfaces
-from composer.model import Isolation, Port, System
-from composer.model.names import matches_wildcard
-from composer.model.system import Recording
+from composer.model import System
+from composer.model.qos import QosProfile
+from composer.model.recording import Recording
 from composer.runtime.clock.clock import Clock
-from composer.runtime.intra_process.topic import CopyingTarget
-from composer.runtime.supervision.events import BroughtUp, Event, NodeFailed
+from composer.runtime.supervision.events import Event, NodeFailed
 
 #: The attachment with facts, and the time at which the process of the system began to start.
 FACTS, STARTED = "recording.json", "started_ns"
@@ -74,7 +71,6 @@ class SystemRecording:
         self._say = say
         self._interfaces = Interfaces.installed()
         self._faults: list[str] = []
-        self._published: set[str] = set()
         self._ring: Ring | None = None
         self._writer: BagWriter | None = None
         if recording.ring_s is None:
@@ -107,16 +103,12 @@ class SystemRecording:
         elif dropped:
             self._say(f"the flight recorder has lost messages: {recorder.dropped}")
 
-    def target(self, port: Port) -> Any:
-        """Return what receives the messages of a publisher; None if its topic is not recorded."""
-        self._published.add(port.full_name)
-        if not self._settings.includes(port.full_name):
+    def tap(self, topic: str, type_name: str, profile: QosProfile) -> Source | None:
+        """Return what receives the messages of a topic; None if it is not recorded."""
+        if not self._settings.includes(topic):
             return None
-        type_name = port.interface.value
         definition = full_definition(type_name, self._interfaces)
-        topic = BagTopic(port.full_name, type_name, (port.qos.profile,), definition)
-        source = self._recorder.source(topic)
-        return CopyingTarget(source) if port.isolation is Isolation.COPY else source
+        return self._recorder.source(BagTopic(topic, type_name, (profile,), definition))
 
     def save(self, done: Callable[[bool, str], None]) -> None:
         """Write the last seconds; ``done`` receives whether that succeeded, and the folder or why.
@@ -126,24 +118,12 @@ class SystemRecording:
         self._recorder.call_later(0.0, lambda: done(*self._save("requested")))
 
     def on_event(self, event: Event) -> None:
-        """Write the last seconds soon if a node has failed; once for faults that come together.
-
-        After the bring-up, say which patterns match no topic.
-        """
-        if isinstance(event, BroughtUp):
-            self._check_topics()
+        """Write the last seconds soon if a node has failed; once for faults that come together."""
         if self._ring is None or not isinstance(event, NodeFailed):
             return
         if not self._faults:
             self._recorder.call_later(_AFTER_FAULT_S, self._save_faults)
         self._faults.append(str(event))
-
-    def _check_topics(self) -> None:
-        for pattern in self._settings.topics:
-            if not any(matches_wildcard(pattern.value, name) for name in self._published):
-                hint = suggestion(pattern.value, self._published)
-                text = f"no node of this process publishes '{pattern}', which 'recording' lists"
-                self._say(f"warning: {text}" if hint is None else f"warning: {text}; {hint}")
 
     def _save_faults(self) -> None:
         faults, self._faults = self._faults, []

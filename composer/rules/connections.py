@@ -7,11 +7,19 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from composer.base.diagnostics import Diagnostic, Label, Rule, error, info, warning
+from composer.base.diagnostics import (
+    Diagnostic,
+    Label,
+    Rule,
+    error,
+    info,
+    suggestion,
+    warning,
+)
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
-from composer.model import ChannelKind, PortKind, PortOfNode
-from composer.model.names import join
+from composer.model import ChannelKind, PortKind, PortOfNode, channels
+from composer.model.names import join, matches_wildcard
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.formatting import port_name
 from composer.rules.analysis.subjects import earlier_errors, wiring
@@ -41,6 +49,7 @@ COUNTERPARTS = {_SOURCES[kind]: _SINKS[kind] for kind in ChannelKind} | {
     _SINKS[kind]: _SOURCES[kind] for kind in ChannelKind
 }
 
+_OUTSIDE = "record what other programs publish by 'compose record'"
 #: Maximum number of similar names to consider, because the port's own name is among them.
 _MAXIMUM_CANDIDATES = 5
 #: For a kind of port and an interface: the names of such ports, each with their nodes.
@@ -223,6 +232,38 @@ def check_subscription_without_publisher(context: Context) -> Iterator[Diagnosti
             )
             hint = nearest_channel(context, endpoint) or external_hint(endpoint)
             yield _unconnected(SUBSCRIPTION_WITHOUT_PUBLISHER, endpoint, message, hint)
+
+
+def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
+    """Check that nodes in the processes of the system send what ``recording`` names."""
+    system = context.system
+    recording = system.recording
+    nodes = [node for node in system.nodes if node.implementation.in_process]
+    if recording is None or not _is_fully_known(context):
+        return
+    if any(node.hosted_class is not None for node in nodes):
+        return  # a class may create ports that YAML does not declare
+    used = channels(nodes, with_transforms=True)
+    names = {kind: [item.name for item in used if item.kind is kind] for kind in ChannelKind}
+    topics = [item.name for item in used if item.kind is ChannelKind.TOPIC and item.sources]
+    topics += ["/rosout", "/parameter_events"]
+    topics += [f"{node.full_name}/transition_event" for node in nodes]
+    for kind, rule, verb, known in (
+        ("topics", SUBSCRIPTION_WITHOUT_PUBLISHER, "publishes", topics),
+        ("services", CLIENT_WITHOUT_SERVER, "provides or calls", names[ChannelKind.SERVICE]),
+        ("actions", CLIENT_WITHOUT_SERVER, "provides", names[ChannelKind.ACTION]),
+    ):
+        for pattern in recording.patterns[kind]:
+            text = pattern.value
+            if is_unresolved(text) or any(matches_wildcard(text, name) for name in known):
+                continue
+            is_outside = any(matches_wildcard(text, item.name) for item in context.channels)
+            yield Diagnostic(
+                rule,
+                f"no node in a process of this system {verb} '{text}', which 'recording' lists",
+                pattern.span,
+                hint=_OUTSIDE if is_outside else suggestion(text, known),
+            )
 
 
 def check_publisher_without_subscription(context: Context) -> Iterator[Diagnostic]:

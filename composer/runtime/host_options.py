@@ -8,23 +8,24 @@ from typing import Any, Protocol, TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, Port, Process
+from composer.model.qos import QosProfile
 from composer.runtime.clock.clock import COMPUTER, Clock
 
 R = TypeVar("R")
 
 
 class Tap(Protocol):
-    """Receives what a publisher publishes."""
+    """Receives the messages of a topic."""
 
     def put(self, message: Any) -> None:
         """Receive a message, from any thread. It must not wait."""
 
 
 class Recorder(Protocol):
-    """Receives what the nodes in the process publish."""
+    """Receives what the nodes in the process send: messages, calls, transitions, the log."""
 
-    def target(self, port: Port) -> Tap | None:
-        """Return what receives the messages of a publisher, if anything does."""
+    def tap(self, topic: str, type_name: str, profile: QosProfile) -> Tap | None:
+        """Return what receives the messages of a topic; None if it is not recorded."""
 
     def save(self, done: Callable[[bool, str], None]) -> None:
         """Write the last seconds; ``done`` receives whether that succeeded, and where or why."""
@@ -64,7 +65,7 @@ class HostOptions:
     requires it. ``on_alive()`` is called every second. Times of events count from ``started_at_s``,
     by ``clock``; by default, from when the host is created. ``clock`` is the clock of the system.
     With ``seed``, which is 0 by default in virtual time, random numbers are the same in each run.
-    ``instruments`` belong to a test. ``recorder`` receives what is published.
+    ``instruments`` belong to a test. ``recorder`` receives what nodes send.
     """
 
     run_for_s: float | None = None

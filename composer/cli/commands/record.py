@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +14,6 @@ from composer.cli.support.bags import (
     SplitS,
     Topics,
     bag_errors,
-    matches,
     show_progress,
 )
 from composer.cli.support.errors import CommandError, UsageError
@@ -54,6 +53,24 @@ def record(
         ),
     ] = None,
     topics: Topics = None,
+    services: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--services",
+            metavar="PATTERN",
+            help="Services with this full name, if their nodes publish service events. Repeatable.",
+            show_default="all",
+        ),
+    ] = None,
+    actions: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--actions",
+            metavar="PATTERN",
+            help="Actions with this full name: feedback and states of goals. Repeatable.",
+            show_default="all",
+        ),
+    ] = None,
     run_for: Annotated[
         float | None,
         typer.Option(
@@ -75,15 +92,19 @@ def record(
 ) -> None:
     """Record topics in a bag.
 
-    A bag is a folder with MCAP files, which rosbag2 and Foxglove read as well. Without SYSTEM, all
-    topics are recorded. Subscriptions have a QoS profile that matches all publishers, and latched
-    messages are included. Topics that appear later are added.
+    A bag is a folder with MCAP files, which rosbag2 and Foxglove read as well. Without SYSTEM,
+    topics of all nodes are recorded. Subscriptions have a QoS profile that matches all publishers,
+    and latched messages are included. Topics that appear later are added.
+
+    Without --topics, --services and --actions, everything is recorded; with one of them, only what
+    they select.
 
     The 'recording' of a system, and 'compose run --record', record from inside of its process, at
     less cost.
     """
     if now:
-        if system is None or output is not None or topics or run_for is not None:
+        others = (topics, services, actions, output, run_for, split_mb, split_s)
+        if system is None or any(item is not None for item in others):
             raise UsageError("--now takes a running system, and no other option")
         _save(system, timeout)
         return
@@ -98,7 +119,9 @@ def record(
         from composer.bags.writer import BagWriter, split_limits
         from composer.client.session import Deadline
 
-        is_wanted = _chosen(session, deadline, system, topics)
+        patterns = {"topics": topics, "services": services, "actions": actions}
+        chosen = {kind: found or [] for kind, found in patterns.items()}
+        is_wanted = _chosen(session, deadline, system, chosen)
         folder = output or new_folder(Path(), "recording" if system is None else system)
         writer = BagWriter(folder, split_limits(split_mb, split_s), attachments(None))
         until = Deadline(float("inf") if run_for is None else run_for)
@@ -119,11 +142,13 @@ def _save(system: str, timeout_s: float) -> None:
 
 
 def _chosen(
-    session: Session, deadline: Deadline, system: str | None, topics: list[str] | None
+    session: Session, deadline: Deadline, system: str | None, patterns: Mapping[str, list[str]]
 ) -> Callable[[TopicInfo], bool]:
     """Return which topics to record. Raises RosError if there is no such system."""
+    from composer.model.recording import is_chosen
+
     if system is None:
-        return lambda info: matches(info.name, topics)
+        return lambda info: is_chosen(info.name, patterns)
     from composer.client.systems.managers import Systems
 
     systems = Systems(session, deadline)
@@ -131,7 +156,7 @@ def _chosen(
     nodes = {node.node for node in report.nodes}
     systems.close()
     return lambda info: (
-        matches(info.name, topics) and any(end.node in nodes for end in info.publishers)
+        is_chosen(info.name, patterns) and any(end.node in nodes for end in info.publishers)
     )
 
 

@@ -23,7 +23,7 @@ from composer.language.tree_values import (
 )
 from composer.model import Host, Process
 from composer.model.discovery import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
-from composer.model.system import Recording
+from composer.model.recording import Recording
 
 
 def read_processes(tree: Tree | None) -> tuple[Process, ...]:
@@ -104,6 +104,8 @@ def read_recording(entry: Entry | None) -> Recording | None:
     return Recording(
         folder=value_or(text(tree.get("folder")), "bags"),
         topics=texts(tree.get("topics")),
+        services=texts(tree.get("services")),
+        actions=texts(tree.get("actions")),
         exclude=texts(tree.get("exclude")),
         ring_s=value_or(number(tree.get("ring_s")), None),
         split_mb=value_or(number(tree.get("split_mb")), None),

@@ -12,26 +12,25 @@ from types import FrameType
 from typing import TypeAlias
 
 from rcl_interfaces.msg import Log as LogMessage
-from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import set_logger_level
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from composer.model import SEVERITIES, LogLevel
+from composer.model.qos import Durability, QosProfile
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.stacks import is_internal
 from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
+from composer.runtime.host_options import Recorder
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.ros.qos_profiles import rclpy_profile
 
 #: As rcl_qos_profile_rosout_default: a late joiner gets the last ten seconds.
-_ROSOUT_QOS = QoSProfile(
-    depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
-)
+_ROSOUT_QOS = QosProfile(depth=1000, durability=Durability.TRANSIENT_LOCAL, lifespan_ms=10_000.0)
 #: The levels of all loggers of the process are kept by rcutils, as for any ROS node.
 _is_enabled = rclpy_implementation.rclpy_logging_logger_is_enabled_for
 #: Raised if the node or its rclpy context has been destroyed.
@@ -67,15 +66,24 @@ class Log:
     also searches the stack for its caller at every call, which takes longer than the rest.
     """
 
-    def __init__(self, node: Node, write: Write, *, rosout: bool = True) -> None:
+    def __init__(
+        self, node: Node, write: Write, *, rosout: bool = True, recorder: Recorder | None = None
+    ) -> None:
         """Log messages at the level of the node's logger. ``node`` must not have rcl's publisher.
 
-        Without ``rosout``, to the console only.
+        Without ``rosout``, to the console and to the ``recorder`` only.
         """
         self._name = logger_name(node.get_fully_qualified_name())
         self._write = write
         self._clock = node.get_clock()
-        self._rosout = node.create_publisher(LogMessage, "/rosout", _ROSOUT_QOS) if rosout else None
+        #: What receives the lines as messages.
+        self._receivers: list[Callable[[LogMessage], None]] = []
+        if rosout:
+            profile = rclpy_profile(_ROSOUT_QOS)
+            self._receivers.append(node.create_publisher(LogMessage, "/rosout", profile).publish)
+        if recorder is not None:
+            tap = recorder.tap("/rosout", "rcl_interfaces/msg/Log", _ROSOUT_QOS)
+            self._receivers += [] if tap is None else [tap.put]
 
     def is_enabled_for(self, level: LogLevel) -> bool:
         """Return whether messages at ``level`` are logged."""
@@ -100,7 +108,7 @@ class Log:
         name = name or self._name
         text = printable(message)
         self._write(level, name, text)
-        if self._rosout is None:
+        if not self._receivers:
             return
         with suppress(*_DESTROYED):
             line = LogMessage(
@@ -109,7 +117,8 @@ class Log:
             if caller is not None and not is_internal(caller.f_code.co_filename):
                 line.file, line.line = caller.f_code.co_filename, caller.f_lineno
                 line.function = caller.f_code.co_name
-            self._rosout.publish(line)
+            for receive in self._receivers:
+                receive(line)
 
     def debug(self, message: str) -> None:
         """Log details for debugging."""

@@ -22,6 +22,7 @@ from composer.runtime.intra_process.ignore_local_publications import (
 )
 from composer.runtime.intra_process.publisher import GatedPublisher, PublisherContext
 from composer.runtime.intra_process.servers import LocalActionServer, LocalService
+from composer.runtime.intra_process.taps import tap_of
 from composer.runtime.intra_process.time_limits import Leases, Receiver
 from composer.runtime.intra_process.topic import (
     LocalSubscription,
@@ -124,11 +125,11 @@ class LocalRouter:
     ) -> None:
         """``shared`` has the channels with ports at both endpoints, and why they need DDS, if any.
 
-        ``instruments`` belong to a test; ``recorder`` receives what is published. rclpy must be
+        ``instruments`` belong to a test; ``recorder`` receives what nodes send. rclpy must be
         initialized.
         """
         self._instruments = instruments
-        self._recorder = recorder
+        self.recorder = recorder
         self._dds_reasons = dict(shared)
         #: Why eligible topics use DDS nevertheless; None if they do not.
         self.refusal: str | None = None
@@ -156,7 +157,8 @@ class LocalRouter:
         self, port: Port, publisher: Publisher, context: PublisherContext
     ) -> tuple[GatedPublisher, Remove]:
         """Return the publisher that a node uses for the port, and a function that removes it."""
-        tap = None if self._recorder is None else self._recorder.target(port)
+        type_name, profile = port.interface.value, port.qos.profile
+        tap = tap_of(self.recorder, port, port.full_name, type_name, profile)
         if tap is not None:
             context = replace(context, observers=(*context.observers, tap))
         topic = self._topics.get(channel_of(port))

@@ -13,7 +13,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
-from lifecycle_msgs.msg import State, Transition, TransitionDescription
+from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -24,6 +24,7 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from composer.behavior import TransitionFailed
 from composer.model.lifecycle import TRANSITIONS
+from composer.model.qos import QosProfile
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.exceptions import (
     describe,
@@ -35,6 +36,7 @@ from composer.runtime.executors.exceptions import (
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.tasks import within
+from composer.runtime.host_options import Tap
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
@@ -90,6 +92,11 @@ class Lifecycle:
         self._last_state = ""
         self._repeats = RepeatLimit(loop.clock)
         self._pending_reply: list[Reply] = []  # of the change_state request for it, if any
+        self._tap: Tap | None = None
+        if context.router.recorder is not None:
+            topic = f"{node.get_fully_qualified_name()}/transition_event"
+            type_name = "lifecycle_msgs/msg/TransitionEvent"
+            self._tap = context.router.recorder.tap(topic, type_name, QosProfile(depth=10))
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
         self._services: list[Service] = []
@@ -201,23 +208,42 @@ class Lifecycle:
         transition_id = self.available.get(transition)
         if transition_id is None:
             return self._refuse(transition, f"the node is {start}")
-        self._machine.trigger_transition_by_id(transition_id, True)
+        self._trigger(transition_id)
         cause = await self._attempt(
             transition, partial(self._hooks.on_transition, transition, start)
         )
         if cause is not None and issubclass(type(cause), TransitionFailed):
-            self._machine.trigger_transition_by_label(_FAILURE, True)
+            self._trigger(_FAILURE)
         elif cause is not None:
-            self._machine.trigger_transition_by_label(_ERROR, True)
+            self._trigger(_ERROR)
             await self._process_error(cause)
         else:
-            self._machine.trigger_transition_by_label(_SUCCESS, True)
+            self._trigger(_SUCCESS)
         reason = "" if cause is None else describe(cause)
         result = TransitionOutcome(
             transition, self.state, success=cause is None, reason=reason, requested=requested
         )
         self._hooks.on_transition_end(result)
         return result
+
+    def _trigger(self, transition: int | str) -> None:
+        """Make a step of rcl's machine, by its id or its label: to the next state, or the end."""
+        if self._tap is not None:
+            entries = map(_described, self._machine.available_transitions)
+            step = next(
+                item
+                for item in entries
+                if transition in (item.transition.id, item.transition.label)
+            )
+            event = TransitionEvent(
+                timestamp=self._loop.clock.time_ns(), transition=step.transition
+            )
+            event.start_state, event.goal_state = step.start_state, step.goal_state
+            self._tap.put(event)
+        if isinstance(transition, int):
+            self._machine.trigger_transition_by_id(transition, True)
+        else:
+            self._machine.trigger_transition_by_label(transition, True)
 
     async def _attempt(self, transition: str, work: _Work) -> BaseException | None:
         """Do the work of a transition; return the exception that it raised."""
@@ -245,9 +271,9 @@ class Lifecycle:
             if is_closing(error):
                 raise
             self._log_error("on_error", error)
-            self._machine.trigger_transition_by_label(_FAILURE, True)
+            self._trigger(_FAILURE)
         else:
-            self._machine.trigger_transition_by_label(_SUCCESS, True)
+            self._trigger(_SUCCESS)
 
     async def _in_time(self, work: _Work) -> None:
         """Do the work. Its time starts when the loop starts it: other nodes may keep the loop."""

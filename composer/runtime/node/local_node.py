@@ -28,7 +28,7 @@ from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, Pending
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
 from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
-from composer.runtime.node.options import NodeOptions, make_ros_node
+from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.ports import PortSet, RunningPort
@@ -82,9 +82,10 @@ class LocalNode(ABC):
         self._listener = listener
         self._system_is_up = options.system_is_up
         self._start_state = ""  # of the current transition
+        recorder = options.router.recorder
         self._ros = self._make_ros_node()
         offers = model.introspection
-        log = Log(self._ros, listener.write_log, rosout=offers.rosout)
+        log = Log(self._ros, listener.write_log, rosout=offers.rosout, recorder=recorder)
         self._error_limit = _error_limit(model, listener)
         error_log = ErrorLog(log, loop.clock, self.statistics, listener.on_error, self._error_limit)
         self._context = NodeContext(
@@ -102,6 +103,7 @@ class LocalNode(ABC):
             events=options.process.events,
             mutations=_mutation_check(options.seen_messages, error_log),
         )
+        record_parameter_events(self._ros, recorder)  # with stamps of the clock that it has now
         # Ports that are always on have a gate of their own and share the rest.
         always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop))
         self._always_on_context = replace(self._context, gate=always_on_gate)

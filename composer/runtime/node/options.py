@@ -11,10 +11,11 @@ from rclpy.parameter import Parameter
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node
+from composer.model.qos import QosProfile
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.host_options import Instruments
+from composer.runtime.host_options import Instruments, Recorder, Tap
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.node_time.sim_time import SimTimeSource
 from composer.runtime.ros.limited_requests import limit_type_descriptions
@@ -51,6 +52,10 @@ class NodeOptions:
     system_is_up: bool = False
     make_library_node: Callable[[Any], Any] | None = None
     instruments: Instruments | None = None
+
+
+#: rmw's profile of parameter events.
+_EVENTS_PROFILE = QosProfile(depth=1000)
 
 
 class _NoPublisher:
@@ -91,3 +96,26 @@ def make_ros_node(model: Node, arguments: Sequence[str] = ()) -> RosNode:
     )
     limit_type_descriptions(node)
     return node
+
+
+@dataclass(frozen=True, slots=True)
+class _RecordedEvents:
+    """The publisher of /parameter_events of a node, recorded."""
+
+    publisher: Any
+    tap: Tap
+
+    def publish(self, event: ParameterEvent) -> None:
+        """Publish and record an event."""
+        self.publisher.publish(event)
+        self.tap.put(event)
+
+
+def record_parameter_events(node: RosNode, recorder: Recorder | None) -> None:
+    """Record the parameters of a node as they are declared and changed, if that is requested."""
+    if recorder is None:
+        return
+    tap = recorder.tap("/parameter_events", "rcl_interfaces/msg/ParameterEvent", _EVENTS_PROFILE)
+    if tap is not None:
+        events: Any = _RecordedEvents(node._parameter_event_publisher, tap)
+        node._parameter_event_publisher = events

@@ -8,6 +8,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse, ServerGoalHandle
 from rclpy.serialization import serialize_message
+from unique_identifier_msgs.msg import UUID
 
 from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallCancelled
@@ -22,6 +23,7 @@ from composer.runtime.executors.futures import Cancelled, Future, wrap_future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.intra_process.servers import LocalActionServer
+from composer.runtime.intra_process.taps import GoalTap
 from composer.runtime.ports import RunningPort
 from composer.runtime.ros.messages import Build, compile_message, interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -35,9 +37,9 @@ class RunningGoal:
     """
 
     def __init__(
-        self, handle: ServerGoalHandle, publish_local: Callable[[bytes, Any], None]
+        self, handle: ServerGoalHandle, publish_local: Callable[[UUID, Any], None]
     ) -> None:
-        """``publish_local`` gets the goal's identity and feedback for clients of the process."""
+        """``publish_local`` gets the goal's id and feedback, for receivers in the process."""
         self._handle = handle
         self._publish_local = publish_local
         self._is_node_leaving = False
@@ -82,7 +84,7 @@ class RunningGoal:
         """Send feedback to the client. Raises TypeError for another type than the Feedback."""
         if self.is_open:
             self._handle.publish_feedback(feedback)
-            self._publish_local(self.identity, feedback)
+            self._publish_local(self._handle.goal_id, feedback)
 
     def succeed(self) -> None:
         """End the goal as succeeded."""
@@ -155,6 +157,7 @@ class ActionServerPort(RunningPort):
             result_service_qos_profile=profile,
             cancel_service_qos_profile=profile,
         )
+        self._tap = GoalTap(context.router.recorder, port, self._server, context.loop.clock)
         context.loop.add_action_server(self._server)
         self._local = LocalActionServer(port, self._server, context.loop.run_task)
         self._remove = context.router.add_action_server(port, self._local)
@@ -218,10 +221,14 @@ class ActionServerPort(RunningPort):
         return None if self._context.gate.incoming else self._context.gate.refusal
 
     def _on_accepted(self, handle: ServerGoalHandle) -> None:
-        goal = RunningGoal(handle, self._local.publish_feedback)
+        goal = RunningGoal(handle, self._publish_feedback)
         self._context.statistics.calls += 1
         self._goals[goal.identity] = goal
         self._queue.put(goal)
+
+    def _publish_feedback(self, goal_id: UUID, feedback: Any) -> None:
+        self._tap.feedback(goal_id, feedback)
+        self._local.publish_feedback(bytes(goal_id.uuid), feedback)
 
     def _on_cancel_request(self, handle: ServerGoalHandle) -> CancelResponse:
         goal = self._goals.get(bytes(handle.goal_id.uuid))

@@ -15,6 +15,7 @@ from composer.runtime.executors.exceptions import text_of
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.servers import LocalService
+from composer.runtime.intra_process.taps import CallTap
 from composer.runtime.ports import RunningPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -146,6 +147,9 @@ class ClientPort(CallingPort):
             callback_group=context.group,
         )
         context.loop.add_client(self._client)
+        self._tap = CallTap.of_port(
+            context.router.recorder, port, self.service_type, context.loop.clock, is_client=True
+        )
 
     @property
     def content_type(self) -> Any:
@@ -208,7 +212,7 @@ class ClientPort(CallingPort):
             response: Future[Any] = Future()
             server.call(request, response)
             return response
-        return self._client.call_async(request)
+        return self._tap.follow(request, self._client.call_async(request))
 
     async def _send(self, request: Any) -> None:
         try:

@@ -18,6 +18,7 @@ from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.intra_process.servers import LocalService
+from composer.runtime.intra_process.taps import CallTap
 from composer.runtime.ports import RunningPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -90,8 +91,10 @@ class ServicePort(RunningPort):
             reentrant=port.reentrant,
         )
         self._service = self._make_service(port)
-        context.loop.add_service(self._service, self.on_request)
-        local = LocalService(port, self._type, context.loop.call_soon, self.on_request)
+        tap = CallTap.of_port(context.router.recorder, port, self._type, context.loop.clock)
+        receive = tap.recorded(self.on_request)
+        context.loop.add_service(self._service, receive)
+        local = LocalService(port, self._type, context.loop.call_soon, receive)
         self._remove = context.router.add_service(port, local)
 
     def on_request(self, content: Any, reply: Reply) -> None:

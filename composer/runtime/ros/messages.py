@@ -92,11 +92,13 @@ def load_type_support(interface: Any) -> None:
 def interface_class(name: str) -> Any:
     """Return the class of ``package/folder/Name``, ready for use on any thread.
 
-    Only packages that the ament index lists are imported, because names also come from the ROS
-    graph: any node can announce ``antigravity/msg/Any``. Raises MessageError when the interface is
-    not installed.
+    The name may be one that rosidl derives from a service or an action, as ``Trigger_Event``. Only
+    packages that the ament index lists are imported, because names also come from the ROS graph:
+    any node can announce ``antigravity/msg/Any``. Raises MessageError when the interface is not
+    installed.
     """
-    parts = split_name(name)
+    folder_path, _, derived_name = name.rpartition("/")
+    parts = split_name(f"{folder_path}/{derived_name.partition('_')[0]}")
     if parts is None:
         raise MessageError(f"'{name}' is not the name of an interface")
     package, folder, class_name = parts
@@ -107,6 +109,9 @@ def interface_class(name: str) -> Any:
     try:
         message_class = getattr(import_module(f"{package}.{folder}"), class_name)
         load_type_support(message_class)
+        if derived_name != class_name:
+            message_class = getattr(import_module(message_class.__module__), derived_name)
+            load_type_support(message_class)
     except _NOT_INSTALLED as error:
         raise MessageError(f"interface '{name}' is not installed for Python: {error}") from error
     return message_class

@@ -26,6 +26,7 @@ from composer.runtime.hosting.user_code import (
     call_in_group,
     interrupt_callbacks,
 )
+from composer.runtime.intra_process.taps import CallTap, GoalTap
 from composer.runtime.ports import RunningPort
 from composer.runtime.ports.action_server import CANCEL_LIMIT_S
 from composer.runtime.ports.service import ServicePort
@@ -67,13 +68,14 @@ class HostedClient(Client):
     """
 
     _instance: Instance
+    _tap: CallTap
 
     def call_async(self, request: Any) -> HostedFuture:
         """Send a request; the future fails with CallCancelled if the node is not active."""
         gate = self._instance.context.gate
         if not gate.waiting:
             return hosted_future(self._instance, CallCancelled(gate.refusal))
-        future: Any = super().call_async(request)
+        future: Any = self._tap.follow(request, super().call_async(request))
         future.__class__ = HostedFuture
         future._instance = self._instance
         return future  # type: ignore[no-any-return]
@@ -131,7 +133,11 @@ class ClientPort(RunningPort):
         self.port = instance.ports.port(PortKind.CLIENT, client.service_name, client.srv_type)
         client.__class__ = HostedClient
         client._instance = instance
-        instance.context.loop.add_client(client)
+        context = instance.context
+        client._tap = CallTap.of_port(
+            context.router.recorder, self.port, client.srv_type, context.loop.clock, is_client=True
+        )
+        context.loop.add_client(client)
 
     def deactivate(self) -> None:
         """Fail the pending calls."""
@@ -171,7 +177,9 @@ class HostedActionServer(RunningPort):
         # As in rclpy, the execution of a goal belongs to no callback group.
         self._execution = UserFunction(instance, server._execute_callback)
         server.register_execute_callback(self._wrapped(self._execution, self._abort))
-        instance.context.loop.add_action_server(server)
+        context = instance.context
+        self._tap = GoalTap(context.router.recorder, self.port, server, context.loop.clock)
+        context.loop.add_action_server(server)
 
     def deactivate(self) -> None:
         """Ask the running goals to cancel."""
@@ -280,6 +288,7 @@ class HostedActionServer(RunningPort):
         def publish_feedback(feedback: Any) -> None:
             if self._context.gate.outgoing:
                 publish(feedback)
+                self._tap.feedback(goal.goal_id, feedback)
 
         goal.publish_feedback = publish_feedback
 
