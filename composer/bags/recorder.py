@@ -1,4 +1,4 @@
-"""Writes messages of many sources on a thread of its own, so that no callback waits for a disk."""
+"""Writes messages of many sources on threads of its own, so that no callback waits for a disk."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ from rclpy.serialization import serialize_message
 from composer.bags.bag import BagError, BagMessage, BagTopic
 from composer.runtime.clock.clock import Clock
 
-_PERIOD_S = 0.02
-#: What a source keeps at most until the thread has written it.
-_QUEUE_BYTES = 64_000_000
+_SERIALIZE_PERIOD_S = 0.02
+_WRITE_PERIOD_S = 0.1
+#: Serialized messages that wait for the sink.
+_LARGEST_PENDING_BYTES = 256_000_000
+#: Messages of one source that wait to be serialized.
+_LARGEST_QUEUE_BYTES = 64_000_000
 _SHORTEST_QUEUE, _LONGEST_QUEUE = 16, 10_000
 
 
 class Sink(Protocol):
-    """What receives the messages, on the thread of the recorder."""
+    """What receives the messages, one call at a time."""
 
     def add_topic(self, topic: BagTopic) -> None:
         """Declare a topic."""
@@ -73,19 +76,22 @@ class Source:
             return
         self._queue.append((self._time_ns(), self._number(), message))
 
-    def taken(self) -> list[tuple[int, int, Any, str]]:
-        """Take what was put so far: the time, the number, the message, and the topic."""
+    def taken(self) -> list[tuple[int, int, Any, Source]]:
+        """Take what was put so far: the time, the number, the message, and the source."""
         queue = self._queue
-        return [(*queue.popleft(), self.topic) for _ in range(len(queue))]
+        return [(*queue.popleft(), self) for _ in range(len(queue))]
 
     def note_size(self, size_bytes: int) -> None:
         """Limit the queue, given the size of a message."""
-        fitting = _QUEUE_BYTES // max(size_bytes, 1)
+        fitting = _LARGEST_QUEUE_BYTES // max(size_bytes, 1)
         self.limit = min(max(fitting, _SHORTEST_QUEUE), _LONGEST_QUEUE)
 
 
 class Recorder:
     """Passes messages to a sink. Use it as a context manager.
+
+    One thread serializes messages, another one writes them. If the disk stalls, messages wait in a
+    limited memory, and then they are dropped.
 
     In virtual time nothing is dropped: a publisher waits for a full queue, and the system does not
     notice the wait.
@@ -96,28 +102,37 @@ class Recorder:
         self._clock = clock
         self._sources: dict[str, Source] = {}
         self._numbers = count()
-        self._lock = threading.RLock()
+        #: For the sink: a topic comes before its messages.
+        self._pending: deque[BagTopic | BagMessage] = deque()
+        self._serialized_bytes = self._written_bytes = 0  # each is changed under its own lock
+        self._serializing, self._writing = threading.Lock(), threading.Lock()  # in this order
         self._calls: deque[tuple[float, Callable[[], None]]] = deque()
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._threads = [
+            threading.Thread(target=self._repeat, args=args, name=name, daemon=True)
+            for name, *args in (
+                ("recorder", self._serialize, _SERIALIZE_PERIOD_S),
+                ("bag writer", self._write_and_call, _WRITE_PERIOD_S),
+            )
+        ]
         #: Why nothing more is recorded; None while it is.
         self.problem: str | None = None
 
     def __enter__(self) -> Recorder:
-        self._thread.start()
+        for thread in self._threads:
+            thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         """Write the rest. Afterwards, ``problem`` says whether that failed."""
         self._ended.set()
-        self._thread.join()
-        self._drain()
-        self._run_calls(inf)
-        with self._lock:
-            try:
-                self._sink.close()
-            except BagError as error:
-                self.problem = self.problem or str(error)
+        for thread in self._threads:
+            thread.join()
+        self._write_and_call(until_s=inf)
+        try:
+            self._sink.close()
+        except BagError as error:
+            self.problem = self.problem or str(error)
 
     @property
     def dropped(self) -> int:
@@ -125,54 +140,71 @@ class Recorder:
         return sum(source.dropped for source in tuple(self._sources.values()))
 
     def source(self, topic: BagTopic) -> Source:
-        """Return what receives the messages of a topic."""
-        with self._lock:
-            self._sink.add_topic(topic)
-            if topic.name not in self._sources:
-                number = self._numbers.__next__
-                source = Source(topic.name, self._clock.time_ns, number, self._make_room)
-                self._sources[topic.name] = source
-            return self._sources[topic.name]
+        """Return what receives the messages of a topic. It does not wait for the sink."""
+        self._pending.append(topic)
+        clock, number = self._clock, self._numbers.__next__
+        new = Source(topic.name, clock.time_ns, number, self._on_full)
+        return self._sources.setdefault(topic.name, new)
 
     def call_later(self, delay_s: float, function: Callable[[], None]) -> None:
-        """Call a function on the thread, with all messages until then in the sink."""
+        """Call a function on the thread that writes, with all messages until then in the sink."""
         self._calls.append((time.monotonic() + delay_s, function))
 
-    def _make_room(self) -> bool:
-        if self._clock.is_virtual and self.problem is None:
-            self._drain()
+    def _on_full(self) -> bool:
+        if self._clock.is_virtual:
+            self._serialize()
         return self._clock.is_virtual
 
-    def _run(self) -> None:
-        while not self._ended.wait(_PERIOD_S):
-            self._drain()
-            self._run_calls(time.monotonic())
+    def _repeat(self, function: Callable[[], None], period_s: float) -> None:
+        while not self._ended.wait(period_s):
+            function()
 
-    def _run_calls(self, until_s: float) -> None:
-        while self._calls and self._calls[0][0] <= until_s:
-            _, function = self._calls.popleft()
-            with self._lock:
-                function()
-
-    def _drain(self) -> None:
-        with self._lock:
-            messages = [item for source in self._sources.values() for item in source.taken()]
-            if self.problem is not None:
-                return
+    def _serialize(self) -> None:
+        """Serialize what the sources have received, in the order in which they received it."""
+        with self._serializing:
+            sources = tuple(self._sources.values())
+            messages = [item for source in sources for item in source.taken()]
             messages.sort(key=itemgetter(0, 1))
+            for at_ns, _, content, source in messages:
+                try:
+                    data = content if isinstance(content, bytes) else serialize_message(content)
+                except Exception:  # a message that no publisher could send
+                    source.dropped += 1
+                    continue
+                source.note_size(len(data))
+                if self._serialized_bytes - self._written_bytes > _LARGEST_PENDING_BYTES:
+                    if not self._clock.is_virtual:
+                        source.dropped += 1
+                        continue
+                    self._write()
+                self._pending.append(BagMessage(source.topic, at_ns, at_ns, bytes(data)))
+                self._serialized_bytes += len(data)
+
+    def _write(self) -> None:
+        """Pass what is pending to the sink, until there is a problem."""
+        with self._writing:
             try:
-                for at_ns, _, content, topic in messages:
-                    self._write(at_ns, topic, content)
-                self._sink.flush_if_due()
+                while self._pending:
+                    item = self._pending.popleft()
+                    if isinstance(item, BagTopic):
+                        self._sink.add_topic(item)
+                        continue
+                    self._written_bytes += len(item.data)
+                    if self.problem is None:
+                        self._sink.write(item)
+                if self.problem is None:
+                    self._sink.flush_if_due()
             except BagError as error:
                 self.problem = str(error)
 
-    def _write(self, at_ns: int, topic: str, content: Any) -> None:
-        source = self._sources[topic]
-        try:
-            data = content if isinstance(content, bytes) else bytes(serialize_message(content))
-        except Exception:  # a message that no publisher could send
-            source.dropped += 1
-            return
-        source.note_size(len(data))
-        self._sink.write(BagMessage(topic, at_ns, at_ns, data))
+    def _write_and_call(self, until_s: float | None = None) -> None:
+        """Write what is pending, and make the calls that are due."""
+        until_s = time.monotonic() if until_s is None else until_s
+        is_due = bool(self._calls) and self._calls[0][0] <= until_s
+        if is_due or until_s == inf:
+            self._serialize()
+        self._write()
+        while self._calls and self._calls[0][0] <= until_s:
+            _, function = self._calls.popleft()
+            with self._writing:
+                function()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from composer.bags.recorder import Recorder
 from composer.runtime.clock.clock import COMPUTER
 from tests.ros.support.commands import compose, error, finished, output_of, running, start
 from tests.ros.support.forked import ForkedCommand
-from tests.ros.support.in_process import Peer
+from tests.ros.support.in_process import PATIENCE_S, Peer, wait_until
 
 COUNTING = """\
 system: counting
@@ -361,3 +362,32 @@ def test_drops_are_counted() -> None:
     with recorder:
         pass
     assert len(sink.written) == 10_000
+
+
+class _StalledDisk(_FullDisk):
+    """A sink that waits before it writes."""
+
+    def __init__(self) -> None:
+        super().__init__(10**6)
+        self.goes_on = threading.Event()
+
+    def write(self, message: BagMessage) -> None:
+        assert self.goes_on.wait(PATIENCE_S)
+        super().write(message)
+
+
+def test_a_stalled_disk_delays_nobody_and_costs_limited_memory() -> None:
+    sink = _StalledDisk()
+    recorder = Recorder(sink, COMPUTER)
+    source = recorder.source(BagTopic("/image", "sensor_msgs/msg/Image"))
+    image = bytes(1_000_000)
+    with recorder:
+        for _ in range(1000):
+            source.put(image)
+        wait_until(lambda: recorder.dropped >= 700, "drops")
+        other = recorder.source(BagTopic("/later", "std_msgs/msg/String"))
+        other.put(String())
+        sink.goes_on.set()
+    assert recorder.problem is None
+    assert 240 <= len(sink.written) <= 270
+    assert len(sink.written) + recorder.dropped == 1001
