@@ -12,6 +12,40 @@ from enum import StrEnum
 from composer.base.fast_dataclass import dataclass
 from composer.language.tree import Plain
 
+
+class View(StrEnum):
+    """The view of a system."""
+
+    NODES = "nodes"
+    CONNECTIONS = "connections"
+    LIFECYCLE = "lifecycle"
+    DEPLOYMENT = "deployment"
+    STATES = "states"
+    FRAMES = "frames"
+
+
+class Format(StrEnum):
+    """The format of a diagram."""
+
+    MERMAID = "mermaid"
+    SVG = "svg"
+    PNG = "png"
+    JSON = "json"
+    HTML = "html"
+
+
+#: The formats by the suffix of a file name.
+FORMATS_BY_SUFFIX = {
+    ".mmd": Format.MERMAID,
+    ".mermaid": Format.MERMAID,
+    ".svg": Format.SVG,
+    ".png": Format.PNG,
+    ".json": Format.JSON,
+    ".html": Format.HTML,
+    ".htm": Format.HTML,
+}
+
+
 #: Facts about a vertex or an edge, in the order they are shown.
 Details = tuple[tuple[str, Plain], ...]
 

@@ -9,8 +9,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from composer.base.characters import escape_json
-from composer.graph.diagram import Cluster, Edge, Graph, Vertex
-from composer.graph.diagram_options import Format
+from composer.graph.diagram import Cluster, Edge, Format, Graph, Vertex
 from composer.graph.formats import html, mermaid, svg
 from composer.graph.layout import arrange
 

@@ -15,10 +15,10 @@ from composer.graph.diagram import (
     Problem,
     Vertex,
     VertexKind,
+    View,
     parent_of,
     worst,
 )
-from composer.graph.diagram_options import View
 from composer.graph.facts import channel_facts, rate, short_type
 from composer.graph.live import live_scene_of
 from composer.graph.node_views import (

@@ -11,7 +11,6 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span, shown_path
 from composer.interfaces.definitions import Action, Interface, Message, Service, parts
 from composer.interfaces.parser import DefinitionError, parse_definition, split_name
-from composer.interfaces.share_json import read_description
 from composer.interfaces.sources import (
     Bundle,
     Definition,
@@ -20,6 +19,7 @@ from composer.interfaces.sources import (
     Prefix,
     find_packages,
     installed_prefixes,
+    read_description,
 )
 
 #: A type as descriptions of interfaces name it.

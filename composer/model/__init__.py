@@ -5,8 +5,7 @@ report it.
 """
 
 from composer.model.dependencies import Channel, PortOfNode, channels
-from composer.model.discovery import Discovery, DiscoveryKind
-from composer.model.hosts import Host, Process
+from composer.model.hosts import Discovery, DiscoveryKind, Host, Process
 from composer.model.implementation import (
     BehaviorReference,
     Component,

@@ -10,8 +10,7 @@ from typing import Any, TypeVar, cast
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
 from composer.language.tree import LeftOut
-from composer.model.discovery import Discovery
-from composer.model.hosts import Host, Process
+from composer.model.hosts import Discovery, Host, Process
 from composer.model.names import matches_wildcard
 from composer.model.node import (
     DEFAULT_SUPERVISION,

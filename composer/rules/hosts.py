@@ -9,18 +9,16 @@ from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.base.source import Located
 from composer.language.rules import UNUSED_DECLARATION
 from composer.model import DiscoveryKind, Host
-from composer.model.discovery import (
-    host_of,
-    interface_problem,
-    is_loopback,
-    peer_problem,
-    server_problem,
-)
 from composer.model.hosts import (
     address_problem,
     domain_problem,
+    host_of,
+    interface_problem,
+    is_loopback,
     key_file_problem,
     name_problem,
+    peer_problem,
+    server_problem,
     user_problem,
     workspace_problem,
 )

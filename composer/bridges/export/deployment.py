@@ -22,8 +22,7 @@ from composer.model import (
     Process,
     System,
 )
-from composer.model.discovery import is_loopback
-from composer.model.hosts import ENCLAVE_VARIABLE, own_enclave
+from composer.model.hosts import ENCLAVE_VARIABLE, is_loopback, own_enclave
 from composer.model.names import join
 
 #: Longer than --grace of compose run, by which the process ends in any case.

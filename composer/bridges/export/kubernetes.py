@@ -20,7 +20,7 @@ from composer.bridges.export.deployment import (
     yaml_text,
 )
 from composer.model import System
-from composer.model.discovery import is_loopback
+from composer.model.hosts import is_loopback
 
 _HEAD = """\
 # Written by 'compose export kubernetes' for the system {system}.

@@ -15,7 +15,7 @@ from composer.cli.support.new_files import write_file
 from composer.cli.support.options import Timeout, examples, finite
 from composer.cli.support.system_arguments import load_system, system_file
 from composer.cli.support.terminal import say, write_bytes
-from composer.graph.diagram_options import FORMATS_BY_SUFFIX, Format, View
+from composer.graph.diagram import FORMATS_BY_SUFFIX, Format, View
 
 if TYPE_CHECKING:
     from composer.base.diagnostics import Diagnostic

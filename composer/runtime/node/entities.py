@@ -19,10 +19,9 @@ from composer.runtime.ports import PortSet, RunningPort
 from composer.runtime.ports.action_client import ActionClientPort
 from composer.runtime.ports.action_server import ActionServerPort, Handlers
 from composer.runtime.ports.client import ClientPort
-from composer.runtime.ports.publisher import PublisherPort
 from composer.runtime.ports.service import ServicePort
-from composer.runtime.ports.subscription import SubscriptionPort
 from composer.runtime.ports.timer import TimerPort
+from composer.runtime.ports.topics import PublisherPort, SubscriptionPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.transforms.listener import TransformListeners
 

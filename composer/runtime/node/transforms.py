@@ -26,7 +26,7 @@ from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.stacks import interruptible
 from composer.runtime.ports import RunningPort
-from composer.runtime.ports.publisher import PublisherPort
+from composer.runtime.ports.topics import PublisherPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.transforms.buffer import Found, TransformBuffer
 from composer.runtime.transforms.listener import TransformListeners

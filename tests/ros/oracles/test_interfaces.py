@@ -11,8 +11,7 @@ import pytest
 from rosidl_adapter import parser as rosidl
 
 from composer.interfaces import Action, Field, Interfaces, Message, Service, split_name
-from composer.interfaces.share_json import read_description
-from composer.interfaces.sources import Bundle, installed_prefixes
+from composer.interfaces.sources import Bundle, installed_prefixes, read_description
 
 PREFIXES = installed_prefixes()
 INSTALLED = Interfaces(PREFIXES)

@@ -9,8 +9,13 @@ from pathlib import Path
 import pytest
 
 from composer.interfaces import Action, FieldType, Interfaces, Message, Service, parts
-from composer.interfaces.share_json import read_description
-from composer.interfaces.sources import Bundle, Prefix, find_packages, installed_prefixes
+from composer.interfaces.sources import (
+    Bundle,
+    Prefix,
+    find_packages,
+    installed_prefixes,
+    read_description,
+)
 
 BUNDLED = Interfaces([Bundle()])
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from composer.loading import load
 from composer.model import Discovery, member_system
-from composer.model.discovery import interface_problem, is_loopback, peer_problem, server_problem
+from composer.model.hosts import interface_problem, is_loopback, peer_problem, server_problem
 
 NODES = "nodes: {arm: {process: acting, on_activate: {log: on}}}\nprocesses: {acting: {}}\n"
 

@@ -32,9 +32,8 @@ from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.intra_process.publisher import copy_of
 from composer.runtime.ports.mailbox import Mailbox
-from composer.runtime.ports.publisher import PublisherPort
 from composer.runtime.ports.qos_events import QosEvents
-from composer.runtime.ports.subscription import SubscriptionPort
+from composer.runtime.ports.topics import PublisherPort, SubscriptionPort
 
 _PUBLISHER = QoSPublisherEventType
 _SUBSCRIPTION = QoSSubscriptionEventType
