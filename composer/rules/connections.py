@@ -7,15 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from composer.base.diagnostics import (
-    Diagnostic,
-    Label,
-    Rule,
-    error,
-    info,
-    suggestion,
-    warning,
-)
+from composer.base.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
 from composer.model import ChannelKind, PortKind, PortOfNode, channels
@@ -209,29 +201,36 @@ def _channel_names(context: Context) -> _ChannelNames:
     return found
 
 
-def check_client_without_server(context: Context) -> Iterator[Diagnostic]:
-    """Check for services and actions that have only clients."""
-    for kind in (PortKind.CLIENT, PortKind.ACTION_CLIENT):
+#: Of a port without a counterpart: the rule, what no other node does, and what its own node does.
+_UNCONNECTED = {
+    PortKind.CLIENT: (CLIENT_WITHOUT_SERVER, "provides", "calls"),
+    PortKind.ACTION_CLIENT: (CLIENT_WITHOUT_SERVER, "provides", "calls"),
+    PortKind.SUBSCRIPTION: (SUBSCRIPTION_WITHOUT_PUBLISHER, "publishes", "subscribes to"),
+    PortKind.PUBLISHER: (PUBLISHER_WITHOUT_SUBSCRIPTION, "subscribes to", "publishes"),
+}
+
+
+def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
+    """Check for topics, services and actions that have ports of one side only."""
+    for kind, (rule, not_done, done) in _UNCONNECTED.items():
         for endpoint in unconnected_ports(context, kind):
-            if endpoint.port.required is None:
-                message = (
-                    f"no node in this system provides '{endpoint.port.full_name}', "
-                    f"which '{port_name(endpoint)}' calls"
-                )
-                hint = nearest_channel(context, endpoint) or external_hint(endpoint)
-                yield _unconnected(CLIENT_WITHOUT_SERVER, endpoint, message, hint)
-
-
-def check_subscription_without_publisher(context: Context) -> Iterator[Diagnostic]:
-    """Check for topics that have only subscriptions."""
-    for endpoint in unconnected_ports(context, PortKind.SUBSCRIPTION):
-        if endpoint.port.required is None:
-            message = (
-                f"no node in this system publishes '{endpoint.port.full_name}', "
-                f"which '{port_name(endpoint)}' subscribes to"
+            port, hint = endpoint.port, None
+            if port.required is not None:
+                continue
+            if kind is not PortKind.PUBLISHER:
+                hint = nearest_channel(context, endpoint)
+            elif is_meant_by_another(context, endpoint):
+                continue
+            place, labels = name_location(endpoint)
+            yield Diagnostic(
+                rule,
+                f"no node in this system {not_done} '{port.full_name}', "
+                f"which '{port_name(endpoint)}' {done}",
+                place,
+                labels,
+                hint or external_hint(endpoint),
+                relies_on=wiring(endpoint.node, port),
             )
-            hint = nearest_channel(context, endpoint) or external_hint(endpoint)
-            yield _unconnected(SUBSCRIPTION_WITHOUT_PUBLISHER, endpoint, message, hint)
 
 
 def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
@@ -264,24 +263,6 @@ def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
                 pattern.span,
                 hint=_OUTSIDE if is_outside else suggestion(text, known),
             )
-
-
-def check_publisher_without_subscription(context: Context) -> Iterator[Diagnostic]:
-    """Check for topics that have only publishers."""
-    for endpoint in unconnected_ports(context, PortKind.PUBLISHER):
-        if endpoint.port.required is None and not is_meant_by_another(context, endpoint):
-            message = (
-                f"no node in this system subscribes to '{endpoint.port.full_name}', "
-                f"which '{port_name(endpoint)}' publishes"
-            )
-            hint = external_hint(endpoint)
-            yield _unconnected(PUBLISHER_WITHOUT_SUBSCRIPTION, endpoint, message, hint)
-
-
-def _unconnected(rule: Rule, endpoint: PortOfNode, message: str, hint: str | None) -> Diagnostic:
-    place, labels = name_location(endpoint)
-    reliance = wiring(endpoint.node, endpoint.port)
-    return Diagnostic(rule, message, place, labels, hint, relies_on=reliance)
 
 
 def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
