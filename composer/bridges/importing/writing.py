@@ -12,10 +12,8 @@ from dataclasses import fields, replace
 from composer.base.characters import escape_lines, is_safe
 from composer.base.source import SourceFile, Span
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
-from composer.language.document import parse_bytes
-from composer.language.document.limits import MAX_BYTES, MAX_ENTRIES
+from composer.language.document.limits import MAX_ENTRIES
 from composer.language.document.writer import write_document
-from composer.language.rules import TOO_LARGE
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
 from composer.launch.variants import with_references
 from composer.model import ChannelKind, PortKind
@@ -23,8 +21,8 @@ from composer.model.qos import PRESETS, QosProfile
 
 #: Presets that may describe a profile, the usual ones first.
 _PRESETS = ("command", "sensor_data", "state")
-#: The part of a file that is left out at once, if it is too large.
-_PART = 0.1
+#: Of the value of a parameter: longer ones are data, longer than a robot description.
+_MAX_CHARACTERS = 500_000
 #: What was left out and is listed in a file.
 _MAX_LISTED = 200
 _RANGE = ("minimum", "maximum", "step")
@@ -208,30 +206,25 @@ def _literal(text: str) -> str:
 
 
 def readable(found: FoundSystem) -> FoundSystem:
-    """Return what a file can hold: without the largest parameters, and then the last nodes."""
-    found = _without_unreadable(found)
-    while True:
-        content = write_system(found).encode()
-        _, _, diagnostics = parse_bytes(content, found.name)
-        is_large = any(item.rule is TOO_LARGE for item in diagnostics)
-        if not is_large and len(found.nodes) <= MAX_ENTRIES:
-            return found
-        found = _smaller(found, max(_PART, 1 - MAX_BYTES / len(content)))
+    """Return what a file can hold: parameters without long values, and the first nodes.
 
-
-def _without_unreadable(found: FoundSystem) -> FoundSystem:
-    """Leave out values that the language does not have: control characters, and no numbers."""
+    The language has neither control characters nor numbers that are not finite.
+    """
     left_out = list(found.left_out)
     nodes = []
-    for node in found.nodes:
+    for node in found.nodes[:MAX_ENTRIES]:
         kept = []
         for item in node.parameters:
-            if _is_readable(item.value):
+            what, size = f"parameter {item.name} of {node.full_name}", len(str(item.value))
+            if size > _MAX_CHARACTERS:
+                left_out.append(f"{what}: its value has {size:,} characters")
+            elif _is_readable(item.value):
                 kept.append(_with_readable_settings(item))
             else:
                 problem = "its value has characters or numbers that a file cannot have"
-                left_out.append(f"parameter {item.name} of {node.full_name}: {problem}")
+                left_out.append(f"{what}: {problem}")
         nodes.append(replace(node, parameters=tuple(kept)))
+    left_out += (f"node {item.full_name}: the file is full" for item in found.nodes[MAX_ENTRIES:])
     return replace(found, nodes=tuple(nodes), left_out=tuple(left_out))
 
 
@@ -273,28 +266,3 @@ def _is_readable(value: Plain) -> bool:
 
 def _escaped(value: Plain) -> Plain:
     return escape_lines(value) if isinstance(value, str) else value
-
-
-def _smaller(found: FoundSystem, part: float) -> FoundSystem:
-    """Leave out a part: of the characters of parameters, the largest first; without any, nodes."""
-    parameters = [
-        (len(str(item.value)) + len(str(item.settings)), number, item)
-        for number, node in enumerate(found.nodes)
-        for item in node.parameters
-    ]
-    if not parameters:
-        kept = min(MAX_ENTRIES, len(found.nodes) - max(1, int(len(found.nodes) * part)))
-        full = (f"node {node.full_name}: the file is full" for node in found.nodes[kept:])
-        return replace(found, nodes=found.nodes[:kept], left_out=(*found.left_out, *full))
-    parameters.sort(key=lambda item: -item[0])
-    wanted = part * sum(size for size, _, _ in parameters)
-    sizes = itertools.accumulate(size for size, _, _ in parameters)
-    removed = parameters[: sum(total < wanted for total in sizes) + 1]
-    nodes, left_out = list(found.nodes), list(found.left_out)
-    for size, number, item in removed:
-        node = nodes[number]
-        kept_parameters = tuple(other for other in node.parameters if other is not item)
-        nodes[number] = replace(node, parameters=kept_parameters)
-        what = f"parameter {item.name} of {node.full_name}"
-        left_out.append(f"{what}: its value has about {size:,} characters")
-    return replace(found, nodes=tuple(nodes), left_out=tuple(left_out))

@@ -100,9 +100,15 @@ def live(
             f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
         )
     from composer.bridges.importing.writing import readable, write_system
+    from composer.language.document.limits import MAX_BYTES
 
     found = readable(found)
-    write_output(write_system(found), output)
+    text = write_system(found)
+    if len(text.encode()) > MAX_BYTES:
+        raise CommandError(
+            f"the file would have more than {MAX_BYTES:,} bytes", hint="choose nodes with --node"
+        )
+    write_output(text, output)
     _report_left_out(found.left_out)
 
 
