@@ -11,7 +11,8 @@ from composer.plan import SystemGoals
 from composer.runtime.callbacks.log import Write
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.loop import Loop
-from composer.runtime.members.context import KeptGoals, MemberContext
+from composer.runtime.members.context import MemberContext
+from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.computer import is_this_computer

@@ -6,17 +6,13 @@ most of them would be lost: a service keeps the last 10 that it has not taken ye
 A process that was killed is known for 20 s more, with its service. If that counted as ready, a
 request might be sent before the service of the next process is discovered, and be lost.
 
-DDS repeats lost packets, but a request or its response may be lost nevertheless: rmw drops a
-response to a client that the service has not discovered yet, and a full queue the oldest request.
-So a step without a result is requested again. The process recognizes it by its number, and never
-runs it twice: see :mod:`composer.runtime.manager.member_service`.
+Steps without a result are requested again: see :mod:`.requested_steps`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import field
 from functools import partial
 from itertools import count
 from typing import Any
@@ -24,10 +20,10 @@ from uuid import uuid4
 
 from rclpy.node import Node as RosNode
 
-from composer.base.fast_dataclass import dataclass
 from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.members.requested_steps import AGAIN_AFTER_S, MemberRequest, RequestedStep
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import (
@@ -39,55 +35,6 @@ from composer.runtime.protocol.requests import (
 )
 from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
 from composer.runtime.ros_graph.graph import participant, servers_of
-
-#: A process reports each second, and each report says what it has received.
-AGAIN_AFTER_S = 3.0
-_REPORTS_UNTIL_LOST = 2
-
-
-@dataclass(frozen=True, slots=True)
-class RequestedStep:
-    """A step, and the future of its result."""
-
-    step: Step
-    result: Future[StepResult] = field(default_factory=Future)
-
-
-@dataclass(frozen=True, slots=True)
-class MemberRequest:
-    """A request on its way: steps, or goals of the system and whether it asks for timings.
-
-    Steps are requested again ``again_after_s`` later, twice as long after each time. ``seen`` is
-    the number of the last report that had been received when it was sent.
-    """
-
-    steps: Sequence[RequestedStep] = ()
-    goals: SystemGoals | None = None
-    timings: bool = False
-    again_after_s: float = AGAIN_AFTER_S
-    seen: int = 0
-
-    @property
-    def is_awaited(self) -> bool:
-        """Whether a result of a step is still waited for."""
-        return any(not step.result.done() for step in self.steps)
-
-    def again(self, seen: int) -> MemberRequest:
-        """Return the request for the steps that still have no result."""
-        left = tuple(step for step in self.steps if not step.result.done())
-        return MemberRequest(left, again_after_s=2.0 * self.again_after_s, seen=seen)
-
-    def is_lost(self, received: int, seen: int) -> bool:
-        """Return whether it has certainly not arrived.
-
-        ``received`` is the number of the last step that the process has received according to its
-        report ``seen``; the first report after the request may be older than its arrival.
-        """
-        is_unknown = any(
-            item.step.number > received for item in self.steps if not item.result.done()
-        )
-        return is_unknown and seen >= self.seen + _REPORTS_UNTIL_LOST
-
 
 _MAX_STEPS = 500  # per request; a service takes a million characters
 _MAX_REQUESTS = 8

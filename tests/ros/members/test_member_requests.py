@@ -19,7 +19,8 @@ from composer.runtime.executors.sources import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
-from composer.runtime.members.context import KeptGoals, MemberContext, ProcessUnavailable
+from composer.runtime.members.context import MemberContext, ProcessUnavailable
+from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import hold_instance_lock

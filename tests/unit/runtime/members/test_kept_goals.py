@@ -6,7 +6,7 @@ import pytest
 
 from composer.model import PrimaryState, System
 from composer.plan import STOPPED, SystemGoals
-from composer.runtime.members.context import KeptGoals
+from composer.runtime.members.kept_goals import KeptGoals
 from tests.unit.support.resolving import system_of
 
 ACTIVE, INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE

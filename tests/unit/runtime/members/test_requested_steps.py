@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from composer.plan import SystemGoals
-from composer.runtime.members.requests import MemberRequest, RequestedStep
+from composer.runtime.members.requested_steps import MemberRequest, RequestedStep
 from composer.runtime.protocol.requests import Step, StepResult
 
 RESULT = StepResult(success=True)
