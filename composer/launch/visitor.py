@@ -34,6 +34,7 @@ from launch.actions import (
 from launch.events import Shutdown as ShutdownEvent
 from launch.frontend.parse_substitution import parse_substitution
 from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch.substitutions import TextSubstitution
 from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros import parameter_descriptions
 from launch_ros.actions import (
@@ -326,6 +327,7 @@ def main(report: Path, path: str, arguments: list[str]) -> None:
     # launch_ros reads each parameter file, and parses its values, several times for each node.
     yaml.SafeLoader = yaml.CSafeLoader  # type: ignore[misc, assignment]
     vars(parameter_descriptions)["parse_substitution"] = lru_cache(maxsize=None)(parse_substitution)
+    TextSubstitution.__repr__ = TextSubstitution.describe  # messages of launch have lists of them
     given = dict(text.split(":=", 1) for text in arguments)
     environment = dict(os.environ)
 

@@ -192,15 +192,28 @@ def test_the_nodes_of_a_launch_file_are_described(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch_ros is not installed")
-def test_the_first_cause_of_a_failure_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("start", "result", "message"),
+    [
+        (
+            "from ament_index_python.packages import get_package_share_directory",
+            "get_package_share_directory('no_such_package')",
+            ":3: PackageNotFoundError: package 'no_such_package' not found, ",
+        ),
+        (
+            "import launch, launch_ros.actions",
+            "launch.LaunchDescription([launch_ros.actions.Node(package='demo', executable="
+            "launch.substitutions.FindExecutable(name='no_program'))])",
+            ": SubstitutionFailure: executable '['no_program']' not found on the PATH",
+        ),
+    ],
+)
+def test_the_first_cause_of_a_failure_is_named(
+    start: str, result: str, message: str, tmp_path: Path
+) -> None:
     file = tmp_path / "robot.launch.py"
-    file.write_text(
-        "from ament_index_python.packages import get_package_share_directory\n"
-        "def generate_launch_description():\n"
-        "    return get_package_share_directory('no_such_package')\n"
-    )
-    expected = f"{file}:3: PackageNotFoundError: package 'no_such_package' not found, "
-    expect_error(expected, "import", "launch", file)
+    file.write_text(f"{start}\ndef generate_launch_description():\n    return {result}\n")
+    expect_error(message, "import", "launch", file)
 
 
 @pytest.mark.skipif(find_spec("launch_ros") is not None, reason="launch_ros is installed")
