@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Rule
-from composer.loading import load
+from composer.loading import load, load_files
 from composer.report.text import render
 from composer.rules import all_checks
 
@@ -22,12 +22,26 @@ CASES = sorted(path.name for path in (ROOT / ERRORS).glob("*.yaml"))
 CODE = re.compile(r"^\w+\[(RC\d+) ", re.MULTILINE)
 
 
+@pytest.fixture(scope="module")
+def reports() -> dict[str, str]:
+    """The reports of all files. All at once: the type checker starts once."""
+    with pytest.MonkeyPatch.context() as current:
+        current.chdir(ROOT)
+        results = load_files(ERRORS / name for name in CASES)
+        return {
+            name: render(result.diagnostics) for name, result in zip(CASES, results, strict=True)
+        }
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_report_matches_the_golden_file(
-    name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    reports: dict[str, str],
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(ROOT)
-    report = render(load(ERRORS / name).diagnostics)
+    report = reports[name]
     expected = ERRORS / f"{Path(name).stem}.txt"
     if request.config.getoption("--update-golden"):
         expected.write_text(report, encoding="utf-8")

@@ -7,6 +7,7 @@ check: each gets a check of its own.
 from __future__ import annotations
 
 import ast
+import itertools
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
@@ -201,9 +202,8 @@ def _unused_name(node: Node, taken: Mapping[str, Node]) -> str:
     """Return the name of the base class for the behavior of a node, not used by another one."""
     type_name = node.own_type_name or node.type_name or node.name
     name = behavior_class_name(type_name.value)
-    while name in taken:
-        name = f"Another{name}"
-    return name
+    numbered = (f"{name}{number}" for number in itertools.count(2))
+    return next(each for each in itertools.chain([name], numbered) if each not in taken)
 
 
 def _imports(tree: ast.Module) -> Iterator[tuple[str, str]]:
