@@ -61,13 +61,22 @@ class SystemRecording:
     """
 
     def __init__(
-        self, system: System, recording: Recording, clock: Clock, say: Callable[[str], None]
+        self,
+        system: System,
+        recording: Recording,
+        clock: Clock,
+        say: Callable[[str], None],
+        bag: Path | None = None,
     ) -> None:
-        """``say`` receives what users have to know. Raises BagError, if the bag cannot be made."""
-        clock.has_ticks = clock.is_virtual  # so that a replay repeats the order of what is due
+        """``say`` receives what users have to know.
+
+        ``bag`` is the folder of the new bag; by default, its name has the time. Raises BagError if
+        the bag cannot be made.
+        """
         self._system = system
         self._settings = recording
         self._folder = Path(recording.folder)
+        self._bag = bag
         self._say = say
         self._interfaces = Interfaces.installed()
         self._faults: list[str] = []
@@ -143,7 +152,7 @@ class SystemRecording:
 
     def _new_writer(self, **facts: object) -> BagWriter:
         limits = split_limits(self._settings.split_mb, self._settings.split_s)
-        path = new_folder(self._folder, self._system.name.value)
+        path = self._bag or new_folder(self._folder, self._system.name.value)
         return BagWriter(path, limits, attachments(self._system, **facts))
 
     def _prepare_folder(self) -> None:

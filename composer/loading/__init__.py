@@ -275,7 +275,7 @@ def _resolve_model(
     if system is not None:
         scenario = None
         if merged.scenario is not None:
-            scenario, found = resolve_scenario(merged.scenario, source, system)
+            scenario, found = resolve_scenario(merged.scenario, source, system, definitions.folder)
             variant.diagnostics += found
         system = replace(system, left_out=merged.left_out)
         errors = tuple(
@@ -368,13 +368,17 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
     )
     follow_ups.update((UNUSED_IGNORE.code, str(comment)) for comment in used)
     all_checks()  # import every rule, so that all names in the settings are known
+    scenario = None if first.context is None else first.context.scenario
+    system = first.system
+    if system is not None and scenario is not None:
+        system = system.without_nodes(scenario.replaced)
     selected = [
         *apply_rule_settings(selected, project.settings),
         *project.diagnostics,
         *check_rule_settings(project.settings, tuple(registered_rules())),
     ]
     return LoadResult(
-        first.system,
+        system,
         in_order(selected),
         source,
         project,
@@ -383,7 +387,7 @@ def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> Loa
         first.merged.tree,
         frozenset(follow_ups),
         tuple(item.system for item in file.variants[1:] if item.system is not None),
-        None if first.context is None else first.context.scenario,
+        scenario,
     )
 
 

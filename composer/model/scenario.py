@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import field
 from enum import StrEnum
+from math import inf
+from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span
 from composer.language.expressions import Expression
 from composer.language.templates import Template
 from composer.language.tree import Plain
+from composer.model.names import matches_wildcard
 from composer.model.ports import ChannelKind, LogLevel
 
 
@@ -30,6 +33,7 @@ class Verb(StrEnum):
     RAISE_IN = "raise_in"
     HANG = "hang"
     KILL = "kill"
+    REPLAY = "replay"
 
     @property
     def channel(self) -> ChannelKind | None:
@@ -46,13 +50,33 @@ _CHANNELS = {
 
 
 @dataclass(frozen=True, slots=True)
+class Replay:
+    """The replay of a bag, from ``start_s`` on and for ``duration_s``.
+
+    ``topics`` are patterns of full names; without any, all are played that the system receives and
+    does not publish. ``replaced`` are patterns of nodes that the bag stands in for.
+    """
+
+    bag: Path
+    topics: tuple[Located[str], ...] = ()
+    replaced: tuple[Located[str], ...] = ()
+    start_s: Located[float] | None = None
+    duration_s: float = inf
+
+    def includes(self, topic: str) -> bool:
+        """Return whether a topic is played, by its full name."""
+        patterns = self.topics
+        return not patterns or any(matches_wildcard(item.value, topic) for item in patterns)
+
+
+@dataclass(frozen=True, slots=True)
 class Action:
     """One thing that a step does.
 
     ``name`` is a topic, service or action with its full name, or the key of a node; of a parameter,
-    ``node.parameter``. ``content`` is a message, a request, a goal, or the fields that ``corrupt``
-    sets; ``value`` is the value of a parameter, or the name of a transition. ``options`` are the
-    other keys.
+    ``node.parameter``; of a replay, its bag as it is written. ``content`` is a message, a request,
+    a goal, or the fields that ``corrupt`` sets; ``value`` is the value of a parameter, or the name
+    of a transition. ``options`` are the other keys.
     """
 
     verb: Verb
@@ -60,6 +84,7 @@ class Action:
     content: Template | None = None
     value: Located[Plain] | None = None
     options: dict[str, Located[Plain]] = field(default_factory=dict)
+    replay: Replay | None = None
 
     @property
     def node(self) -> str:
@@ -171,6 +196,17 @@ class Scenario:
     expectations: tuple[Expectation, ...] = ()
     exit_code: int = 0
     allow_errors: bool = False
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """What all steps do."""
+        return tuple(action for step in self.steps for action in step.actions)
+
+    @property
+    def replaced(self) -> tuple[str, ...]:
+        """The patterns of nodes that bags stand in for."""
+        replays = (action.replay for action in self.actions if action.replay is not None)
+        return tuple(item.value for replay in replays for item in replay.replaced)
 
     @property
     def conditions(self) -> tuple[Condition, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from enum import StrEnum
 from typing import Any, TypeVar, cast
@@ -209,6 +209,35 @@ class System:
         """Return the port of an endpoint, or None."""
         node = self.node(endpoint.node)
         return node.port(endpoint.port) if node is not None else None
+
+    def without_nodes(self, patterns: Sequence[str]) -> System:
+        """Return the system without the nodes whose keys match; nothing waits for them.
+
+        Chains through these nodes are left out, too.
+        """
+        removed = {
+            name
+            for name in self._nodes
+            if any(matches_wildcard(pattern, name) for pattern in patterns)
+        }
+        if not removed:
+            return self
+        nodes = (
+            replace(
+                node,
+                depends_on=tuple(
+                    item for item in node.depends_on if item.node.value not in removed
+                ),
+            )
+            for node in self.nodes
+            if node.name.value not in removed
+        )
+        chains = (
+            chain
+            for chain in self.chains
+            if not any(point.node in removed for point in chain.through)
+        )
+        return replace(self, nodes=tuple(nodes), chains=tuple(chains))
 
 
 def member_system(

@@ -17,6 +17,7 @@ from composer.language.rules import KEYS_EXCLUDE_EACH_OTHER, OUT_OF_RANGE, UNKNO
 from composer.language.templates import Template, expressions_in
 from composer.language.tree import Plain
 from composer.model import Channel, ChannelKind, Node, System
+from composer.model.names import matches_wildcard
 from composer.model.scenario import (
     Action,
     Condition,
@@ -139,9 +140,9 @@ def check_names(context: Context) -> Iterator[Diagnostic]:
     scenario = context.scenario
     if scenario is None or context.is_partial:
         return
-    for action in _actions(scenario):
+    for action in (item for item in scenario.actions if item.replay is None):  # see replays.py
         if action.verb.channel is None:
-            yield from _unknown_node(context.system, action.name, action.node)
+            yield from _unknown_node(context, action.name, action.node)
         else:
             is_sink = action.verb in _SINKS
             yield from _unknown_channel(context, action.verb.channel, action.name, is_sink=is_sink)
@@ -150,11 +151,11 @@ def check_names(context: Context) -> Iterator[Diagnostic]:
             yield from _unknown_channel(context, event.kind.channel, event.name, is_sink=False)
         nodes = [name for name, _ in event.states]
         for name in (*nodes, *([event.node] if event.node is not None else [])):
-            yield from _unknown_node(context.system, name, name.value)
+            yield from _unknown_node(context, name, name.value)
     chains = [chain.name.value for chain in context.system.chains]
     for item in scenario.all_expectations:
         for name, _ in item.states:
-            yield from _unknown_node(context.system, name, name.value)
+            yield from _unknown_node(context, name, name.value)
         if item.name is not None and item.name.value not in chains:
             message = f"the system has no chain '{item.name}'"
             hint = suggestion(item.name.value, chains)
@@ -162,13 +163,12 @@ def check_names(context: Context) -> Iterator[Diagnostic]:
     yield from _without_step(scenario)
 
 
-def _actions(scenario: Scenario) -> Iterator[Action]:
-    for step in scenario.steps:
-        yield from step.actions
-
-
-def _unknown_node(system: System, name: Located[str], node: str) -> Iterator[Diagnostic]:
-    if system.node(node) is None:
+def _unknown_node(context: Context, name: Located[str], node: str) -> Iterator[Diagnostic]:
+    system = context.system
+    if _is_replaced(context, node):
+        message = f"node '{node}' is not in the run: a bag replaces it"
+        yield Diagnostic(UNKNOWN_NODE, message, name.span)
+    elif system.node(node) is None:
         names = [item.name.value for item in system.nodes]
         why = absence(system, "nodes", node, "a node")
         message = f"'{name}' names node '{node}', {why.text}"
@@ -178,13 +178,23 @@ def _unknown_node(system: System, name: Located[str], node: str) -> Iterator[Dia
         yield Diagnostic(UNKNOWN_NODE, message, span, why.labels, hint, subjects=subjects)
 
 
+def _is_replaced(context: Context, node: str) -> bool:
+    scenario = context.scenario
+    patterns = () if scenario is None else scenario.replaced
+    return any(matches_wildcard(pattern, node) for pattern in patterns)
+
+
 def _unknown_channel(
     context: Context, kind: ChannelKind, name: Located[str], *, is_sink: bool
 ) -> Iterator[Diagnostic]:
     usable = [
         channel
         for channel in context.all_channels
-        if channel.kind is kind and (channel.sinks if is_sink else channel.sources)
+        if channel.kind is kind
+        and any(
+            not _is_replaced(context, end.node.name.value)
+            for end in (channel.sinks if is_sink else channel.sources)
+        )
     ]
     names = [channel.name for channel in usable]
     if name.value not in names:
@@ -196,10 +206,10 @@ def _unknown_channel(
 
 def _without_step(scenario: Scenario) -> Iterator[Diagnostic]:
     """Report responses and results of what no step sends."""
-    done = {(action.verb, action.name.value) for action in _actions(scenario)}
+    done = {(action.verb, action.name.value) for action in scenario.actions}
     waiting: list[tuple[Verb | EventKind, Located[str]]]
     waiting = [(event.kind, event.name) for event in scenario.conditions]
-    waiting += [(action.verb, action.name) for action in _actions(scenario)]
+    waiting += [(action.verb, action.name) for action in scenario.actions]
     for kind, name in waiting:
         needed = _NEEDED.get(kind)
         if needed is not None and (needed, name.value) not in done:
@@ -213,7 +223,7 @@ def check_values(context: Context) -> Iterator[Diagnostic]:
     if scenario is None:
         return
     channels = {(channel.kind, channel.name): channel for channel in context.all_channels}
-    for action in _actions(scenario):
+    for action in scenario.actions:
         kind = action.verb.channel
         channel = None if kind is None else channels.get((kind, action.name.value))
         if channel is not None and action.content is not None:

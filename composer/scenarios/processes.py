@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field
 from functools import partial
+from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from tempfile import TemporaryFile
 from typing import IO
@@ -34,10 +35,11 @@ _TO_PRINT_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A scenario to run."""
+    """A scenario to run. ``bag`` is the folder of a new bag for the run."""
 
     scenario: Scenario
     system: System
+    bag: Path | None = None
 
 
 @dataclass(slots=True)
@@ -103,7 +105,7 @@ def _start(number: int, job: Job, options: Options, timeout_s: float) -> _Proces
     sys.stderr.flush()
     pid = os.fork()
     if pid == 0:
-        run = partial(run_scenario, job.scenario, job.system, options)
+        run = partial(run_scenario, job.scenario, job.system, options, job.bag)
         _run_and_exit(writing, output.fileno(), run)
     os.close(writing)
     lasting_s = job.scenario.for_s.value if options.real_time else 0.0
@@ -140,6 +142,8 @@ def _result(process: _Process) -> Result:
         if process.is_late:
             seen = "it was still running at the time limit: the output shows where"
         failure = Failure(process.job.scenario.name.span, "the process of the run to end", seen)
-        result = Result([failure])
+        bag = process.job.bag
+        recorded = [] if bag is None else [f"recorded until the process ended: {bag}"]
+        result = Result([failure], recorded=recorded)
     result.output = output if result.failures else ""
     return result

@@ -54,6 +54,7 @@ def details(case: Case, *, color: bool = False) -> str:
         blocks.append("\n".join(lines))
     if case.result.timeline:
         blocks.append("\n".join(["the last events before:", *case.result.timeline]))
+    blocks += case.result.recorded
     if case.result.output:
         blocks.append(f"output of the process:\n{case.result.output.rstrip()}")
     return "\n".join(blocks)

@@ -9,14 +9,26 @@ from dataclasses import field, replace
 from functools import partial
 from itertools import zip_longest
 from math import inf
+from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+from composer.bags.bag import BagError
 from composer.base.fast_dataclass import dataclass
 from composer.language.expressions import EvaluationError
 from composer.language.templates import evaluate
 from composer.model import LogLevel, System
-from composer.model.scenario import Action, Condition, EventKind, Expectation, Scenario, Verb
+from composer.model.scenario import (
+    Action,
+    Condition,
+    EventKind,
+    Expectation,
+    Replay,
+    Scenario,
+    Step,
+    Verb,
+)
+from composer.runtime.executors.futures import Future
 from composer.runtime.process import StartRefused
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.scenarios.events import Entry, Matcher, time_of
@@ -36,13 +48,15 @@ class Result:
     """How a scenario went.
 
     ``timeline`` are the last events before the first failure, ``output`` is what the process of a
-    run that failed has printed. ``trace`` has the time and a checksum of all that the run reported.
+    run that failed has printed, ``recorded`` what became of its bag. ``trace`` has the time and a
+    checksum of all that the run reported.
     """
 
     failures: list[Failure] = field(default_factory=list)
     timeline: list[str] = field(default_factory=list)
     took_s: float = 0.0
     output: str = ""
+    recorded: list[str] = field(default_factory=list)
     trace: list[tuple[float, int]] = field(default_factory=list)
 
 
@@ -58,11 +72,14 @@ class Options:
     traced: bool = False
 
 
-def run_scenario(scenario: Scenario, system: System, options: Options) -> Result:
-    """Run a scenario with its system, once."""
+def run_scenario(
+    scenario: Scenario, system: System, options: Options, bag: Path | None = None
+) -> Result:
+    """Run a scenario with its system, once. ``bag`` is the folder of a new bag for the run."""
     started_s = time.monotonic()
     seed = scenario.seed if options.seed is None else options.seed
-    test = SystemTest(in_one_process(system), seed=seed, real_time=options.real_time)
+    system = in_one_process(system)
+    test = SystemTest(system, seed=seed, real_time=options.real_time, record_to=bag)
     run = _Run(scenario, system, test)
     result = Result()
     try:
@@ -75,8 +92,9 @@ def run_scenario(scenario: Scenario, system: System, options: Options) -> Result
             result.trace = [(time_of(entry), crc32(_text(entry))) for entry in test.history]
         if result.failures and not result.timeline:
             result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
-    except (StartRefused, TestFailure) as error:
+    except (StartRefused, TestFailure, BagError) as error:
         result.failures.append(Failure(scenario.name.span, "a run of the system", str(error)))
+    result.recorded = test.recorded
     result.took_s = time.monotonic() - started_s
     return result
 
@@ -118,6 +136,7 @@ class _Run:
         self._test = test
         self._keys = {node.full_name: node.name.value for node in system.nodes}
         self._goals: dict[str, Goal] = {}
+        self._replays: list[tuple[Action, Future[None]]] = []
         self._start_s = 0.0
 
     def run(self) -> Iterator[Failure]:
@@ -128,11 +147,7 @@ class _Run:
         stopped: Failure | None = None
         try:
             for step in scenario.steps:
-                if step.at_s is not None:
-                    self._advance_to(step.at_s.value)
-                if step.when is not None:
-                    self._wait_for(step.when)
-                self._advance_to(test.now_s - self._start_s + step.after_s)
+                self._wait_until_due(step)
                 first, now_s = len(test.history), test.now_s
                 waiting += [(item, first, now_s) for item in step.expectations]
                 for action in step.actions:
@@ -140,13 +155,15 @@ class _Run:
         except _Stopped as error:
             stopped = error.failure
         else:
-            self._advance_to(scenario.for_s.value)
+            self._advance_to(scenario.for_s.value + _EPSILON_S)  # with what is due at the end
         # What is reported after the end belongs to the tear-down.
         history, end_s = list(test.history), self._start_s + scenario.for_s.value
         record = Record(history, self._keys, self._start_s, end_s, test.latencies)
         if stopped is not None:
             yield stopped
             return
+        problems = ((action, replay.exception()) for action, replay in self._replays)
+        yield from (_broken(action, str(problem)) for action, problem in problems if problem)
         waiting += [(item, 0, self._start_s) for item in scenario.expectations]
         for expectation, first, now_s in waiting:
             failure = check(expectation, record, first, now_s)
@@ -170,6 +187,13 @@ class _Run:
         if errors and not scenario.allow_errors:
             seen = _errors(errors, self._start_s)
             yield Failure(span, "no errors in the log", seen, errors[0].time_s)
+
+    def _wait_until_due(self, step: Step) -> None:
+        if step.at_s is not None:
+            self._advance_to(step.at_s.value)
+        if step.when is not None:
+            self._wait_for(step.when)
+        self._advance_to(self._test.now_s - self._start_s + step.after_s)
 
     def _advance_to(self, time_s: float) -> None:
         missing_s = self._start_s + time_s - self._test.now_s
@@ -204,10 +228,9 @@ class _Run:
     def _act(self, action: Action) -> None:
         try:
             self._do(action)
-        except (TestFailure, MessageError, EvaluationError) as error:
+        except (TestFailure, MessageError, EvaluationError, BagError) as error:
             text = error.text if isinstance(error, TestFailure) else str(error)
-            failure = Failure(action.name.span, f"'{action.verb}' to work", text, self._test.now_s)
-            raise _Stopped(failure) from error
+            raise _Stopped(_broken(action, text, self._test.now_s)) from error
 
     def _do(self, action: Action) -> None:
         test, name = self._test, action.name.value
@@ -227,10 +250,18 @@ class _Run:
                 test.delay(name, options.pop("by_s"), **options)
             case Verb.CORRUPT:
                 test.corrupt(name, partial(self._corrupted, action), **options)
+            case Verb.REPLAY if action.replay is not None:
+                self._replay(action, action.replay)
             case Verb.HANG:
                 test.hang(name, options["for_s"], options.get("handler"))
             case _:  # drop, duplicate, reorder, raise_in, kill
                 getattr(test, action.verb)(name, **options)
+
+    def _replay(self, action: Action, replay: Replay) -> None:
+        topics = [topic.value for topic in replay.topics]
+        start_s = 0.0 if replay.start_s is None else replay.start_s.value
+        played = self._test.replay(replay.bag, topics, start_s, replay.duration_s)
+        self._replays.append((action, played))
 
     def _send(self, action: Action) -> None:
         test, name = self._test, action.name.value
@@ -249,6 +280,11 @@ class _Run:
         values = {} if action.content is None else evaluate(action.content, scope)
         changed = _updated(to_plain(message), values)
         return convert_message(changed, type(message), action.name.value)
+
+
+def _broken(action: Action, text: str, until_s: float = inf) -> Failure:
+    """Return the failure of a step that could not be made."""
+    return Failure(action.name.span, f"'{action.verb}' to work", text, until_s)
 
 
 def _updated(content: Any, values: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import attrgetter
@@ -19,8 +19,9 @@ from composer.bags.system_recording import FACTS, STARTED
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
-from composer.model import ChannelKind, Node, System, channels
+from composer.model import ChannelKind, System, channels
 from composer.model.names import matches_wildcard
+from composer.testing.bag_messages import inputs
 from composer.testing.system_test import SystemTest
 
 #: Nodes are active when the first message arrives, if the bag does not say when its system started.
@@ -79,49 +80,7 @@ def without_nodes(system: System, patterns: Sequence[str]) -> System:
         if not any(matches_wildcard(pattern, name) for name in names):
             text = f"{system.name} has no node '{pattern}'"
             raise BagError(text, suggestion(pattern, names))
-    removed = {
-        name for name in names if any(matches_wildcard(pattern, name) for pattern in patterns)
-    }
-
-    def kept(node: Node) -> Node:
-        waits = tuple(item for item in node.depends_on if item.node.value not in removed)
-        return replace(node, depends_on=waits)
-
-    return replace(
-        system,
-        nodes=tuple(kept(node) for node in system.nodes if node.name.value not in removed),
-        chains=tuple(
-            item
-            for item in system.chains
-            if not any(point.node in removed for point in item.through)
-        ),
-    )
-
-
-def inputs(system: System, bag: Bag, is_wanted: Callable[[str], bool]) -> frozenset[str]:
-    """Return the topics of a bag that the system receives and does not publish.
-
-    Raises BagError if there is none, or if one has another type in the bag.
-    """
-    topics = [
-        channel
-        for channel in channels(
-            (node for node in system.nodes if node.in_process), with_transforms=True
-        )
-        if channel.kind is ChannelKind.TOPIC
-    ]
-    received = {item.name: item.sinks[0].port for item in topics if item.sinks and not item.sources}
-    found = {name for name in bag.summary.topics if name in received and is_wanted(name)}
-    if not found:
-        hint = "leave out the nodes that publish topics of the bag: --replace NODE"
-        if received:
-            hint = f"{system.name} only receives {', '.join(sorted(received))}"
-        raise BagError(f"the bag has no topic that {system.name} only receives", hint)
-    for name in sorted(found):
-        types = bag.summary.topics[name].type_name, received[name].interface.value
-        if types[0] != types[1]:
-            raise BagError(f"'{name}' is {types[0]} in the bag, and {types[1]} in the system")
-    return frozenset(found)
+    return system.without_nodes(patterns)
 
 
 def replay(system: System, bag: Bag, selection: Selection) -> Replay:

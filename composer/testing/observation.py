@@ -84,6 +84,14 @@ class Observation:
         else:
             sent.result().result().add_done_callback(partial(self._on_result, action))
 
+    def on_published(self, message: Any, topic: str) -> None:
+        """Note a message of the test. Of many on a topic, the timeline shows the last few."""
+        self.timeline.add(
+            self._now_s(),
+            lambda: f"test: published {short(to_plain(message))} on {topic}",
+            f"published on {topic}",
+        )
+
     def on_action(self, text: str) -> None:
         """Note what the test does."""
         self.timeline.add(self._now_s(), lambda: f"test: {text}")

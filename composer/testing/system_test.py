@@ -15,6 +15,7 @@ a method of this class, nothing in the system runs.
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -24,7 +25,12 @@ from typing import Any, Self, TypeVar
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
+from composer.bags.editing import Selection
+from composer.bags.reader import open_bag
+from composer.bags.system_recording import SystemRecording
 from composer.model import LogLevel, ParameterType, PortKind, System
+from composer.model.names import matches_wildcard
+from composer.model.recording import Recording
 from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.clock.virtual import START_NS, VirtualClock
 from composer.runtime.executors.futures import Future
@@ -35,6 +41,7 @@ from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.supervision.events import Event, Outcome
 from composer.testing import faults
+from composer.testing.bag_messages import messages_of
 from composer.testing.failures import LogLine, Received, TestFailure, short, unknown, unmet
 from composer.testing.faults import Faults, TopicFault
 from composer.testing.goal import Goal
@@ -52,9 +59,9 @@ class SystemTest:
 
     ``system`` is a file, or a model that is already loaded. ``arguments`` are for the system,
     ``settings`` values of parameters by ``node.parameter``. With ``real_time``, the system has the
-    time of the computer. Runs with the same ``seed`` have the same random numbers. For the replay
-    of a bag, virtual time begins at ``start_ns`` (nanoseconds since 1970), and calls that are due
-    in the same nanosecond are due at the same time.
+    time of the computer. Runs with the same ``seed`` have the same random numbers. Virtual time
+    begins at ``start_ns`` (nanoseconds since 1970). ``record_to`` is the folder of a new bag, for
+    what all nodes and the test publish.
     """
 
     __test__ = False  # no class of tests
@@ -67,38 +74,57 @@ class SystemTest:
         settings: Mapping[str, Any] | None = None,
         seed: int = 0,
         real_time: bool = False,
-        start_ns: int | None = None,
+        start_ns: int = START_NS,
+        record_to: Path | None = None,
         log_level: LogLevel = LogLevel.INFO,
     ) -> None:
         """Raise TestFailure if the file cannot be read or has errors."""
         if not isinstance(system, System):
             system = load_system(Path(system), arguments or {}, settings or {})
+        self._tested = system
         self._system = with_tester(system)
         self._seed = seed
         self._is_real = real_time
-        self._has_ticks = start_ns is not None
-        self._start_ns = START_NS if start_ns is None else start_ns
+        self._start_ns = start_ns
         self._log_level = log_level
+        self._record_to = record_to
+        #: What became of the bag: its size and its folder, and what is missing in it.
+        self.recorded: list[str] = []
+        self._resources = ExitStack()
         self._observation = Observation(lambda: self._run.now_s)
         self._run: SystemRun
         self._faults: Faults
         self._tester: Tester
 
     def __enter__(self) -> Self:
-        """Bring the system up. Raises StartRefused if it cannot run here, and TestFailure."""
+        """Bring the system up.
+
+        Raises StartRefused if it cannot run here, TestFailure, and BagError.
+        """
         clock: Clock = COMPUTER if self._is_real else VirtualClock(start_ns=self._start_ns)
-        clock.has_ticks = clock.is_virtual and self._has_ticks
         tester = self._system.node(TESTER)
         ports = () if tester is None else tester.ports
         self._faults = Faults(clock, ports, self._on_tester)
-        options = HostOptions(
-            log_level=self._log_level, clock=clock, seed=self._seed, instruments=self._faults
-        )
-        self._run = SystemRun(self._system, options, self._observation.on_event)
-        self._run.start(lambda: self._observation.is_up)
-        if self.outcome is not None:
-            raise self._failure("the system did not come up")
+        with ExitStack() as resources:
+            recording = None if self._record_to is None else self._recording(self._record_to, clock)
+            if recording is not None:
+                resources.enter_context(recording.running())
+            options = HostOptions(
+                log_level=self._log_level,
+                clock=clock,
+                seed=self._seed,
+                instruments=self._faults,
+                recorder=recording,
+            )
+            self._run = SystemRun(self._system, options, self._observation.on_event)
+            self._run.start(lambda: self._observation.is_up)
+            if self.outcome is not None:
+                raise self._failure("the system did not come up")
+            self._resources = resources.pop_all()
         return self
+
+    def _recording(self, folder: Path, clock: Clock) -> SystemRecording:
+        return SystemRecording(self._system, Recording(), clock, self.recorded.append, folder)
 
     def __exit__(
         self,
@@ -107,7 +133,8 @@ class SystemTest:
         traceback: TracebackType | None,
     ) -> None:
         """Shut the system down. Raises TestFailure if it does not end."""
-        self._run.end()
+        with self._resources:
+            self._run.end()
 
     # --- time
 
@@ -182,7 +209,7 @@ class SystemTest:
         """
         publisher = self._tester.publishers[self._port(PortKind.PUBLISHER, topic)]
         converted = _converted(message, publisher.message_type, topic)
-        self._observation.on_action(f"published {short(to_plain(converted))} on {topic}")
+        self._observation.on_published(converted, topic)
         publisher.publish(converted)
 
     def play(self, messages: Iterable[tuple[float, str, Any]]) -> None:
@@ -192,9 +219,16 @@ class SystemTest:
         that their order among calls of the system that are due at the same time is the same each
         time. Raises what :meth:`publish` and the iterable raise.
         """
+        played = self._play_soon(messages)
+        self.run_until(lambda: played.done() or self.outcome is not None, inf)
+        if not played.done():
+            raise self._failure("the system has ended before the last message")
+        played.result()
+
+    def _play_soon(self, messages: Iterable[tuple[float, str, Any]]) -> Future[None]:
         loop = self._run.host.nodes[TESTER].loop
         remaining = iter(messages)
-        over: list[BaseException | None] = []
+        played: Future[None] = Future()
 
         def play_next(topic: str = "", message: Any = None) -> None:
             try:
@@ -202,20 +236,39 @@ class SystemTest:
                     self.publish(topic, message)
                 following = next(remaining, None)
             except Exception as error:
-                over.append(error)
+                played.set_exception(error)
                 return
             if following is None:
-                over.append(None)
+                played.set_result(None)
             else:
                 time_s, *content = following
                 loop.call_later(time_s - self.now_s, partial(play_next, *content))
 
         loop.call_soon(play_next)
-        self.run_until(lambda: over or self.outcome is not None, inf)
-        if not over:
-            raise self._failure("the system has ended before the last message")
-        if over[0] is not None:
-            raise over[0]
+        return played
+
+    def replay(
+        self,
+        bag: Path,
+        topics: Sequence[str] = (),
+        start_s: float = 0.0,
+        duration_s: float = inf,
+    ) -> Future[None]:
+        """Publish a part of a bag while the system runs; the future is done at its end.
+
+        ``topics`` are full names, with ``*`` for any text; of these, all are published that the
+        system receives and does not publish. Stamps in headers are shifted to the time of the
+        system. Raises BagError; the future has the error if the bag is damaged.
+        """
+        self._observation.on_action(f"replay {bag}")
+
+        def is_wanted(name: str) -> bool:
+            return not topics or any(matches_wildcard(pattern, name) for pattern in topics)
+
+        selection = Selection(is_wanted, start_s, duration_s)
+        time_ns = self._run.clock.time_ns()
+        messages = messages_of(open_bag(bag), selection, self._tested, self.now_s, time_ns)
+        return self._play_soon(messages)
 
     def call(self, service: str, request: Any = None, timeout_s: float = 5.0) -> Any:
         """Call a service and return the response.

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +22,7 @@ from composer.cli.support.terminal import say, use_color, write, write_raw
 
 if TYPE_CHECKING:
     from composer.loading.reported import LoadResult
+    from composer.scenarios.processes import Job
     from composer.scenarios.report import Case
     from composer.scenarios.runner import Options
 
@@ -29,9 +33,12 @@ EPILOG = examples(
     "compose test --repeat 50 -j 4                 run each 50 times, four side by side",
     "compose test --real-time                      with the time of the computer",
     "compose test --junit build/scenarios.xml      write the results for CI",
+    "compose test --bag-on-failure                 keep what failed runs have published",
 )
 
 _FOLDER = Path("scenarios")
+#: What names of bags do not have, and the longest part of a scenario's name in them.
+_UNSAFE, _LONGEST_NAME = re.compile(r"[^\w-]"), 100
 
 
 def test(
@@ -80,6 +87,12 @@ def test(
         Path | None,
         typer.Option("--junit", metavar="FILE", help="Write the results as JUnit XML as well."),
     ] = None,
+    bag_on_failure: Annotated[
+        bool,
+        typer.Option(
+            "--bag-on-failure", help="Keep a bag of each failed run, in the folder 'bags'."
+        ),
+    ] = False,
     timeout: Annotated[
         float,
         typer.Option(
@@ -107,7 +120,8 @@ def test(
     workers = jobs or (1 if real_time else os.cpu_count() or 1)
     cases: list[Case] = []
     options = Options(real_time, seed, traced=repeat > 1 and not real_time)
-    for case in _run(results, options, workers, timeout, repeat):
+    bags = _new_bags() if bag_on_failure else None
+    for case in _run(results, options, (workers, timeout, repeat), bags):
         cases.append(case)
         write(case.line)
     color = use_color(sys.stdout)
@@ -173,10 +187,29 @@ def _name(result: LoadResult) -> str:
     return "" if result.scenario is None else result.scenario.name.value
 
 
+def _new_bags() -> Path:
+    """Return a folder for the bags of this command. Raises CommandError."""
+    from composer.cli.support.bags import bag_errors
+
+    with bag_errors():
+        from composer.bags.system_recording import new_folder
+
+        return new_folder(Path("bags"), "test")
+
+
 def _run(
-    results: Sequence[LoadResult], options: Options, workers: int, timeout_s: float, repeat: int
+    results: Sequence[LoadResult],
+    options: Options,
+    limits: tuple[int, float, int],
+    bags: Path | None,
 ) -> Iterator[Case]:
-    """Run the scenarios without errors, and yield all cases in order."""
+    """Run the scenarios without errors, and yield all cases in order.
+
+    ``limits`` are the number of processes, the seconds for a run and the number of repetitions.
+    ``bags`` is a folder for a bag of each failed run. If a run of several fails, the bag of the
+    first one that has passed is kept as well, to be compared with.
+    """
+    workers, timeout_s, repeat = limits
     from composer.base.diagnostics import Severity
     from composer.scenarios.processes import Job, run_jobs
     from composer.scenarios.report import Case
@@ -187,8 +220,11 @@ def _run(
         if result.is_runnable and result.scenario is not None and result.system is not None:
             require_interfaces(result.system)
             require_modules(result.system)
-            jobs += [Job(result.scenario, result.system)] * repeat
-    outcomes = run_jobs(jobs, options, workers, timeout_s)
+            for _ in range(repeat):
+                name = f"{len(jobs) + 1}-{_UNSAFE.sub('_', _name(result))[:_LONGEST_NAME]}"
+                bag = None if bags is None else bags / name
+                jobs.append(Job(result.scenario, result.system, bag))
+    outcomes = zip(jobs, run_jobs(jobs, options, workers, timeout_s), strict=True)
     for result in results:
         path, scenario = result.source.path, result.scenario
         if not result.is_runnable or scenario is None:
@@ -196,13 +232,29 @@ def _run(
             yield Case(path, _name(result), errors=errors)
             continue
         first = None
+        passed: list[Job] = []
         for number in range(1, repeat + 1):
-            name = f"{scenario.name}[{number}]" if repeat > 1 else scenario.name.value
-            outcome = next(outcomes)
+            job, outcome = next(outcomes)
             first = first or outcome
             differs = difference(scenario, first, outcome) if not outcome.failures else None
             outcome.failures += [] if differs is None else [differs]
-            yield Case(path, name, scenario.for_s.value, outcome)
+            name = f"{scenario.name}[{number}]" if repeat > 1 else scenario.name.value
+            case = Case(path, name, scenario.for_s.value, outcome)
+            if case.has_passed:
+                passed.append(job)
+                _discard(passed[1:])
+            yield case
+        if len(passed) == repeat:
+            _discard(passed)
+
+
+def _discard(jobs: Sequence[Job]) -> None:
+    """Delete the bags of runs."""
+    for job in jobs:
+        if job.bag is not None:
+            shutil.rmtree(job.bag, ignore_errors=True)
+            with suppress(OSError):
+                job.bag.parent.rmdir()  # if it is empty
 
 
 def _write_junit(path: Path, cases: Sequence[Case], took_s: float) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
+from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
@@ -18,6 +20,7 @@ from composer.language.tree_values import (
     plain_text,
     text,
     text_or_opaque,
+    texts,
     value_or,
 )
 from composer.model.names import join
@@ -29,6 +32,7 @@ from composer.model.scenario import (
     EventKind,
     Expectation,
     ExpectationKind,
+    Replay,
     Scenario,
     States,
     Step,
@@ -42,10 +46,10 @@ _VALUES = (Verb.SET_PARAMETER, Verb.TRANSITION)
 
 
 def resolve_scenario(
-    tree: Mapping, source: SourceFile, system: System
+    tree: Mapping, source: SourceFile, system: System, folder: Path
 ) -> tuple[Scenario, list[Diagnostic]]:
-    """Return the scenario in a file, with diagnostics of its expressions."""
-    reader = _Reader(system)
+    """Return the scenario in a file of a folder, with diagnostics of its expressions."""
+    reader = _Reader(system, folder)
     span = next((entry.key.span for entry in tree), tree.span)
     scenario = Scenario(
         name=text_or_opaque(tree.get("scenario"), span),
@@ -61,8 +65,9 @@ def resolve_scenario(
 
 
 class _Reader:
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, folder: Path) -> None:
         self._namespace = system.namespace
+        self._folder = folder
         self.diagnostics: list[Diagnostic] = []
 
     def step(self, tree: Tree) -> Step:
@@ -82,6 +87,9 @@ class _Reader:
         )
 
     def _actions(self, verb: Verb, entry: Entry) -> Iterator[Action]:
+        if verb is Verb.REPLAY:
+            yield self._replay(entry)
+            return
         name = text(entry.value)
         if name is not None:  # cancel, kill
             yield Action(verb, self._name(verb, name))
@@ -100,6 +108,18 @@ class _Reader:
                 }
                 content = template(_get(item.value, "set"), self.diagnostics)
                 yield Action(verb, target, content, options=options)
+
+    def _replay(self, entry: Entry) -> Action:
+        tree = entry.value
+        bag = text_or_opaque(_get(tree, "bag"), entry.key.span)
+        replay = Replay(
+            self._folder / bag.value,
+            tuple(self._name(EventKind.MESSAGE, topic) for topic in texts(_get(tree, "topics"))),
+            texts(_get(tree, "replace")),
+            number(_get(tree, "start_s")),
+            value_or(number(_get(tree, "duration_s")), inf),
+        )
+        return Action(Verb.REPLAY, bag, replay=replay)
 
     def _name(self, kind: Verb | EventKind, name: Located[str]) -> Located[str]:
         """Return the full name of a topic, service or action."""

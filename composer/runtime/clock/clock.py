@@ -19,7 +19,8 @@ class Clock(ABC):
     is_virtual = False
     #: Whether its system has no contact to other processes.
     is_isolated = False
-    #: Whether calls that are due in the same nanosecond are due at the same time, as in bags.
+    #: Whether calls that are due in the same nanosecond are due at the same time: the messages in a
+    #: bag have whole nanoseconds, so that a replay repeats their order.
     has_ticks = False
 
     @abstractmethod

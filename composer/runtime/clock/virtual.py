@@ -48,6 +48,7 @@ class VirtualClock(Clock):
     """
 
     is_virtual = True
+    has_ticks = True
 
     def __init__(
         self, speed: float = inf, *, is_isolated: bool = True, start_ns: int = START_NS

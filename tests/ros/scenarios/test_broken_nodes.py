@@ -66,7 +66,7 @@ MISTAKES = {
         "nodes/watchdog.yaml",
         "timeout_ms: {type: double, default: 1000.0",
         "timeout_ms: {type: double, default: 2500.0",
-        "none; the next one at 7.55 s",
+        "none; the next one at 7.5 s",
     ),
     "wrong_frame": Mistake(
         "nodes/obstacle_finder.py",

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from junitparser import Failure, JUnitXml
 
+from composer.bags.reader import open_bag
+
 CRASHING = """\
 import os
 
@@ -58,7 +60,8 @@ def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
         _write(tmp_path, f"{name}.yaml", SYSTEM.replace("NAME", name))
         scenario = f"scenario: {name}\nsystem: ../{name}.yaml\nfor_s: 1\n"
         _write(tmp_path, f"scenarios/{name}.yaml", scenario)
-    done = _command(tmp_path, "composer", "test", "--timeout", "3", "-j2", "--junit", "out/j.xml")
+    words = ("--timeout", "3", "-j2", "--junit", "out/j.xml", "--bag-on-failure")
+    done = _command(tmp_path, "composer", "test", *words)
     assert done.returncode == 1
     [suite] = JUnitXml.fromfile(str(tmp_path / "out" / "j.xml"))
     crashed, hung = (case.result[0] for case in suite)
@@ -68,6 +71,10 @@ def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
     assert "still running at the time limit" in hung.message
     assert "in on_tick" in hung.text
     assert "2 failed" in done.stderr
+    [folder] = (tmp_path / "bags").iterdir()
+    for name in ("1-Crashing", "2-Hanging"):
+        assert f"recorded until the process ended: bags/{folder.name}/{name}" in done.stdout
+        assert open_bag(folder / name).warnings
 
 
 def test_repetitions_and_pytest(tmp_path: Path) -> None:

@@ -1,0 +1,116 @@
+"""Scenarios with bags: a step that replays one, and the bags of failed runs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+
+from composer.bags.bag import BagError
+from composer.bags.reader import open_bag
+from composer.scenarios.runner import Result
+from composer.testing import SystemTest
+from composer.testing.bag_messages import shift_stamps
+from composer.testing.system_run import load_system
+from tests.ros.scenarios.conftest import run
+
+REPLAY = "replay: {bag: ../bag, replace: [sensor_simulator]"
+
+
+@pytest.fixture
+def recorded(project: Path) -> Path:
+    """Five seconds of the pipeline, in the folder ``bag`` of the project."""
+    with SystemTest(project / "systems" / "pipeline.yaml", record_to=project / "bag") as system:
+        system.advance(5.0)
+    assert system.recorded == [f"recorded 400 messages: {project / 'bag'}"]
+    return project
+
+
+def _run(project: Path, text: str) -> Result:
+    path = project / "scenarios" / "test.yaml"
+    path.write_text(f"scenario: test\nsystem: pipeline\nfor_s: 8\n{text}")
+    return run(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        # The first message is as old for the planner as in the recorded run.
+        f"steps: [{{at_s: 2, {REPLAY}}}, expect: [{{message: /motor_commands, within_s: 0.2}}]}}]",
+        f"steps: [{{{REPLAY}, topics: ['/sensor_*']}}, drop: {{/sensor_data: {{}}}},"
+        " expect: [{silence: /motor_commands, where: message.linear.x != 0.0}]}]",
+    ],
+)
+def test_a_step_replays_a_bag(text: str, recorded: Path) -> None:
+    result = _run(recorded, text)
+    assert [(item.expected, item.seen) for item in result.failures] == []
+
+
+def test_a_part_of_a_bag(recorded: Path) -> None:
+    loaded = load_system(recorded / "systems" / "pipeline.yaml", {}, {})
+    with SystemTest(loaded.without_nodes(["sensor_*"]), record_to=recorded / "second") as system:
+        replay = system.replay(recorded / "bag", ["/sensor_*"], start_s=1.0, duration_s=2.0)
+        system.run_until(replay.done, 2.0)
+        with pytest.raises(BagError, match="has no topic that pipeline only receives"):
+            system.replay(recorded / "bag", ["/motor_commands"])
+    assert open_bag(recorded / "second").summary.counts["/sensor_data"] == 60
+
+
+def test_stamps_have_the_time_of_the_run() -> None:
+    moved, unset = TransformStamped(), TransformStamped()
+    moved.header.stamp = Time(sec=7, nanosec=900_000_000)
+    message = TFMessage(transforms=[moved, unset])
+    shift_stamps(message, 200_000_000)
+    stamps = [(item.header.stamp.sec, item.header.stamp.nanosec) for item in message.transforms]
+    assert stamps == [(8, 100_000_000), (0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (lambda _: b"", "is empty"),
+        (
+            lambda data: data[: len(data) // 4] + bytes(500) + data[len(data) // 4 + 500 :],
+            "is corrupt or not supported",
+        ),
+    ],
+)
+def test_a_damaged_bag_fails_the_step(
+    damage: Callable[[bytes], bytes], text: str, recorded: Path
+) -> None:
+    [file] = (recorded / "bag").glob("*.mcap")
+    file.write_bytes(damage(file.read_bytes()))
+    [failure] = _run(recorded, f"steps: [{{{REPLAY}}}}}]\nallow_errors: true").failures
+    assert failure.expected == "'replay' to work"
+    assert text in failure.seen
+
+
+def _compose(folder: Path, *arguments: str | Path) -> str:
+    command = [sys.executable, "-m", "composer", *map(str, arguments)]
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False, timeout=60
+    )
+    return done.stdout
+
+
+def test_a_failed_run_leaves_a_bag(project: Path) -> None:
+    (project / "scenarios" / "wrong.yaml").write_text(
+        "scenario: too fast\nsystem: pipeline\nfor_s: 5\n"
+        "steps: [{at_s: 2, publish: {/sensor_data: {}}}]\n"
+        "expect: [{message: /motor_commands, where: message.linear.x > 9}]\n"
+    )
+    output = _compose(project, "test", "--bag-on-failure", "-k", "minimal or wrong")
+    assert "passed  scenarios/minimal.yaml" in output
+    [folder] = (project / "bags").iterdir()
+    [bag] = folder.iterdir()
+    assert f"recorded 401 messages: {bag.relative_to(project)}" in output
+    words = ("replay", bag, "systems/pipeline.yaml", "--replace", "sensor_simulator")
+    assert "which are equal" in _compose(project, *words, "--compare", bag)
+    _compose(project, "test", "--bag-on-failure", "-k", "minimal")
+    assert list((project / "bags").iterdir()) == [folder]
