@@ -36,7 +36,7 @@ class _Recorded:
 
 @dataclass(frozen=True, slots=True)
 class _Topic:
-    """The ends of a topic in nodes that no bag replaces."""
+    """The endpoints of a topic in nodes that no bag replaces."""
 
     publishers: tuple[PortOfNode, ...]
     subscriptions: tuple[PortOfNode, ...]
