@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.completion import silent
+from composer.cli.support.errors import FAILED
 from composer.cli.support.system_arguments import (
     complete_system,
     example_systems,
     path_exists,
     system_file,
 )
-from composer.cli.support.terminal import as_json, say, write
+from composer.cli.support.terminal import as_json, say, say_raw, use_color, write
 
 if TYPE_CHECKING:
     from composer.language.expand.arguments import Declared
@@ -111,11 +113,22 @@ def declared_arguments(path: Path) -> dict[str, Declared]:
 
 
 def print_arguments(text: str) -> None:
-    """Print the arguments of a system, as 'ros2 launch --show-args' does."""
+    """Print the arguments of a system, as 'ros2 launch --show-args' does.
+
+    Raises typer.Exit if the file cannot be read; the reason is printed.
+    """
+    from composer.base.diagnostics import has_errors
+    from composer.language.document import read_document
     from composer.language.tree import plain
     from composer.language.tree_values import word
+    from composer.report.text import render
 
-    declared = declared_arguments(system_file(text))
+    path = system_file(text)
+    _, _, diagnostics = read_document(path)
+    if has_errors(diagnostics):
+        say_raw(render(diagnostics, color=use_color(sys.stderr)))
+        raise typer.Exit(FAILED)
+    declared = declared_arguments(path)
     if not declared:
         say(f"'{text}' has no arguments")
     for name, argument in declared.items():

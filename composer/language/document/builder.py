@@ -308,6 +308,9 @@ class TreeBuilder:
         text = f"{{{key.value}}}"
         message = f"'{shown(text)}' is a map whose key has no value"
         hint = f'quote it if it is an expression: "{shown(text)}"'
+        if str(key.value).endswith("$"):
+            message = "'${...}' needs quotes here"
+            hint = f'write "{shown(key.value)}{{name}}": inside braces it needs quotes'
         self._report(rules.KEY_WITHOUT_VALUE, message, key.span, hint)
         parent.text_in_braces = Scalar(text, parent.start, verbatim=False)
 

@@ -42,6 +42,19 @@ def test_extends_is_resolved(tmp_path: Path) -> None:
     assert "extends" not in done.out
 
 
+def test_arguments_are_listed_unless_the_file_has_errors(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        "system: a\narguments: {lidar: {choices: [x, y], default: x}}\nnodes: {c: {}}\n"
+    )
+    done = compose("run", str(path), "--help-arguments")
+    assert (done.code, done.out) == (0, 'lidar (string)\n    default: "x"; one of: x, y\n')
+    path.write_text("system: a\narguments: {lidar: 1}\nnodes: {c_${lidar}: {}}\n")
+    done = compose("run", str(path), "--help-arguments")
+    assert (done.code, done.out) == (1, "")
+    assert "key-without-value" in done.err
+
+
 def test_a_file_with_errors_prints_nothing(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("system: a\ninclude: [b.yaml]\nnodes: {c: {}}\n")
     done = compose("config", str(tmp_path / "a.yaml"))

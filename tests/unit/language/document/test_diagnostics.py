@@ -126,6 +126,7 @@ def test_misplaced_line_shows_where_its_map_begins() -> None:
         ("a: &x b\nc: {*x : 1}", "unsupported-yaml", "f:2:5 found the alias '*x', expected a key"),
         ("log: {message.data}", "key-without-value", "f:1:7 '{message.data}' is a map whose key"),
         ("log: {data} read", "key-without-value", "f:1:7 '{data}' is a map whose key"),
+        ("nodes: {a_${i}: {}}", "key-without-value", "f:1:9 '${...}' needs quotes here"),
         ("t: {rate_hz:10}", "key-without-value", "f:1:5 there is no space after the colon of"),
         ("a: \x1b[2J", "forbidden-character", "f:1:4 the character U+001B is not allowed"),
         ("a: 1\nb: \x00", "forbidden-character", "f:2:4 the character U+0000 is not allowed"),
