@@ -1,6 +1,6 @@
 """Characters that control a terminal, change the direction of text, or are invisible.
 
-And the width of text in a terminal.
+And the width of text in a terminal, and numbers with their nouns.
 """
 
 from __future__ import annotations
@@ -24,6 +24,11 @@ _UNSAFE_IN_LINE = re.compile(f"[{UNSAFE}\r\n\t]")
 
 _ZERO_WIDTH_CATEGORIES = frozenset({"Mn", "Me"})
 _TAB = "    "
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: ``1 error``, ``2 errors``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def is_safe(text: str) -> bool:

@@ -298,7 +298,7 @@ def unified_groups(
 
     ``values`` has the arguments of all visits.
     """
-    switches = _switches(values)
+    switches = frozenset(name for name in values[0] if is_switch(item[name] for item in values))
 
     def together(numbers: Sequence[int]) -> Any:
         return _unified([trees[n] for n in numbers], [values[n] for n in numbers], switches)
@@ -319,7 +319,3 @@ def unified_groups(
 def is_switch(texts: Iterable[str]) -> bool:
     """Return whether an argument with these values is true or false."""
     return all(text.lower() in ("true", "false") for text in texts)
-
-
-def _switches(values: Sequence[Mapping[str, str]]) -> frozenset[str]:
-    return frozenset(name for name in values[0] if is_switch(item[name] for item in values))

@@ -117,7 +117,9 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
         case kinds.SYSTEM if (surplus := _surplus_entry(tree)) is not None:
             return Merged(diagnostics=[surplus])
         case kinds.SYSTEM:
-            return _merge_system(tree, document.source, definitions, arguments)
+            return _merged(
+                assemble(tree, document.source, definitions.folder, definitions.project, arguments)
+            )
         case kinds.NODE:
             return _merge_node_type(tree, document.source, definitions, arguments)
         case kinds.SCENARIO:
@@ -125,13 +127,6 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
         case _:
             problem = check_kind(tree, document.source)
             return Merged(diagnostics=[] if problem is None else [problem])
-
-
-def _merge_system(
-    tree: Mapping, source: SourceFile, definitions: Definitions, arguments: Map[str, Entry]
-) -> Merged:
-    # Each file is expanded and checked against the schema before it is merged.
-    return _merged(assemble(tree, source, definitions.folder, definitions.project, arguments))
 
 
 def _merged(assembly: AssembledSystem) -> Merged:

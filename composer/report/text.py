@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from composer.base.characters import visible, width
+from composer.base.characters import counted, visible, width
 from composer.base.diagnostics import Diagnostic, Severity
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
@@ -88,12 +88,8 @@ def _most_severe(diagnostics: Sequence[Diagnostic], maximum: int | None) -> Sequ
 def summary(diagnostics: Iterable[Diagnostic]) -> str:
     """Return one line with the number of diagnostics: ``found 3 errors, 1 warning``."""
     counts = Counter(diagnostic.severity for diagnostic in diagnostics)
-    counted = [
-        f"{counts[severity]} {severity.value}{'s' if counts[severity] != 1 else ''}"
-        for severity in Severity
-        if counts[severity]
-    ]
-    return f"found {', '.join(counted)}" if counted else "no diagnostics"
+    found = [counted(counts[item], item.value) for item in Severity if counts[item]]
+    return f"found {', '.join(found)}" if found else "no diagnostics"
 
 
 def _diagnostic(diagnostic: Diagnostic, style: _Style) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from composer.base.characters import counted
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
 from composer.base.source import Span
 from composer.interfaces import Interfaces, Message
@@ -110,10 +111,9 @@ def _out_of_range(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]
         return
     value = parameter.value.value
     if isinstance(value, list) and not -len(value) <= index < len(value):
-        count = f"{len(value)} element" + ("" if len(value) == 1 else "s")
         yield Diagnostic(
             INDEX_OUT_OF_RANGE,
-            f"parameter '{name}' has no element {index}: it has {count}",
+            f"parameter '{name}' has no element {index}: it has {counted(len(value), 'element')}",
             part_of_path(site.span, site.expression, path, 2),
             (Label(parameter.value.span, "its value"),),
             f"indices count from 0, so the last one is {len(value) - 1}" if value else None,

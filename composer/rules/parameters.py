@@ -191,7 +191,10 @@ def check_similar_parameter(context: Context) -> Iterator[Diagnostic]:
     nodes = context.system.nodes
     # What uses the parameters of a program is unknown.
     derived = [
-        node for node in nodes if len(_declaring_files(node)) > 1 and not node.gets_undeclared
+        node
+        for node in nodes
+        if len({parameter.name.span.file.path for parameter in node.parameters}) > 1
+        and not node.gets_undeclared
     ]
     if not derived:
         return
@@ -214,10 +217,6 @@ def check_similar_parameter(context: Context) -> Iterator[Diagnostic]:
             is_own = PurePath(parameter.name.span.file.path).name == PurePath(own).name
             if is_own and (node.name.value, name) not in used and name not in text:
                 yield from _similar(node, parameter)
-
-
-def _declaring_files(node: Node) -> set[str]:
-    return {parameter.name.span.file.path for parameter in node.parameters}
 
 
 def _similar(node: Node, parameter: Parameter) -> Iterator[Diagnostic]:

@@ -16,7 +16,6 @@ from composer.base.diagnostics import (
     suggestion,
     warning,
 )
-from composer.base.source import Located
 from composer.base.spelling import is_typo
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
 from composer.model.names import expand_name, remapped_name, topic_name_problem
@@ -74,7 +73,8 @@ def check_unknown_remapping(context: Context) -> Iterator[Diagnostic]:
         for remapping in node.remappings:
             source = remapping.source
             if _is_known(node, remapping) or (
-                node.gets_undeclared and not _is_misspelled(node, source)
+                node.gets_undeclared
+                and not any(is_typo(source.value, port.ros_name.value) for port in node.ports)
             ):
                 continue
             yield Diagnostic(
@@ -91,10 +91,6 @@ def _names_meant(node: Node, remapping: Remapping) -> Iterator[Subject]:
     yield ("name", own_name(node, remapping.target.value))
     for port in node.ports:
         yield from wiring(node, port)
-
-
-def _is_misspelled(node: Node, source: Located[str]) -> bool:
-    return any(is_typo(source.value, port.ros_name.value) for port in node.ports)
 
 
 def _is_known(node: Node, remapping: Remapping) -> bool:

@@ -11,9 +11,8 @@ from composer.model import USE_SIM_TIME, ChannelKind, PortKind
 from composer.model.names import parameter_name_problem, split_node_name, topic_name_problem
 from composer.model.qos import PRESETS, QosProfile
 from composer.model.resolve.parameters import rclpy_type
-from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
+from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
 
-_IS_ACTIVE = "/manager/is_active"
 _SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
 #: Parameters that rclpy and rclcpp declare for each node.
 _OF_EVERY_NODE = ("start_type_description_service", "qos_overrides.")
@@ -64,16 +63,10 @@ def describe_graph(
 
 
 def _is_selected(node: ObservedNode, selected: tuple[str, ...]) -> bool:
-    if node.is_hidden or _is_manager(node):
+    if node.is_hidden or is_manager(node.full_name, node.endpoints):
         return False
     patterns = [text if text.startswith("/") else f"*/{text}" for text in selected]
     return not patterns or any(fnmatchcase(node.full_name, pattern) for pattern in patterns)
-
-
-def _is_manager(node: ObservedNode) -> bool:
-    return node.full_name.endswith("/manager") and any(
-        end.kind is PortKind.SERVICE and end.name.endswith(_IS_ACTIVE) for end in node.endpoints
-    )
 
 
 def _channels(nodes: Iterable[ObservedNode]) -> dict[tuple[ChannelKind, str], set[bool]]:

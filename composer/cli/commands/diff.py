@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from composer.base.characters import counted
 from composer.cli.support.errors import FAILED
 from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import (
@@ -159,9 +160,8 @@ def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
         write(as_json(data, indent=2))
     elif drifts:
         write(lines(line for drift in drifts for line in _lines(drift)))
-    count = len(drifts)
-    differences = f"{count} difference{'s' if count != 1 else ''}"
-    say(f"{system.name.value}: {differences if count else 'runs as declared'}")
+    differences = counted(len(drifts), "difference")
+    say(f"{system.name.value}: {differences if drifts else 'runs as declared'}")
 
 
 def _event(what: str, drift: Drift, *, json: bool) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.base.characters import counted
 from composer.cli.support.errors import FAILED, CommandError
 from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
@@ -20,7 +21,7 @@ from composer.cli.support.system_arguments import ShowWarnings, complete_system,
 from composer.cli.support.terminal import as_json, lines, say, write
 
 if TYPE_CHECKING:
-    from composer.client.doctor import CheckResult, Level
+    from composer.client.doctor import CheckResult
     from composer.model import System
 
 EPILOG = examples(
@@ -73,8 +74,10 @@ def doctor(
             write(_text(result))
     if json:
         write(as_json([asdict(result) for result in results], indent=2))
-    errors, warnings = (_count(results, level) for level in (Level.ERROR, Level.WARNING))
-    say(f"{_counted(errors, 'error')}, {_counted(warnings, 'warning')}")
+    errors, warnings = (
+        sum(result.level is level for result in results) for level in (Level.ERROR, Level.WARNING)
+    )
+    say(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}")
     if errors or (strict and warnings):
         raise typer.Exit(FAILED)
 
@@ -175,11 +178,3 @@ def _text(result: CheckResult) -> str:
     head = f"{result.level.value:<{_LEVEL_WIDTH}}  {result.area:<{_AREA_WIDTH}}  "
     remedy = () if result.remedy is None else (f"{' ' * len(head)}-> {result.remedy}",)
     return lines([head + result.message, *remedy])
-
-
-def _count(results: list[CheckResult], level: Level) -> int:
-    return sum(result.level is level for result in results)
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.base.characters import counted
 from composer.cli.support.errors import CONFIG, FAILED, CommandError, UsageError
 from composer.cli.support.hosts import (
     check_workspaces,
@@ -179,13 +180,9 @@ def _report(host: Host, changes: Sequence[str], *, dry_run: bool) -> None:
     deleted = sum(change.startswith("del.") for change in changes)
     copied = len(changes) - deleted
     verb = "would be " if dry_run else ""
-    parts = [f"{_files(copied)} {verb}copied"] if copied else []
-    parts += [f"{_files(deleted)} {verb}deleted"] if deleted else []
+    parts = [f"{counted(copied, 'file')} {verb}copied"] if copied else []
+    parts += [f"{counted(deleted, 'file')} {verb}deleted"] if deleted else []
     write(lines([f"{host.name}: {', '.join(parts) or 'up to date'}"]))
-
-
-def _files(count: int) -> str:
-    return "1 file" if count == 1 else f"{count} files"
 
 
 @hosts_app.command(

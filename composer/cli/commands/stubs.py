@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.base.characters import counted
 from composer.base.fast_dataclass import dataclass
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import examples
@@ -214,11 +215,7 @@ def update_typings(project: Project) -> None:
 def _counted(changes: FolderChanges) -> str:
     """Return how many files have changed."""
     removed = f", {len(changes.obsolete)} removed" if changes.obsolete else ""
-    return f"{_files(len(changes.outdated))} written{removed}"
-
-
-def _files(number: int) -> str:
-    return f"{number} file{'' if number == 1 else 's'}"
+    return f"{counted(len(changes.outdated), 'file')} written{removed}"
 
 
 def _system_paths(project: Project) -> Iterator[Path]:

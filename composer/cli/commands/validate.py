@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from composer.base.characters import counted
 from composer.base.fast_dataclass import dataclass
 from composer.cli.commands.stubs import update_typings
 from composer.cli.support.completion import complete_rule
@@ -130,7 +131,7 @@ def validate(
     diagnostics = _selected(checked.diagnostics, select or [], ignore or [])
     _print(diagnostics, output_format or _default_format(), max_diagnostics)
     suffix = "" if diagnostics else ": no problems found"
-    say(f"{checked.files} file{'' if checked.files == 1 else 's'} checked{suffix}")
+    say(f"{counted(checked.files, 'file')} checked{suffix}")
     for project in checked.projects:
         update_typings(project)
     if checked.foreign:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO
 
-from composer.base.characters import escape_lines
+from composer.base.characters import counted, escape_lines
 from composer.cli.support.callback_tables import summary_table
 from composer.cli.support.console import OutputQueue
 from composer.cli.support.line_format import Line, LineFormat
@@ -158,8 +158,8 @@ def _error_line(nodes: Sequence[NodeSummary]) -> str:
     shown = [f"{node.node} ({node.errors})" for node in failed[:_MAX_NODES_WITH_ERRORS]]
     more = [f"{len(failed) - len(shown)} more"] if len(failed) > len(shown) else []
     total = sum(node.errors for node in failed)
-    what = "1 error" if total == 1 else f"{total} errors"
-    return f"{what} in {'node' if len(failed) == 1 else 'nodes'} {', '.join(shown + more)}"
+    noun = "node" if len(failed) == 1 else "nodes"
+    return f"{counted(total, 'error')} in {noun} {', '.join(shown + more)}"
 
 
 class RunLog:

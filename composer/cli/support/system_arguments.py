@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from composer.base.characters import counted
 from composer.cli.support.completion import complete_running_system
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.terminal import say, say_raw, use_color
@@ -202,8 +203,7 @@ def load_system(
         say_raw(render(reported, color=use_color(sys.stderr)))
     count = sum(item.severity is Severity.WARNING for item in result.diagnostics)
     if count and warnings is ShowWarnings.COUNT:
-        number = "1 warning" if count == 1 else f"{count} warnings"
-        say(f"{number}: see 'compose validate {shown or path}'")
+        say(f"{counted(count, 'warning')}: see 'compose validate {shown or path}'")
     return result
 
 

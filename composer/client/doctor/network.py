@@ -12,6 +12,7 @@ import socket
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from composer.base.characters import counted
 from composer.client.doctor import CheckResult, error, note, ok, warning
 from composer.model import Discovery, DiscoveryKind
 from composer.runtime.middleware.environment import discovery_conflict
@@ -138,7 +139,7 @@ def _check_leftovers(folder: Path) -> Iterator[CheckResult]:
     if dead:
         yield note(
             _NETWORK,
-            f"{len(dead)} shared memory segment{'s' if len(dead) > 1 else ''} of killed processes:"
+            f"{counted(len(dead), 'shared memory segment')} of killed processes:"
             " Fast DDS prints errors about them",
             "run 'fastdds shm clean'",
         )

@@ -10,7 +10,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
@@ -103,12 +103,8 @@ def _type_hash(name: str) -> str | None:
             described = json.loads(read_regular(path, _MAX_DESCRIPTION_BYTES))["type_hashes"]
         except (OSError, ValueError, KeyError, TypeError):
             continue
-        return _hash_of(described, name)
+        return next((item["hash_string"] for item in described if item["type_name"] == name), None)
     return None
-
-
-def _hash_of(described: Iterable[Mapping[str, str]], name: str) -> str | None:
-    return next((item["hash_string"] for item in described if item["type_name"] == name), None)
 
 
 def _digest(path: Path) -> str | None:

@@ -6,6 +6,7 @@ from array import array
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from composer.base.characters import counted
 from composer.base.diagnostics import suggestion
 from composer.base.source import SourceFile
 from composer.client.messages.field_paths import path_steps
@@ -159,6 +160,6 @@ def _step(value: Any, step: str | int, path: str) -> Any:
         try:
             return value[step]
         except IndexError as error:
-            count = f"{len(value)} item{'' if len(value) == 1 else 's'}"
-            raise InvalidValueError(f"'{path}': index {step} of {count}") from error
+            items = counted(len(value), "item")
+            raise InvalidValueError(f"'{path}': index {step} of {items}") from error
     raise InvalidValueError(f"'{path}': {value!r:.60} has no part '{step}'")

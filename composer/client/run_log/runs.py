@@ -23,7 +23,11 @@ _FILE_NAME = re.compile(r"log-(\d{6,12})\.jsonl")
 def log_files(folder: Path) -> list[Path]:
     """Return the log files in ``folder``, oldest first."""
     with suppress(OSError):
-        found = [(int(match[1]), path) for path in folder.iterdir() if (match := _match(path))]
+        found = [
+            (int(match[1]), path)
+            for path in folder.iterdir()
+            if (match := _FILE_NAME.fullmatch(path.name))
+        ]
         return [path for _, path in sorted(found)]
     return []
 
@@ -74,10 +78,6 @@ class RotatingFile:
 
     def _path(self, number: int) -> Path:
         return self._folder / f"log-{number:06}.jsonl"
-
-
-def _match(path: Path) -> re.Match[str] | None:
-    return _FILE_NAME.fullmatch(path.name)
 
 
 FOLDER = "compose"

@@ -8,14 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 from composer.dashboard.declared import Declared
-from composer.dashboard.observing.topology import is_manager
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
 from composer.graph.formats.svg import contents, markers
 from composer.graph.layout import Size, arrange_for_pages
 from composer.graph.scene import Scene
 from composer.graph.views import View, build_graph, live_scene_of, scene_of
 from composer.model import PortKind
-from composer.plan.drift import Snapshot
+from composer.plan.drift import Snapshot, is_manager
 
 #: Stand where the page writes the state of a node and the rate of a topic, as the longest usual
 #: ones: what is measured must not change the layout.

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import PortKind
 from composer.model.names import is_hidden
-from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
+from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
 
 _GET_STATE = "lifecycle_msgs/srv/GetState"
-_MANAGER, _IS_ACTIVE, _TRIGGER = "/manager", "is_active", "std_srvs/srv/Trigger"
 
 
 @dataclass(frozen=True)
@@ -72,12 +71,6 @@ class Topology:
     def is_for_tools(self, name: str) -> bool:
         """Return whether a topic or service is hidden by name, or is one of a manager."""
         return is_hidden(name) or name.rpartition("/")[0] in self.managers
-
-
-def is_manager(node: str, ends: Iterable[ObservedEndpoint]) -> bool:
-    """Return whether a node with these endpoints is the manager of a running system."""
-    own_service = (f"{node}/{_IS_ACTIVE}", _TRIGGER)
-    return node.endswith(_MANAGER) and any((end.name, end.type) == own_service for end in ends)
 
 
 def first_topology() -> Topology | None:

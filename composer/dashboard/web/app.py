@@ -212,7 +212,7 @@ def _content(path: str) -> Response:
     is_odd = any(part in ("", ".", "..") or part.startswith(".") for part in parts)
     found = file_of_page(path) if not is_odd and len(path) <= _MAX_PATH else None
     if found is None or not path.endswith(_SUFFIXES) or not found.is_file():
-        return _not_found(path)
+        return refusal_page(Refusal(404, f"there is no file '{path[:_MAX_PATH]}'"))
     kind = mimetypes.guess_type(path)[0] or "application/octet-stream"
     if kind == "application/javascript":
         kind = "text/javascript"
@@ -221,10 +221,6 @@ def _content(path: str) -> Response:
 
 def _of_page(content: bytes, kind: str) -> Response:
     return Response(content, media_type=kind, headers={"Cache-Control": "no-cache"})
-
-
-def _not_found(path: str) -> Response:
-    return refusal_page(Refusal(404, f"there is no file '{path[:_MAX_PATH]}'"))
 
 
 def refusal_page(refusal: Refusal) -> Response:

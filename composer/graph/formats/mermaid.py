@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from composer.base.characters import escape_line
-from composer.graph.diagram import Cluster, Edge, EdgeKind, Graph, Mark, Vertex, VertexKind
+from composer.graph.diagram import Edge, EdgeKind, Graph, Mark, Vertex, VertexKind
 from composer.graph.formats.theme import LIGHT_COLORS
 
 #: Mermaid's default limits (``maxTextSize``, ``maxEdges``).
@@ -78,13 +78,9 @@ def _inside(around: str, graph: Graph, identifiers: dict[str, str], indent: str)
             yield f"{indent}{_vertex(vertex, identifiers)}"
     for number, cluster in enumerate(graph.clusters, 1):
         if cluster.parent == around:
-            yield f"{indent}{_frame(cluster, number)}"
+            yield f"{indent}subgraph c{number} [{_quoted((cluster.label,))}]"
             yield from _inside(cluster.key, graph, identifiers, indent + "  ")
             yield f"{indent}end"
-
-
-def _frame(cluster: Cluster, number: int) -> str:
-    return f"subgraph c{number} [{_quoted((cluster.label,))}]"
 
 
 def _vertex(vertex: Vertex, identifiers: dict[str, str]) -> str:

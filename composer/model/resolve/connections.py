@@ -126,7 +126,9 @@ def _connection(tree: Tree) -> Connection | None:
     if entry is None or name is None:
         return None
     kind = ChannelKind(entry.name)
-    sources, sinks = (_endpoints(tree.get(end)) for end in _ENDPOINT_KEYS[kind])
+    sources, sinks = (
+        tuple(Endpoint(name) for name in texts(tree.get(end))) for end in _ENDPOINT_KEYS[kind]
+    )
     return Connection(
         kind,
         name,
@@ -142,10 +144,6 @@ def _connection(tree: Tree) -> Connection | None:
 def _kind_entry(tree: Mapping) -> Entry | None:
     kinds = {kind.value for kind in ChannelKind}
     return next((entry for entry in tree if entry.name in kinds), None)
-
-
-def _endpoints(tree: Tree | None) -> tuple[Endpoint, ...]:
-    return tuple(Endpoint(name) for name in texts(tree))
 
 
 def _profile(tree: Tree, kind: ChannelKind, qos: QosTable) -> Qos | None:

@@ -297,7 +297,10 @@ def _dependencies(tree: Tree | None, container: Located[str] | None) -> tuple[De
     A component needs its container active.
     """
     if isinstance(tree, Mapping):
-        declared = [_dependency(entry) for entry in tree]
+        declared = [
+            Dependency(key(entry), value_or(choice(entry.value, PrimaryState), PrimaryState.ACTIVE))
+            for entry in tree
+        ]
     else:
         names = (text(item) for item in (tree.items if isinstance(tree, Sequence) else ()))
         declared = [Dependency(name) for name in names if name is not None]
@@ -305,7 +308,3 @@ def _dependencies(tree: Tree | None, container: Located[str] | None) -> tuple[De
         return tuple(declared)
     others = (item for item in declared if item.node.value != container.value)
     return (Dependency(container, is_container=True), *others)
-
-
-def _dependency(entry: Entry) -> Dependency:
-    return Dependency(key(entry), value_or(choice(entry.value, PrimaryState), PrimaryState.ACTIVE))

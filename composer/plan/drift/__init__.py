@@ -1,7 +1,7 @@
 """Compares a declared system with an observed ROS graph, without using ROS.
 
-``snapshot`` is the observed graph, ``compare`` finds the differences, and ``drift`` describes them
-and selects those that last long enough to be reported.
+``drift`` has the observed graph, describes differences and selects those that last long enough to
+be reported; ``compare`` finds them.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from composer.plan.drift.drift import (
     ObservedNode,
     ObservedProcess,
     Snapshot,
+    is_manager,
 )
 
 __all__ = [
@@ -28,4 +29,5 @@ __all__ = [
     "ObservedProcess",
     "Snapshot",
     "compare",
+    "is_manager",
 ]

@@ -21,11 +21,17 @@ from composer.model import (
 )
 from composer.model.qos import QosProfile
 from composer.plan import bring_up
-from composer.plan.drift.drift import Drift, DriftKind, ObservedEndpoint, ObservedNode, Snapshot
+from composer.plan.drift.drift import (
+    MANAGER,
+    Drift,
+    DriftKind,
+    ObservedEndpoint,
+    ObservedNode,
+    Snapshot,
+    is_manager,
+)
 
-_MANAGER = "manager"
 _NODES_HINT = "if its program creates them all, list their names under 'nodes' of the executable"
-_MANAGER_SERVICE = "is_active"
 #: States in which a node has its ports.
 _WITH_PORTS = ("inactive", "active")
 #: The policies that discovery reports for publishers and subscriptions; not history and depth.
@@ -109,11 +115,9 @@ def _has_lifecycle(node: Node) -> bool:
 def _is_manager(system: System, other: ObservedNode) -> bool:
     """Return whether this is the manager node of the system, or of one of its processes."""
     name = system.name.value
-    processes = (f"{name}/{process.name.value}" for process in system.processes)
-    return any(
-        other.full_name.endswith(f"/{part}/{_MANAGER}") for part in (name, *processes)
-    ) and any(
-        endpoint.name == f"{other.full_name}/{_MANAGER_SERVICE}" for endpoint in other.endpoints
+    names = (name, *(f"{name}/{process.name}" for process in system.processes))
+    return is_manager(other.full_name, other.endpoints) and any(
+        other.full_name.endswith(f"/{part}/{MANAGER}") for part in names
     )
 
 

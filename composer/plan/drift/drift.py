@@ -71,6 +71,19 @@ class ObservedEndpoint:
         return False
 
 
+#: The last name of the manager of a running system, and a service that every manager has.
+MANAGER, _MANAGER_SERVICE = "manager", ("is_active", "std_srvs/srv/Trigger")
+
+
+def is_manager(node: str, endpoints: Iterable[ObservedEndpoint]) -> bool:
+    """Return whether a node with these endpoints is the manager of a running system."""
+    name, kind = _MANAGER_SERVICE
+    service = (f"{node}/{name}", kind)
+    return node.endswith(f"/{MANAGER}") and any(
+        (item.name, item.type) == service for item in endpoints
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class ObservedNode:
     """A node of the graph.
