@@ -35,8 +35,8 @@ from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.clock.virtual import START_NS, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.host_options import HostOptions
+from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.managed_node import InProcessNode, ManagedNode
-from composer.runtime.node.node import RunningNode
 from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.supervision.events import Event, Outcome
@@ -378,7 +378,7 @@ class SystemTest:
     def kill(self, node: str, reason: str = "killed by the test") -> None:
         """Let a node fail, so that its ``on_failure`` applies."""
         found = self._node(node)
-        if not isinstance(found, RunningNode):
+        if not isinstance(found, LocalNode):
             raise self._failure(f"{node} does not run in this process")
         self._observation.on_action(f"let {node} fail")
         found.loop.call_soon(partial(found.fail, reason))

@@ -9,7 +9,10 @@ from __future__ import annotations
 import threading
 import time
 from abc import ABC, abstractmethod
-from typing import Final
+from queue import SimpleQueue
+from typing import Final, TypeVar
+
+T = TypeVar("T")
 
 
 class Clock(ABC):
@@ -40,6 +43,10 @@ class Clock(ABC):
         """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
 
     @abstractmethod
+    def get(self, queue: SimpleQueue[T], /) -> T:
+        """Wait for an item of a queue, and remove and return it."""
+
+    @abstractmethod
     def start(self, thread: threading.Thread) -> None:
         """Start a thread of the system."""
 
@@ -63,6 +70,10 @@ class RealClock(Clock):
     def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
         """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
         return event.wait(timeout_s)
+
+    def get(self, queue: SimpleQueue[T], /) -> T:
+        """Wait for an item of a queue, and remove and return it."""
+        return queue.get()
 
     def start(self, thread: threading.Thread) -> None:
         """Start a thread of the system."""

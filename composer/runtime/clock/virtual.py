@@ -11,10 +11,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from math import inf
+from queue import SimpleQueue
 from threading import get_ident
-from typing import Final
+from typing import Final, TypeVar
 
 from composer.runtime.clock.clock import COMPUTER, Clock
+
+T = TypeVar("T")
 
 #: Virtual time begins in September 2001: not at zero, which means in ROS that no time is known.
 START_NS: Final = 10**18
@@ -67,6 +70,8 @@ class VirtualClock(Clock):
         self._members = {get_ident()}
         self._alive: set[threading.Thread] = set()
         self._followers: list[Callable[[int], None]] = []
+        #: The identifier of the thread that has the turn.
+        self.running_thread = get_ident()
         #: How often a thread has begun its turn.
         self.turns = 0
         self._reads = 0  # since the last jump
@@ -101,6 +106,11 @@ class VirtualClock(Clock):
         """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
         return self.wait_until(event.is_set, inf if timeout_s is None else self._now_s + timeout_s)
 
+    def get(self, queue: SimpleQueue[T], /) -> T:
+        """Wait for an item of a queue, and remove and return it."""
+        self.wait_until(lambda: not queue.empty())
+        return queue.get()
+
     def start(self, thread: threading.Thread) -> None:
         """Start a thread of the system; it runs when it gets the turn."""
         first = _Waiting(lambda: True, self._now_s)
@@ -109,6 +119,7 @@ class VirtualClock(Clock):
         def run_in_turn() -> None:
             self._members.add(get_ident())
             first.turn.acquire()
+            self.running_thread = get_ident()
             try:
                 run()
             finally:
@@ -158,6 +169,7 @@ class VirtualClock(Clock):
             if not waiting.turn.acquire(timeout=_INTERRUPTED_WITHIN_S):
                 self._waiting.remove(waiting)
             raise
+        self.running_thread = get_ident()
 
     def _next(self) -> _Waiting:
         """Return the thread that has the next turn; it does not wait any more."""

@@ -12,7 +12,7 @@ from math import floor, inf, isnan
 from typing import Any, Generic, TypeVar, cast
 
 from composer.runtime.clock.clock import Clock
-from composer.runtime.executors.futures import Awaited, Future
+from composer.runtime.executors.futures import Future
 from composer.runtime.executors.stacks import format_stacks
 from composer.runtime.executors.tasks import Report, Task, name_of
 
@@ -218,15 +218,12 @@ class BaseLoop(ABC):
             raise RuntimeError(f"executor '{self._name}' has stopped")
         return call.wait(timeout_s, self.current_stack)
 
-    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
-        """Block until ``future`` is done; return false if that takes longer, or the loop stops."""
-        done = threading.Event()
-        future.add_done_callback(lambda _: done.set())
-        self._waits.add(done)
-        if not (future.done() or self._stopping):
-            self.clock.wait(done, timeout_s)
-        self._waits.discard(done)
-        return future.done()
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> None:
+        """Block until ``event`` is set or the time is over. A loop that stops sets the event."""
+        self._waits.add(event)
+        if not self._stopping:
+            self.clock.wait(event, timeout_s)
+        self._waits.discard(event)
 
     def _end_waits(self) -> None:
         """Let all waits return; the loop is stopping."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Generator
 from typing import Any, Generic, Protocol, TypeVar, cast
 
@@ -139,6 +140,15 @@ class _Failure:
     def __del__(self) -> None:
         if self.report is not None:
             self.report(self.error)
+
+
+def done_event(future: Awaited) -> threading.Event:
+    """Return an event that is set once a future is done."""
+    event = threading.Event()
+    future.add_done_callback(lambda _: event.set())
+    if future.done():
+        event.set()
+    return event
 
 
 def wrap_future(

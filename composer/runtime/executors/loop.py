@@ -114,6 +114,14 @@ class Loop(Scheduler):
         """Complete the futures of the client and deliver its feedback."""
         self._serve(client, ActionSource(client, self._executor, self))
 
+    def action_receiver(self, client: ActionClient) -> Callable[[dict[str, Any]], None]:
+        """Return a function that passes to a client what came from a server of the process.
+
+        It takes what ``client.take_data()`` returns, from any thread.
+        """
+        source = ActionSource(client, self._executor, self)
+        return lambda taken: self.call_soon(partial(source.call, taken))
+
     def remove(self, entity: object) -> None:
         """Stop serving an entity. Call it before the entity is destroyed."""
         with self._changing:

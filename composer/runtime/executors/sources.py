@@ -188,12 +188,17 @@ class ClientSource:
     def call(self, taken: Any) -> None:
         """Complete the future of the request, unless it was removed."""
         header, response = taken
-        try:
-            future = self._client.get_pending_request(header.request_id.sequence_number)
-        except KeyError:
-            return
-        future._set_executor(self._executor)  # the loop reports exceptions of done callbacks
-        future.set_result(response)
+        complete_request(self._client, self._executor, header.request_id.sequence_number, response)
+
+
+def complete_request(client: Any, executor: object, number: int, response: Any) -> None:
+    """Complete the future of a client's request, unless it was removed."""
+    try:
+        future = client.get_pending_request(number)
+    except KeyError:
+        return
+    future._set_executor(executor)  # the loop reports exceptions of done callbacks
+    future.set_result(response)
 
 
 class EventSource:

@@ -21,7 +21,6 @@ from threading import get_ident
 from composer.model import ExecutorKind
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.base_loop import PAUSE_AFTER_FAULT_S, BaseLoop
-from composer.runtime.executors.futures import Awaited
 from composer.runtime.executors.poller import use_precise_wakeups
 from composer.runtime.executors.tasks import Report
 
@@ -197,8 +196,8 @@ class TurnTaking(BaseLoop):
         self._checked = call
         return bool(call)
 
-    def wait_for(self, future: Awaited, timeout_s: float | None = None) -> bool:
-        """Block until ``future`` is done; return false if that takes longer, or the loop stops.
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> None:
+        """Block until ``event`` is set or the time is over. A loop that stops sets the event.
 
         In a callback, another thread serves the loop meanwhile, if its kind allows it. On a loop
         of kind *events*, the callback continues with its turn, so that it overlaps with no other
@@ -206,14 +205,14 @@ class TurnTaking(BaseLoop):
         """
         self.overlap()
         with self._handing_over:
-            had_turn = self._replaces_blocked and self._has_turn() and not future.done()
+            had_turn = self._replaces_blocked and self._has_turn() and not event.is_set()
             call = self._turn.call
             if had_turn:
                 if call is not None:
                     call.clear()
                 self._hand_over()
         try:
-            return super().wait_for(future, timeout_s)
+            super().wait(event, timeout_s)
         finally:
             if had_turn:
                 self._resume(call)
@@ -312,7 +311,7 @@ class TurnTaking(BaseLoop):
                 if self._has_turn():
                     return self._turn
                 self._idle.add(threading.current_thread())
-                return self._turns.get()
+                return self.clock.get(self._turns)
             except BaseException as error:  # an interrupt of a callback that has just returned
                 self.report(f"executor '{self._name}'", error)
 

@@ -19,26 +19,18 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.service import Service
 from rclpy.subscription import Subscription
-from rclpy.timer import Timer
+from rclpy.timer import Rate, Timer
 from rclpy.waitable import Waitable
 
 from composer.model import PortKind
-from composer.runtime.executors.futures import Future
 from composer.runtime.executors.sources import Taken, rclpy_callback
 from composer.runtime.hosting.declared_ports import HostingError
 from composer.runtime.hosting.instance import Instance
-from composer.runtime.hosting.ports.calls import (
-    ClientPort,
-    HostedActionClient,
-    HostedActionServer,
-    HostedService,
-)
-from composer.runtime.hosting.ports.timers import HostedGuardCondition, HostedTimerPort
-from composer.runtime.hosting.ports.topics import (
-    HostedPublisher,
-    HostedSubscription,
-    PendingQosEvents,
-)
+from composer.runtime.hosting.ports.actions import HostedActionClient, HostedActionServer
+from composer.runtime.hosting.ports.qos_events import PendingQosEvents
+from composer.runtime.hosting.ports.services import ClientPort, HostedService
+from composer.runtime.hosting.ports.timers import HostedGuardCondition, HostedRate, HostedTimerPort
+from composer.runtime.hosting.ports.topics import FirstMessage, HostedPublisher, HostedSubscription
 from composer.runtime.node.parameter_services import LoggerServices
 from composer.runtime.ros.messages import load_type_support
 
@@ -203,6 +195,13 @@ class AdoptedNode(Node):
         self._begin(timer, lambda instance: HostedTimerPort(instance, timer))
         return timer
 
+    def create_rate(self, *arguments: Any, **options: Any) -> Rate:
+        """Create a rate, as rclpy."""
+        rate: Any = super().create_rate(*arguments, **options)
+        rate.__class__ = HostedRate
+        rate._instance = self._composer_instance
+        return rate  # type: ignore[no-any-return]
+
     def create_guard_condition(
         self, callback: Any, callback_group: CallbackGroup | None = None
     ) -> Any:
@@ -234,10 +233,10 @@ class AdoptedNode(Node):
         load_type_support(msg_type)
         instance = self._composer_instance
         loop = instance.context.loop
-        received: Future[Any] = Future()
+        received = FirstMessage()
 
         def receive(taken: Taken) -> None:
-            received.set_result(taken[0])
+            received.put(taken[0])
 
         # Not a port: the gate would close it, and the class uses it only here.
         subscription = super().create_subscription(
@@ -248,10 +247,16 @@ class AdoptedNode(Node):
             event_callbacks=PendingQosEvents(None),  # type: ignore[arg-type]
         )
         instance.ports.awaited.add(subscription.topic_name)
+        port = instance.ports.port(
+            PortKind.SUBSCRIPTION, subscription.topic_name, msg_type, subscription.qos_profile
+        )
+        remove = instance.context.router.add_subscription(port, subscription, received)
         loop.add_subscription(subscription, receive)
         try:
             is_received = instance.wait_for(received, timeout_s)
         finally:
+            remove()
+            instance.ports.forget(port)
             loop.remove(subscription)
             super().destroy_subscription(subscription)
         return is_received, received.result() if is_received else None

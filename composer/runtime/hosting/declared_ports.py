@@ -25,7 +25,7 @@ class HostingError(TransitionFailed):
 
 
 #: Created by rclpy for every node, or by the composer.
-_OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})
+OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})
 
 
 def interface_name(interface: Any) -> str:
@@ -62,7 +62,7 @@ class DeclaredPorts:
                 return self._declared(port, created, profile)
         port = self._undeclared(kind, full_name, created, profile)
         self.created.add(port.name.value)
-        if full_name not in _OF_EVERY_NODE and (kind, full_name) not in self._reported:
+        if full_name not in OF_EVERY_NODE and (kind, full_name) not in self._reported:
             self._reported.add((kind, full_name))
             self.on_undeclared(port)
         return port

@@ -22,6 +22,7 @@ from composer.model.interface_packages import how_to_get
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
 from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_class
 from composer.runtime.hosting.declared_ports import (
@@ -140,6 +141,7 @@ class HostedNode(LocalNode):
         if instance is not None and is_managed(type(instance.node)):
             await self._in_thread(instance, partial(self._handle, instance, "error"), "on_error")
 
+    @calls_user_code
     def _handle(self, instance: Instance, transition: str) -> None:
         """Call a handler of a lifecycle node class."""
         name = f"on_{transition}"
@@ -150,6 +152,7 @@ class HostedNode(LocalNode):
         if answer != TransitionCallbackReturn.SUCCESS:
             raise WrongReturn(f"{name} returned {answer!r}, not a TransitionCallbackReturn")
 
+    @calls_user_code
     def _construct(self, instance: Instance) -> None:
         target: Any = node_class(self._hosted.reference)
         arguments = {name.value: value for name, value in self._hosted.arguments}
@@ -226,6 +229,7 @@ class HostedNode(LocalNode):
                 request=self._request,
                 current_state=lambda: (_STATE_IDS.get(self.state, 0), self.state),
                 may_block=True,
+                package=self._hosted.reference.module.partition(".")[0],
             ),
         )
 

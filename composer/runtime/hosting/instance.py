@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from math import inf
 from types import FrameType
 from typing import Any
 
@@ -25,7 +26,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import SEVERITIES, LogLevel, Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import Log
-from composer.runtime.executors.futures import Awaited, Future
+from composer.runtime.executors.futures import Awaited, Future, done_event
 from composer.runtime.executors.strand import ExclusiveStrand, ReentrantStrand, Strand
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.callback_groups import OwnGroup
@@ -90,7 +91,8 @@ class InstanceSettings:
     of actions by kind and expanded name. ``finish(reason)`` deactivates the node: the class says
     that it has finished. ``request(transition)`` requests a transition. ``current_state()`` returns
     the id and the label of the state. With ``may_block``, others run while a callback blocks: those
-    of its group wait on a strand.
+    of its group wait on a strand. ``package`` is the top-level package of the class; empty for the
+    node of a behavior.
     """
 
     overrides: Mapping[str, Parameter]
@@ -100,6 +102,7 @@ class InstanceSettings:
     request: Callable[[str], None]
     current_state: Callable[[], tuple[int, str]]
     may_block: bool
+    package: str = ""
 
 
 def is_reentrant(context: NodeContext) -> bool:
@@ -109,6 +112,8 @@ def is_reentrant(context: NodeContext) -> bool:
 
 #: How long ``rclpy.spin_once`` without a time waits: responses of clients do not end it.
 _SPINS_WITHIN_S = 0.05
+#: rclpy does not notify when a server appears.
+_POLL_PERIOD_S = 0.05
 #: The groups of rclpy. Classes derived from them are groups of a class's own.
 _GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 
@@ -126,6 +131,7 @@ class Instance(UserCode):
         context, self._always_on_context = contexts
         super().__init__(context, settings.finish, may_block=settings.may_block)
         self.ports = ports
+        self.package = settings.package
         self.overrides = settings.overrides
         self.logger = settings.logger
         self.action_names = settings.action_names
@@ -244,8 +250,20 @@ class Instance(UserCode):
 
         In a callback, the loop goes on with everything but callbacks of the same group.
         """
-        limit_s = None if timeout_s is None or timeout_s < 0 else timeout_s
-        return self.context.loop.wait_for(future, limit_s)
+        self.wait(done_event(future), None if timeout_s is None or timeout_s < 0 else timeout_s)
+        return future.done()
+
+    def sleep(self, delay_s: float) -> None:
+        """Block for a time by the clock of the loop, as :meth:`wait_for`."""
+        self.wait(threading.Event(), max(0.0, delay_s))
+
+    def wait_for_server(self, is_ready: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Block until ``is_ready()``, as rclpy does by polling; return false after the time."""
+        monotonic = self.context.loop.clock.monotonic
+        until_s = inf if timeout_s is None else monotonic() + timeout_s
+        while not is_ready() and monotonic() < until_s and not self.ended.is_set():
+            self.sleep(min(_POLL_PERIOD_S, until_s - monotonic()))
+        return is_ready()
 
 
 def current_instance() -> Instance | None:

@@ -47,6 +47,29 @@ class UserCode:
         self.interrupted: set[tuple[int, str]] = set()
         #: The threads that the class has started.
         self.threads: list[threading.Thread] = []
+        self._waits: dict[int, threading.Event] = {}  # by the threads that wait
+
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
+        """Block until ``event`` is set, in code of the class; return false after the time.
+
+        In a callback, the loop goes on. Raises CallAbandoned if the call is interrupted.
+        """
+        ident = threading.get_ident()
+        self._waits[ident] = event
+        try:
+            self.context.loop.wait(event, timeout_s)
+        finally:
+            is_interrupted = self._waits.pop(ident, None) is None
+        if is_interrupted:
+            raise CallAbandoned
+        return event.is_set()
+
+    def end_wait(self, ident: int) -> bool:
+        """Interrupt what a thread waits for in :meth:`wait`; return false if it does not wait."""
+        event = self._waits.pop(ident, None)
+        if event is not None:
+            event.set()
+        return event is not None
 
 
 def _ignore(*, expected: bool) -> None:
@@ -157,7 +180,7 @@ class CallAbandoned(Cancelled):
     """Raised in code of a class whose time is over. It is not a fault of the class."""
 
 
-def interrupt(ident: int, call: FrameType | None = None) -> str:
+def interrupt(code: UserCode, ident: int, call: FrameType | None = None) -> str:
     """Raise CallAbandoned in a thread as soon as it runs code of the user; return where it is.
 
     With ``call``, only until that call has returned. In a function of C, such as ``time.sleep``, it
@@ -167,6 +190,8 @@ def interrupt(ident: int, call: FrameType | None = None) -> str:
         stack = stacks_of((ident,)).get(ident, [])
         if not stack or (call is not None and call not in stack):
             return ""
+        if code.end_wait(ident):
+            return location_of(stack)
         if not is_internal(stack[0].f_code.co_filename):
             raise_in(ident, CallAbandoned)
             return location_of(stack)
@@ -177,16 +202,17 @@ def interrupt(ident: int, call: FrameType | None = None) -> str:
 
 async def end_callbacks(code: UserCode) -> None:
     """Wait a moment for the callbacks of an instance to return, then interrupt those that run."""
-    until_s = COMPUTER.monotonic() + _RETURN_WITHIN_S
-    while running_callbacks(code) and COMPUTER.monotonic() < until_s:
-        await sleep(code.context.loop, _PERIOD_S)
+    loop = code.context.loop
+    until_s = loop.clock.monotonic() + _RETURN_WITHIN_S
+    while running_callbacks(code) and loop.clock.monotonic() < until_s:
+        await sleep(loop, _PERIOD_S)
     interrupt_callbacks(code)
 
 
 def interrupt_callbacks(code: UserCode, function: UserFunction | None = None) -> None:
     """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
     for ident, call, name in running_callbacks(code, function):
-        at = interrupt(ident, call)
+        at = interrupt(code, ident, call)
         if (ident, name) not in code.interrupted:
             code.interrupted.add((ident, name))
             where = f"; it is at {at}" if at else ""
@@ -234,12 +260,15 @@ class ThreadedCall:
 
         If the caller is canceled, the call is interrupted as soon as it runs code of the user.
         """
-        self.thread.start()
+        self._code.context.loop.clock.start(self.thread)
         try:
             return await self._done
         except Cancelled:
             self.location = self.find_location()
-            threading.Thread(target=interrupt, args=(self.thread.ident or 0,), daemon=True).start()
+            ident = self.thread.ident or 0
+            if not self._code.end_wait(ident):
+                parts = self._code, ident
+                threading.Thread(target=interrupt, args=parts, daemon=True).start()
             raise
 
     def find_location(self) -> str:

@@ -122,12 +122,15 @@ class LocalRouter:
         shared: Mapping[ChannelKey, str | None],
         instruments: Instruments | None = None,
         recorder: Recorder | None = None,
+        *,
+        in_virtual_time: bool = False,
     ) -> None:
         """``shared`` has the channels with ports at both endpoints, and why they need DDS, if any.
 
-        ``instruments`` belong to a test; ``recorder`` receives what nodes send. rclpy must be
-        initialized.
+        ``instruments`` belong to a test; ``recorder`` receives what nodes send. In virtual time,
+        channels that are not declared stay in the process as well. rclpy must be initialized.
         """
+        self._shares_undeclared = in_virtual_time
         self._instruments = instruments
         self.recorder = recorder
         self._dds_reasons = dict(shared)
@@ -136,14 +139,11 @@ class LocalRouter:
         self._topics: dict[ChannelKey, Topic] = {}
         self._services: dict[ChannelKey, LocalService] = {}
         self._action_servers: dict[ChannelKey, LocalActionServer] = {}
-        for key in [key for key, reason in shared.items() if reason is None]:
-            if key[0] is not ChannelKind.TOPIC:
-                continue
+        if in_virtual_time:
             self.refusal = unsupported_reason()
-            if self.refusal is None:
-                self._topics[key] = Topic()
-            else:
-                self._dds_reasons[key] = self.refusal
+        for key in [key for key, reason in shared.items() if reason is None]:
+            if key[0] is ChannelKind.TOPIC:
+                self.refusal = self._dds_reasons[key] = unsupported_reason()
 
     def dds_reason(self, port: Port) -> str | None:
         """Return why the port uses DDS although the other endpoint is in-process, or None."""
@@ -151,7 +151,7 @@ class LocalRouter:
 
     def delivers(self, port: Port) -> bool:
         """Return whether the topic or service of the port is delivered in the process."""
-        return self._dds_reasons.get(channel_of(port), "") is None
+        return self._is_local(channel_of(port))
 
     def add_publisher(
         self, port: Port, publisher: Publisher, context: PublisherContext
@@ -161,7 +161,7 @@ class LocalRouter:
         tap = tap_of(self.recorder, port, port.full_name, type_name, profile)
         if tap is not None:
             context = replace(context, observers=(*context.observers, tap))
-        topic = self._topics.get(channel_of(port))
+        topic = self._topic(port)
         if topic is None:
             return GatedPublisher(publisher, context), _do_nothing
         local = local_publisher_for(publisher, context, port)
@@ -179,7 +179,7 @@ class LocalRouter:
 
         ``leases`` has the leases of the publishers, if the runtime monitors them.
         """
-        topic = self._topics.get(channel_of(port))
+        topic = self._topic(port)
         if topic is None:
             return receiver.close
         ignore_local(subscription)
@@ -205,9 +205,16 @@ class LocalRouter:
         """Return a function that returns the local server of an action client port now, if any."""
         return partial(self._action_servers.get, channel_of(port))
 
+    def _is_local(self, key: ChannelKey) -> bool:
+        return self._dds_reasons.get(key, None if self._shares_undeclared else "") is None
+
+    def _topic(self, port: Port) -> Topic | None:
+        key = channel_of(port)
+        return self._topics.setdefault(key, Topic()) if self._is_local(key) else None
+
     def _add(self, servers: dict[ChannelKey, S], port: Port, server: S) -> Remove:
         key = channel_of(port)
-        if key not in self._dds_reasons or self._dds_reasons[key] is not None:
+        if not self._is_local(key):
             return _do_nothing
         servers[key] = server
 

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 from weakref import ref
 
+from rclpy.action.server import ActionServer
 from unique_identifier_msgs.msg import UUID
 
 from composer.base.fast_dataclass import dataclass
@@ -88,7 +89,7 @@ OnFeedback = Callable[[Any], None]
 class LocalActionServer:
     """Passes goals and cancel requests to the server's loop, and feedback and results back."""
 
-    def __init__(self, port: Port, server: GoalServer, spawn: Spawn) -> None:
+    def __init__(self, port: Port, server: ActionServer, spawn: Spawn) -> None:
         """``spawn`` runs a coroutine on the server's loop."""
         self._server = server
         self._spawn = spawn
@@ -97,13 +98,14 @@ class LocalActionServer:
             self._passed = copy_of
         self._listeners: dict[bytes, OnFeedback] = {}
 
-    def send_goal(self, goal: Any, on_feedback: OnFeedback) -> Future[LocalGoal]:
+    def send_goal(
+        self, goal: Any, on_feedback: OnFeedback, goal_id: UUID | None = None
+    ) -> Future[LocalGoal]:
         """Send a goal, from any thread; return the future of its handle, accepted or not.
 
-        ``on_feedback`` is called on the server's loop.
+        ``on_feedback`` is called on the server's loop. The goal has a random id by default.
         """
-        goal_id = UUID(uuid=list(new_id()))
-        handle = LocalGoal(goal_id, self)
+        handle = LocalGoal(goal_id or new_goal_id(), self)
         sent: Future[LocalGoal] = Future()
         self._spawn(self._on_goal(handle, self._passed(goal), on_feedback, sent))
         return sent
@@ -145,7 +147,8 @@ class LocalActionServer:
 
         def respond(result: Any) -> None:
             self._listeners.pop(identity, None)
-            self._server.discard_result(identity)
+            if isinstance(self._server, GoalServer):
+                self._server.discard_result(identity)
             result.result = self._passed(result.result)
             response.set_result(result)
 
@@ -170,6 +173,11 @@ class LocalGoal:
     def cancel_goal_async(self) -> Future[Any]:
         """Request cancellation."""
         return self.server.cancel(self)
+
+
+def new_goal_id() -> UUID:
+    """Return a random id of a goal."""
+    return UUID(uuid=list(new_id()))
 
 
 def _itself(value: Any) -> Any:

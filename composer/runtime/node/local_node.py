@@ -157,6 +157,10 @@ class LocalNode(ABC):
         for context in self.contexts:
             context.gate.block()
 
+    def fail(self, reason: str) -> None:
+        """Report that the node has failed."""
+        self._listener.on_fault(FaultKind.REPORTED, reason)
+
     def sent(self, publisher: str) -> int:
         """Return how many messages a publisher has sent."""
         return self.statistics.publisher(publisher).count

@@ -14,7 +14,6 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, Node, PeriodError
-from composer.plan import FaultKind
 from composer.runtime.executors.exceptions import shown
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import calls_user_code
@@ -131,7 +130,7 @@ class RunningNode(LocalNode):
             failures.append(str(reason))
         elif self._failed_in != self.activations:  # a timer calls it again until the node is down
             self._failed_in = self.activations
-            self._listener.on_fault(FaultKind.REPORTED, str(reason))
+            super().fail(str(reason))
 
     def _set_used(self, *used: object) -> None:
         self._context.hot_objects = self._always_on_context.hot_objects = used

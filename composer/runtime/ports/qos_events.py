@@ -118,7 +118,7 @@ _INCOMPATIBLE = {
 
 
 @dataclass(frozen=True, slots=True)
-class _EventKind:
+class EventKind:
     """A kind of event, how it is counted, and what is logged.
 
     ``count`` returns the number of events from a status. Without it, each signal is one event.
@@ -221,10 +221,10 @@ class QosEvents:
         for warning in self._warnings.values():
             warning.close()
 
-    def _publisher_events(self) -> Iterator[_EventKind]:
+    def _publisher_events(self) -> Iterator[EventKind]:
         profile = self._port.qos.profile
         if profile.deadline_ms is not None:
-            yield _EventKind(
+            yield EventKind(
                 _DEADLINE_MISSED,
                 _PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
                 f"nothing was published within its deadline of {profile.deadline_ms:g} ms",
@@ -232,17 +232,17 @@ class QosEvents:
             )
         lease_ms = profile.liveliness_lease_duration_ms
         if lease_ms is not None:
-            yield _EventKind(
+            yield EventKind(
                 _LIVELINESS_LOST,
                 _PUBLISHER.RCL_PUBLISHER_LIVELINESS_LOST,
                 f"it did not assert its liveliness within its lease of {lease_ms:g} ms",
                 period_s=lease_ms / 1000.0,
             )
 
-    def _subscription_events(self) -> Iterator[_EventKind]:
+    def _subscription_events(self) -> Iterator[EventKind]:
         profile = self._port.qos.profile
         if profile.deadline_ms is not None:
-            yield _EventKind(
+            yield EventKind(
                 _DEADLINE_MISSED,
                 _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,
                 f"nothing was received within its deadline of {profile.deadline_ms:g} ms",
@@ -250,13 +250,13 @@ class QosEvents:
             )
         lease_ms = profile.liveliness_lease_duration_ms
         if lease_ms is not None:
-            yield _EventKind(
+            yield EventKind(
                 _LIVELINESS_CHANGED,
                 _SUBSCRIPTION.RCL_SUBSCRIPTION_LIVELINESS_CHANGED,
                 f"a publisher did not assert its liveliness within the lease of {lease_ms:g} ms",
                 lambda status: status.not_alive_count_change,  # negative for a recovery
             )
-        yield _EventKind(
+        yield EventKind(
             "message_lost",
             _SUBSCRIPTION.RCL_SUBSCRIPTION_MESSAGE_LOST,
             "a message was lost in transit",
@@ -268,7 +268,7 @@ class QosEvents:
         stop = self._context.events.watch(endpoint, kind, lambda: call_soon(self._on_incompatible))
         self._stop_watching.append(stop)
 
-    def _watch(self, endpoint: Any, event: _EventKind) -> None:
+    def _watch(self, endpoint: Any, event: EventKind) -> None:
         context = self._context
 
         def on_events(number: int) -> None:
@@ -285,7 +285,7 @@ class QosEvents:
         self._stop_watching.append(stop)
         self._warn_of(event)
 
-    def _warn_of(self, event: _EventKind) -> None:
+    def _warn_of(self, event: EventKind) -> None:
         """Prepare the warning of an event."""
         name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
         self._warnings[event.name] = RepeatedWarning(
@@ -294,7 +294,7 @@ class QosEvents:
             lambda: f"{name}: {event.text}{self._publishers()}",
         )
 
-    def _on_overdue(self, event: _EventKind) -> OnOverdue:
+    def _on_overdue(self, event: EventKind) -> OnOverdue:
         """Return what is called when the period of an event has passed, in virtual time."""
         self._warn_of(event)
 

@@ -128,7 +128,7 @@ class HealthMonitor:
     def _check_callbacks(self, now_s: float) -> None:
         before, self._callbacks = self._callbacks, {}
         for loop in tuple(self._node_set.loops.values()):
-            for stack in running_callbacks(loop):
+            for stack in running_callbacks(loop.busy_threads()):
                 for callback in stack:
                     observed = before.pop(callback.call, None)
                     observed = observed or _ObservedCallback(callback, loop.name, now_s)

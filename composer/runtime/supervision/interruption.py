@@ -15,7 +15,6 @@ from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.clock.clock import COMPUTER
-from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import (
     INTERRUPTIBLE,
     USER_CODE_CALLERS,
@@ -107,12 +106,12 @@ class RunningCallback:
                 return
 
 
-def running_callbacks(loop: Loop) -> Iterator[list[RunningCallback]]:
-    """Yield for each thread of ``loop`` the callbacks that run now, the innermost first.
+def running_callbacks(threads: Iterable[int]) -> Iterator[list[RunningCallback]]:
+    """Yield for each of the threads the callbacks that run now, the innermost first.
 
     Delivery calls the callback of a receiver within that of the sender.
     """
-    for ident, stack in stacks_of(loop.busy_threads()).items():
+    for ident, stack in stacks_of(threads).items():
         if callbacks := [_callback(ident, stack, at) for at in _callers(stack)]:
             yield callbacks
 

@@ -87,8 +87,12 @@ class NodeFactory:
         """
         self._process = process
         self._nodes = nodes
-        shared = shared_channels(self._system, in_virtual_time=self.clock.is_virtual)
-        self._router = LocalRouter(shared, self._options.instruments, self._options.recorder)
+        is_virtual = self.clock.is_virtual
+        shared = shared_channels(self._system, in_virtual_time=is_virtual)
+        options = self._options
+        self._router = LocalRouter(
+            shared, options.instruments, options.recorder, in_virtual_time=is_virtual
+        )
         return self._router.refusal
 
     def make(self, node: Node, before: ManagedNode | None = None) -> ManagedNode:
@@ -144,9 +148,6 @@ class NodeFactory:
         raise AssertionError(f"{node.full_name} runs in this process")
 
     def _loop_of(self, executor: Executor) -> Loop:
-        if self.clock.is_virtual:  # one order of everything
-            one = Located(DEFAULT_EXECUTOR, executor.span)
-            executor = Executor(one, ExecutorKind.EVENTS, executor.span)
         name = executor.name.value
         if name not in self.loops:
             self.loops[name] = Loop(
@@ -164,16 +165,15 @@ class NodeFactory:
     def _executor_of(self, node: Node) -> Executor:
         """Return the executor that runs the node: by default ``default``, an event loop.
 
-        A hosted class has an event loop of its own by default: its callbacks may block.
+        A hosted class has an event loop of its own by default: its callbacks may block. In virtual
+        time, each class has one, and all other nodes have one together.
         """
-        if node.executor is not None:
+        is_virtual = self.clock.is_virtual
+        if node.executor is not None and not is_virtual:
             return self.executors[node.executor.value]
-        if node.hosted_class is not None:
-            name = Located(node.full_name, node.span)
-            return Executor(name, ExecutorKind.EVENTS, node.span)
-        return self.executors.get(DEFAULT_EXECUTOR) or Executor(
-            Located(DEFAULT_EXECUTOR, node.span), ExecutorKind.EVENTS, node.span
-        )
+        key = DEFAULT_EXECUTOR if node.hosted_class is None else node.full_name
+        own = Executor(Located(key, node.span), ExecutorKind.EVENTS, node.span)
+        return own if is_virtual else self.executors.get(key, own)
 
     def _on_exception(self, what: str, error: BaseException) -> None:
         """Log an exception that leaves a callback, unless its node was only deactivated."""

@@ -12,7 +12,7 @@ from composer.model import (
 )
 from composer.model.lifecycle import FINALIZED
 from composer.runtime.executors.exceptions import describe
-from composer.runtime.executors.futures import Future
+from composer.runtime.executors.futures import Future, done_event
 from composer.runtime.executors.placement import place_threads
 from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.members.node import MemberNode
@@ -96,7 +96,10 @@ class NodeSet:
             executor = self._factory.executors.get(name)
             if executor is not None:
                 self.warnings += place_threads(executor, loop.native_thread_ids())
-        if any(node.model.in_process and node.model.hosted_class for node in self.nodes.values()):
+        has_classes = any(
+            node.model.in_process and node.model.hosted_class for node in self.nodes.values()
+        )
+        if has_classes and not self._clock.is_virtual:
             self._turn_watch.start()
 
     def timeout_s(self, name: str) -> float:
@@ -180,7 +183,8 @@ class NodeSet:
 
     def running_callbacks(self, name: str) -> list[RunningCallback]:
         """Return the callbacks that keep the threads of the node's loop busy, one per thread."""
-        return [innermost for innermost, *_ in running_callbacks(self.nodes[name].loop)]
+        threads = self.nodes[name].loop.busy_threads()
+        return [innermost for innermost, *_ in running_callbacks(threads)]
 
     def active(self) -> int:
         """Return the number of active nodes."""
@@ -199,7 +203,8 @@ class NodeSet:
             return None
         if isinstance(node, MemberNode):
             created = node.loop.run_task(node.create_again(is_outdated))
-            if not node.loop.wait_for(created, node.transition_timeout_s):
+            node.loop.wait(done_event(created), node.transition_timeout_s)
+            if not created.done():
                 created.cancel()
                 return "cannot be created again: its process does not respond"
             return created.result()

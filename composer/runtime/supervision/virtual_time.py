@@ -6,22 +6,17 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from functools import wraps
-from pkgutil import resolve_name
-from types import FrameType
-from typing import Any
+from contextlib import contextmanager
 
-from composer.base.fast_dataclass import dataclass
 from composer.model import Node, System
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.clock.virtual import VirtualClock
-from composer.runtime.executors.stacks import is_internal, is_library, location_of, outward
-from composer.runtime.hosting.dispatch import install
+from composer.runtime.executors.stacks import is_library, location_of, outward
 from composer.runtime.intra_process.router import shared_channels
 from composer.runtime.process import StartRefused
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.node_set import NodeSet
+from composer.runtime.supervision.outside_calls import outside_calls
 
 #: Nothing outside of the process takes part in a run.
 ISOLATION = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
@@ -59,8 +54,6 @@ def _kind_outside(node: Node) -> str | None:
         return "is an executable"
     if node.component is not None:
         return "is a component"
-    if node.hosted_class is not None:
-        return "is a class of rclpy"
     return None
 
 
@@ -133,14 +126,9 @@ class TurnWatch:
     """
 
     def __init__(
-        self,
-        clock: VirtualClock,
-        node_set: NodeSet,
-        is_stopping: Callable[[], bool],
-        warn: Callable[[str], None],
+        self, clock: VirtualClock, is_stopping: Callable[[], bool], warn: Callable[[str], None]
     ) -> None:
         self._clock = clock
-        self._node_set = node_set
         self._is_stopping = is_stopping
         self._warn = warn
         self._end = threading.Event()
@@ -171,63 +159,7 @@ class TurnWatch:
                     self._warn(f"{lasts}, in which the time does not advance; it is at {at}")
 
     def _callbacks(self) -> list[RunningCallback]:
-        loops = tuple(self._node_set.loops.values())
-        return [stack[0] for loop in loops for stack in running_callbacks(loop)]
-
-
-@dataclass(frozen=True, slots=True)
-class _Outside:
-    """A function of Python that is not of virtual time, and what to use instead.
-
-    If libraries call it for user code, the user code is named (``walks``).
-    """
-
-    name: str
-    use: str
-    shown: str = ""
-    walks: bool = False
-
-    def applies(self, arguments: tuple[Any, ...], options: dict[str, Any]) -> bool:
-        """Return whether a call is outside: generators of random numbers may have a seed."""
-        if self.name != "random.Random.seed":
-            return True
-        return (arguments[1] if len(arguments) > 1 else options.get("a")) is None
-
-
-_NOW = "self.clock.now()"
-_OUTSIDE = (
-    *(_Outside(f"time.{name}", _NOW) for name in ("time", "monotonic", "perf_counter")),
-    *(_Outside(f"time.{name}_ns", _NOW) for name in ("time", "monotonic", "perf_counter")),
-    _Outside("time.sleep", "await self.clock.sleep(seconds)"),
-    _Outside("os.urandom", "random.randbytes(size)"),
-    *(
-        _Outside(f"uuid.{name}", "uuid.UUID(int=random.getrandbits(128), version=4)")
-        for name in ("uuid1", "uuid4")
-    ),
-    _Outside("random.Random.seed", "random.Random(seed)", "random.Random", walks=True),
-    _Outside("threading.Thread.start", "timers, or 'async def' handlers", "a thread", walks=True),
-    _Outside("socket.socket.__init__", "a stand-in for this node", "a socket", walks=True),
-    _Outside("subprocess.Popen.__init__", "a stand-in for this node", "a process", walks=True),
-)
-
-
-@contextmanager
-def outside_calls(report: Callable[[str], None]) -> Iterator[None]:
-    """Context manager: report once each place of user code that does not use virtual time.
-
-    Modules that were imported before, and have names of their own for these functions, are not
-    noticed, nor is code in C.
-    """
-    install()  # it replaces Thread.start as well, for good
-    places: set[tuple[str, str]] = set()
-    with ExitStack() as stack:
-        for outside in _OUTSIDE:
-            owner_name, _, attribute = outside.name.rpartition(".")
-            owner: Any = resolve_name(owner_name)
-            original = getattr(owner, attribute)
-            stack.callback(setattr, owner, attribute, original)
-            setattr(owner, attribute, _watched(original, outside, places, report))
-        yield
+        return [stack[0] for stack in running_callbacks((self._clock.running_thread,))]
 
 
 @contextmanager
@@ -243,39 +175,5 @@ def watched_time(
     ``warn`` receives what may be meant, ``fail`` what has to end the run.
     """
     Standstill(clock, node_set, fail)
-    with outside_calls(warn), TurnWatch(clock, node_set, is_stopping, warn):
+    with outside_calls(warn), TurnWatch(clock, is_stopping, warn):
         yield
-
-
-def _watched(
-    function: Callable[..., Any],
-    outside: _Outside,
-    places: set[tuple[str, str]],
-    report: Callable[[str], None],
-) -> Callable[..., Any]:
-    @wraps(function)
-    def call(*arguments: Any, **options: Any) -> Any:
-        frame = sys._getframe(1)
-        place = _user_place(frame, walks=outside.walks)
-        is_new = bool(place) and (place, outside.name) not in places
-        if is_new and _is_callback(frame) and outside.applies(arguments, options):
-            places.add((place, outside.name))
-            shown = outside.shown or f"{outside.name}()"
-            report(f"{place} uses {shown}, which virtual time does not control; use {outside.use}")
-        return function(*arguments, **options)
-
-    return call
-
-
-def _user_place(frame: FrameType | None, *, walks: bool) -> str:
-    """Return ``file:line`` of a frame if it is user code, which may call libraries (``walks``)."""
-    while walks and frame is not None and is_library(frame.f_code.co_filename):
-        frame = frame.f_back
-    path = "" if frame is None else frame.f_code.co_filename
-    is_user_code = frame is not None and not (is_library(path) or is_internal(path))
-    return f"{path}:{frame.f_lineno}" if frame is not None and is_user_code else ""
-
-
-def _is_callback(frame: FrameType) -> bool:
-    """Return whether the composer has called the code; a test of pytest is not of the system."""
-    return any(is_internal(caller.f_code.co_filename) for caller in outward(frame))

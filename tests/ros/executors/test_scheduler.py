@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from composer.model import ExecutorKind
 from composer.runtime.executors import readiness
-from composer.runtime.executors.futures import Future
+from composer.runtime.executors.futures import Future, done_event
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from tests.ros.support.in_process import wait_until
@@ -28,6 +28,12 @@ from tests.ros.support.loops import Bench, bench, peer
 def on() -> Iterator[Bench]:
     with bench(ExecutorKind.EVENTS) as running:
         yield running
+
+
+def wait_for(loop: Loop, future: Future[Any], timeout_s: float | None = None) -> bool:
+    """Wait for a future; return whether it is done."""
+    loop.wait(done_event(future), timeout_s)
+    return future.done()
 
 
 def test_calls_of_each_thread_keep_their_order(on: Bench) -> None:
@@ -256,7 +262,7 @@ def test_a_callback_that_waits_for_a_future_keeps_nothing_else_waiting(on: Bench
     seen: list[object] = []
 
     def wait() -> None:
-        seen.append(on.loop.wait_for(answered, 5.0))
+        seen.append(wait_for(on.loop, answered, 5.0))
         seen.append(answered.result())
 
     on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
@@ -279,7 +285,7 @@ def test_each_wait_ends_as_soon_as_its_future_is_done(on: Bench) -> None:
     order: list[str] = []
 
     def wait(name: str, future: Future[None]) -> None:
-        on.loop.wait_for(future)
+        wait_for(on.loop, future)
         assert on.loop.is_current()
         order.append(name)
 
@@ -329,7 +335,7 @@ def test_a_timer_that_waits_longer_than_its_period_is_called_again_after_it(on: 
     answered: Future[None] = Future()
     waits: list[bool] = []
     others: list[float] = []
-    timer = on.loop.call_every(0.001, lambda: waits.append(on.loop.wait_for(answered, 5.0)))
+    timer = on.loop.call_every(0.001, lambda: waits.append(wait_for(on.loop, answered, 5.0)))
     on.loop.call_every(0.002, lambda: others.append(time.monotonic()))
     wait_until(lambda: len(others) >= 10)
     assert waits == []
@@ -342,11 +348,11 @@ def test_a_timer_that_waits_longer_than_its_period_is_called_again_after_it(on: 
 def test_a_wait_ends_in_time_and_when_the_loop_stops(on: Bench) -> None:
     never: Future[None] = Future()
     results: list[bool] = []
-    on.loop.call_soon(lambda: results.append(on.loop.wait_for(never, 0.01)))
+    on.loop.call_soon(lambda: results.append(wait_for(on.loop, never, 0.01)))
     wait_until(lambda: results)
     assert results == [False]
     waiting = threading.Event()
-    on.loop.call_soon(lambda: (waiting.set(), results.append(on.loop.wait_for(never))))
+    on.loop.call_soon(lambda: (waiting.set(), results.append(wait_for(on.loop, never))))
     assert waiting.wait(5.0)
     assert on.loop.stop(5.0)
     assert results == [False, False]

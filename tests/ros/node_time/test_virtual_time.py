@@ -342,7 +342,6 @@ def test_external_nodes_take_part_in_a_system_that_publishes_its_clock(peer: Pee
 
 
 REFUSED = [
-    ('talker: {class: "demo:Talker"}', "/talker is a class of rclpy, which has the time of the"),
     ("battery: {external: true}", "/battery is an external node, which has the time of the"),
     ("camera: {executable: {command: [camera]}}", "/camera is an executable, which has the time"),
     (

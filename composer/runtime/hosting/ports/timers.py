@@ -8,7 +8,7 @@ from typing import Any
 from rclpy.clock_type import ClockType
 from rclpy.guard_condition import GuardCondition
 from rclpy.node import Node
-from rclpy.timer import Timer
+from rclpy.timer import Rate, Timer
 
 from composer.base.source import Located
 from composer.model import Period, PeriodUnit, TimerClock
@@ -152,6 +152,20 @@ class HostedTimerPort(TimerPort):
             clock=TimerClock.ROS if is_ros else TimerClock.STEADY,
             reentrant=is_reentrant(context),
         )
+
+
+class HostedRate(Rate):
+    """The rate that the class uses: rclpy's, whose class is replaced by this one."""
+
+    _instance: Instance
+
+    def sleep(self) -> None:
+        """Block until the next time. In a callback, the loop goes on."""
+        self._presleep()
+        try:
+            self._instance.wait(self._event)
+        finally:
+            self._postsleep()
 
 
 #: rclpy accepts a period of zero, which calls as often as possible.

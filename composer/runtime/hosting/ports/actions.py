@@ -1,157 +1,27 @@
-"""Services, actions and their clients that a class creates."""
+"""Action servers and their clients that a class creates."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse, ServerGoalHandle
 from rclpy.action.server import RCLError as ActionError
-from rclpy.client import Client
-from rclpy.node import Node
-from rclpy.service import Service
-from rclpy.task import Future as RclpyFuture
 
 from composer.behavior import CallCancelled
-from composer.model import Port, PortKind
+from composer.model import PortKind
 from composer.runtime.executors.exceptions import is_closing
-from composer.runtime.executors.futures import Cancelled, wrap_future
+from composer.runtime.executors.futures import Cancelled, Future, wrap_future
 from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.executors.tasks import within
-from composer.runtime.hosting.instance import Instance, is_reentrant
-from composer.runtime.hosting.user_code import (
-    UserFunction,
-    call_in_group,
-    interrupt_callbacks,
-)
-from composer.runtime.intra_process.taps import CallTap, GoalTap
+from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.ports.services import ServerInProcess, hosted_future
+from composer.runtime.hosting.user_code import UserFunction, call_in_group, interrupt_callbacks
+from composer.runtime.intra_process.servers import LocalActionServer, LocalGoal, new_goal_id
+from composer.runtime.intra_process.taps import GoalTap
 from composer.runtime.ports import RunningPort
 from composer.runtime.ports.action_server import CANCEL_LIMIT_S
-from composer.runtime.ports.service import ServicePort
-
-
-class HostedService(ServicePort):
-    """A service port around rclpy's service, with the callback of the class."""
-
-    def __init__(self, instance: Instance, service: Service) -> None:
-        port = instance.ports.port(PortKind.SERVICE, service.service_name, service.srv_type)
-        self._instance = instance
-        self.port = port
-        self._given: Any = service
-        callback = UserFunction(instance, service.callback)
-        context = instance.context_of(port, self._given)
-        if is_reentrant(context):
-            port = replace(port, reentrant=True)
-        super().__init__(context, port, None, callback)
-
-    def destroy(self) -> None:
-        """Refuse the pending requests and destroy the service."""
-        self._instance.ports.forget(self.port)
-        super().destroy()
-
-    def _interface(self, _port: Port) -> Any:
-        return self._given.srv_type
-
-    def _make_service(self, _port: Port) -> Service:
-        return self._given  # type: ignore[no-any-return]
-
-    def _destroy_service(self) -> None:
-        Node.destroy_service(self._instance.node, self._given)
-
-
-class HostedClient(Client):
-    """The client that the class uses: rclpy's, whose class is replaced by this one.
-
-    It calls in every transition and while the node is active.
-    """
-
-    _instance: Instance
-    _tap: CallTap
-
-    def call_async(self, request: Any) -> HostedFuture:
-        """Send a request; the future fails with CallCancelled if the node is not active."""
-        gate = self._instance.context.gate
-        if not gate.waiting:
-            return hosted_future(self._instance, CallCancelled(gate.refusal))
-        future: Any = self._tap.follow(request, super().call_async(request))
-        future.__class__ = HostedFuture
-        future._instance = self._instance
-        return future  # type: ignore[no-any-return]
-
-    def call(self, request: Any, timeout_sec: float | None = None) -> Any:
-        """Send a request and wait for the response, or return None after ``timeout_sec``."""
-        future = self.call_async(request)
-        if not self._instance.wait_for(future, timeout_sec):
-            self.remove_pending_request(future)
-            return None
-        return future.result()
-
-
-class HostedFuture(RclpyFuture):
-    """The future of a call: rclpy's, whose class is replaced by this one.
-
-    Exceptions of its callbacks are errors of the node.
-    """
-
-    _instance: Instance
-
-    def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
-        """Call ``callback(self)`` on the loop once the future is done."""
-        function = UserFunction(self._instance, callback)
-        context = self._instance.context
-
-        def call(future: Any) -> None:
-            rest = context.call(function.__name__, function, future)
-            if rest is not None:
-                context.spawn(rest)
-
-        super().add_done_callback(call)
-
-
-def hosted_future(instance: Instance, error: BaseException) -> HostedFuture:
-    """Return a future that has failed with ``error``."""
-    future = HostedFuture()
-    future._instance = instance
-    fail(future, error)
-    return future
-
-
-def fail(future: RclpyFuture, error: BaseException) -> None:
-    """Fail a future. rclpy prints exceptions that are never retrieved; this one need not be."""
-    future.set_exception(error)
-    future.exception()
-
-
-class ClientPort(RunningPort):
-    """The port of a client: it fails the pending calls when the node leaves *active*."""
-
-    def __init__(self, instance: Instance, client: Any) -> None:
-        self._instance = instance
-        self._client = client
-        self.port = instance.ports.port(PortKind.CLIENT, client.service_name, client.srv_type)
-        client.__class__ = HostedClient
-        client._instance = instance
-        context = instance.context
-        client._tap = CallTap.of_port(
-            context.router.recorder, self.port, client.srv_type, context.loop.clock, is_client=True
-        )
-        context.loop.add_client(client)
-
-    def deactivate(self) -> None:
-        """Fail the pending calls."""
-        gate = self._instance.context.gate
-        for future in tuple(self._client._pending_requests.values()):
-            future._set_executor(self._instance.context.node.executor)
-            fail(future, CallCancelled(gate.refusal))
-
-    def destroy(self) -> None:
-        """Fail the pending calls and destroy the client."""
-        self._instance.ports.forget(self.port)
-        self.deactivate()
-        self._instance.context.loop.remove(self._client)
-        Node.destroy_client(self._instance.node, self._client)
 
 
 class HostedActionServer(RunningPort):
@@ -168,6 +38,8 @@ class HostedActionServer(RunningPort):
         self.name = self.port.name.value
         self._context = instance.context_for(server.callback_group, server)
         self._statistics = instance.context.statistics.callback(self.port.kind.value, self.name)
+        loop, router = instance.context.loop, instance.context.router
+        self._local = LocalActionServer(self.port, server, loop.run_task)
         goal = UserFunction(instance, server._goal_callback)
         server.register_goal_callback(self._in_group(goal, self._accepts))
         cancel = UserFunction(instance, server._cancel_callback)
@@ -177,9 +49,9 @@ class HostedActionServer(RunningPort):
         # As in rclpy, the execution of a goal belongs to no callback group.
         self._execution = UserFunction(instance, server._execute_callback)
         server.register_execute_callback(self._wrapped(self._execution, self._abort))
-        context = instance.context
-        self._tap = GoalTap(context.router.recorder, self.port, server, context.loop.clock)
-        context.loop.add_action_server(server)
+        self._tap = GoalTap(router.recorder, self.port, server, loop.clock)
+        loop.add_action_server(server)
+        self._remove = router.add_action_server(self.port, self._local)
 
     def deactivate(self) -> None:
         """Ask the running goals to cancel."""
@@ -206,6 +78,7 @@ class HostedActionServer(RunningPort):
 
     def destroy(self) -> None:
         """Abort the goals that have not ended, and destroy the server."""
+        self._remove()
         self._instance.ports.forget(self.port)
         for identity, goal in tuple(self._server._goal_handles.items()):
             if goal.is_active:
@@ -289,6 +162,7 @@ class HostedActionServer(RunningPort):
             if self._context.gate.outgoing:
                 publish(feedback)
                 self._tap.feedback(goal.goal_id, feedback)
+                self._local.publish_feedback(bytes(goal.goal_id.uuid), feedback)
 
         goal.publish_feedback = publish_feedback
 
@@ -302,16 +176,27 @@ class HostedActionServer(RunningPort):
 
 
 class HostedActionClient(RunningPort):
-    """The port of an action client. Its goals go by DDS, while the node is active."""
+    """The port of an action client, which sends goals while the node is active."""
 
     def __init__(self, instance: Instance, client: Any, full_name: str) -> None:
         self._instance = instance
         self._client = client
         self.port = instance.ports.port(PortKind.ACTION_CLIENT, full_name, client._action_type)
         self._context = instance.context_for(self._client.callback_group, client)
+        loop, router = instance.context.loop, instance.context.router
         self._send = self._client.send_goal_async
         self._client.send_goal_async = self._send_goal
-        instance.context.loop.add_action_client(client)
+        # rclpy's own functions would block the loop.
+        self._client.send_goal = self._send_goal_and_wait
+        self._client._get_result = self._waiting(self._client._get_result_async)
+        self._client._cancel_goal = self._waiting(self._client._cancel_goal_async)
+        self._client.wait_for_server = self._wait_for_server
+        self._client._generate_random_uuid = new_goal_id
+        loop.add_action_client(client)
+        find = router.action_server_lookup(self.port)
+        self._client._client_handle = GoalRequests(
+            client, ServerInProcess(self._context, self.port, find), loop.action_receiver(client)
+        )
 
     def destroy(self) -> None:
         """Destroy the client."""
@@ -330,6 +215,84 @@ class HostedActionClient(RunningPort):
             function = UserFunction(self._instance, feedback_callback)
             feedback_callback = partial(call_in_group, self._context, function)
         return self._send(goal, feedback_callback, **options)
+
+    def _waiting(self, send: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function that sends something and waits for the response."""
+
+        def send_and_wait(*arguments: Any, **options: Any) -> Any:
+            future = send(*arguments, **options)
+            self._instance.wait_for(future, None)
+            return future.result()
+
+        return send_and_wait
+
+    def _send_goal_and_wait(self, goal: Any, **options: Any) -> Any:
+        handle = self._waiting(self._send_goal)(goal, **options)
+        return self._client._get_result(handle)
+
+    def _wait_for_server(self, timeout_sec: float | None = None) -> bool:
+        return self._instance.wait_for_server(self._client.server_is_ready, timeout_sec)
+
+
+class GoalRequests:
+    """Takes the place of rcl's action client: requests to a server of the process stay there."""
+
+    def __init__(
+        self,
+        client: Any,
+        server: ServerInProcess[LocalActionServer],
+        receive: Callable[[dict[str, Any]], None],
+    ) -> None:
+        """``receive`` gets what rclpy's client takes from rcl, by the kind of response."""
+        self._rcl = client._client_handle
+        self._types = client._action_type.Impl
+        self._server = server
+        self._receive = receive
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._rcl, name)
+
+    def is_action_server_available(self) -> bool:
+        """Return whether there is a server."""
+        return self._server.is_ready(self._rcl.is_action_server_available)
+
+    def send_goal_request(self, request: Any) -> int:
+        """Send a goal; return the number of the request."""
+        server = self._server.for_request()
+        if server is None:
+            return int(self._rcl.send_goal_request(request))
+        number = self._server.next_number()
+        goal_id = request.goal_id
+
+        def on_feedback(feedback: Any) -> None:
+            message = self._types.FeedbackMessage(goal_id=goal_id, feedback=feedback)
+            self._receive({"feedback": message})
+
+        def on_sent(sent: Future[LocalGoal]) -> None:
+            response = self._types.SendGoalService.Response(accepted=sent.result().accepted)
+            self._receive({"goal": (number, response)})
+
+        server.send_goal(request.goal, on_feedback, goal_id).add_done_callback(on_sent)
+        return number
+
+    def send_cancel_request(self, request: Any) -> int:
+        """Request the cancellation of a goal; return the number of the request."""
+        server = self._server.for_request()
+        if server is None:
+            return int(self._rcl.send_cancel_request(request))
+        return self._pass_on("cancel", server.cancel(LocalGoal(request.goal_info.goal_id, server)))
+
+    def send_result_request(self, request: Any) -> int:
+        """Request the result of a goal; return the number of the request."""
+        server = self._server.for_request()
+        if server is None:
+            return int(self._rcl.send_result_request(request))
+        return self._pass_on("result", server.result(LocalGoal(request.goal_id, server)))
+
+    def _pass_on(self, kind: str, future: Future[Any]) -> int:
+        number = self._server.next_number()
+        future.add_done_callback(lambda done: self._receive({kind: (number, done.result())}))
+        return number
 
 
 def _returns(value: Any) -> Callable[[object], Any]:

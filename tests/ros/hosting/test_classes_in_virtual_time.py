@@ -1,0 +1,186 @@
+"""Unmodified rclpy classes in virtual time: all that they do follows the clock of the run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+
+from composer.testing.failures import TestFailure
+from composer.testing.system_test import SystemTest
+
+CLASSES = "tests.ros.support.node_classes"
+CALLBACKS = "tests.ros.support.callback_classes"
+TIMED = "tests.ros.support.timed_classes"
+REFUSED = "tests.ros.support.refused_classes"
+#: Timers, services that call each other in callbacks and coroutines, goals, rates, lifecycle nodes,
+#: constructors that wait, and ports that are declared or not.
+DEMO = f"""
+system: demo
+executors: {{pool: {{kind: multi_threaded, threads: 4}}}}
+nodes:
+  talker:
+    class: {CLASSES}:Talker
+    executor: pool
+    publishers: {{numbers: {{type: std_msgs/msg/Int64}}}}
+    parameters: {{period: {{type: double, default: 0.1}}}}
+    lifecycle: {{depends_on: [listener]}}
+  listener:
+    class: {CLASSES}:Listener
+    executor: pool
+    subscriptions: {{numbers: {{type: std_msgs/msg/Int64}}}}
+    services: {{count: {{type: std_srvs/srv/Trigger, always_on: true}}}}
+  waiter: {{class: "{CALLBACKS}:Waiter", lifecycle: {{depends_on: [talker]}}}}
+  caller: {{class: "{CALLBACKS}:BlockingCaller"}}
+  timers: {{class: "{CALLBACKS}:AsyncTimers"}}
+  busy: {{class: "{CALLBACKS}:Busy", remappings: {{numbers: many}}}}
+  sleeper: {{class: "{CALLBACKS}:Sleeper"}}
+  navigator: {{class: "{CLASSES}:Navigator"}}
+  sender: {{class: "{CLASSES}:Sender"}}
+  commander: {{class: "{TIMED}:Commander"}}
+  counter:
+    class: {CLASSES}:Counter
+    remappings: {{numbers: counted}}
+    publishers: {{counted: {{type: std_msgs/msg/Int64}}}}
+"""
+
+
+def instances(system: SystemTest) -> dict[str, Any]:
+    """Return the instances of the classes, by the keys of their nodes."""
+    nodes = system._run.host.nodes.items()
+    return {name: node.instance for name, node in nodes if hasattr(node, "instance")}
+
+
+def test_a_class_of_each_kind(tmp_path: Path) -> None:
+    path = tmp_path / "demo.yaml"
+    path.write_text(DEMO)
+    with SystemTest(path) as system:
+        nodes = instances(system)
+        system.advance(2.0)
+        assert [item.message.data for item in system.messages("/numbers")][:3] == [1, 2, 3]
+        assert len(nodes["listener"].numbers) == nodes["talker"].count
+        assert system.call("/count").message == str(nodes["talker"].count)
+        assert nodes["waiter"].response.success
+        assert len(nodes["caller"].responses) > 300
+        assert all(response.success for response in nodes["caller"].responses)
+        assert nodes["timers"].rounds > 600
+        assert nodes["caller"].overlaps == nodes["timers"].overlaps == nodes["busy"].overlaps == 0
+        assert nodes["busy"].calls > 50
+        assert nodes["sleeper"].rounds > 20
+        assert nodes["sender"].statuses == [GoalStatus.STATUS_SUCCEEDED]
+        assert nodes["sender"].feedback == 3
+        assert nodes["commander"].ends[:2] == [
+            (GoalStatus.STATUS_SUCCEEDED, pytest.approx(0.1, abs=0.05)),
+            (GoalStatus.STATUS_CANCELED, 0.0),
+        ]
+        system.transition("counter", "deactivate")
+        count = nodes["counter"].count
+        system.advance(1.0)
+        assert nodes["counter"].count == count
+        system.transition("counter", "activate")
+        system.set_parameter("talker", "word", "changed")
+        system.kill("sleeper")
+        system.advance(1.0)
+        assert nodes["counter"].count == count + 100
+        assert system.states["sleeper"] == "unconfigured"
+    assert system.outcome is not None
+    assert all(node.errors == 0 for node in system.outcome.nodes)
+
+
+def test_the_same_run_whatever_the_hash_seed(tmp_path: Path) -> None:
+    path = tmp_path / "demo.yaml"
+    path.write_text(DEMO)
+    command = (sys.executable, "-m", "tests.ros.programs.virtual_run", str(path), "1")
+    outputs = {
+        subprocess.run(
+            command,
+            env=os.environ | {"PYTHONHASHSEED": seed},
+            capture_output=True,
+            timeout=60,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    (output,) = outputs
+    assert output.count(b"\n/counted") > 100
+
+
+def test_clocks_and_sleeps_of_all_kinds(tmp_path: Path) -> None:
+    path = tmp_path / "reader.yaml"
+    path.write_text(f'system: times\nnodes: {{reader: {{class: "{TIMED}:ClockReader"}}}}\n')
+    with SystemTest(path) as system:
+        system.advance(3.9)
+        times = instances(system)["reader"].times
+    assert times == [dict.fromkeys(times[0], pytest.approx(0.75))] * 3
+    assert [line.time_s for line in system.log] == [1.75, 3.75]
+
+
+def test_deadlines_and_serialized_messages(tmp_path: Path) -> None:
+    path = tmp_path / "overdue.yaml"
+    path.write_text(f'system: overdue\nnodes: {{overdue: {{class: "{TIMED}:Overdue"}}}}\n')
+    with SystemTest(path) as system:
+        system.advance(4.5)
+        overdue = instances(system)["overdue"]
+        assert overdue.missed == {"offered": 3, "requested": 3}
+        assert overdue.raw == [3]
+
+
+@pytest.mark.parametrize(
+    ("node", "lines"),
+    [
+        (
+            f"{TIMED}:Unserved",
+            [
+                (2.0, "found: False at 1000000002000000000"),
+                (2.0, "client 'reader/set_parameters' waits without end: in virtual time, no node"),
+                (2.0, "subscription on /parameter_events receives nothing in virtual time"),
+            ],
+        ),
+        (
+            f"{TIMED}:WaitsForever",
+            [
+                (1.0, "waiting"),
+                (2.0, "waiting"),
+                (2.5, "on_configure: TransitionTimeout: timed out after 2.5 s"),
+                (2.5, "constructor has not returned; it is at "),
+            ],
+        ),
+        (
+            f"{REFUSED}:NeverReturns",
+            [
+                (2.5, "on_configure: TransitionTimeout: timed out after 2.5 s"),
+                (2.5, "constructor has not returned; it is at "),
+            ],
+        ),
+        (
+            f"{REFUSED}:SpinsInConstructor",
+            [(0.0, "on_configure refused the transition: the class")],
+        ),
+        (
+            f"{CLASSES}:Spinner",
+            [(0.0, "node_classes.py:129 uses a thread, which virtual time does not control")],
+        ),
+    ],
+)
+def test_what_a_class_cannot_do_is_reported(
+    tmp_path: Path, node: str, lines: list[tuple[float, str]]
+) -> None:
+    path = tmp_path / "reported.yaml"
+    limits = "{timeout_ms: 2500, on_failure: ignore}"
+    path.write_text(f'system: s\nnodes: {{a: {{class: "{node}", lifecycle: {limits}}}}}\n')
+    system = SystemTest(path)
+    try:
+        with system:
+            system.advance(0.0)
+    except TestFailure:
+        pass  # it does not come up
+    logged = [(line.time_s, line.text) for line in system.log]
+    assert len(logged) == len(lines)
+    for (at_s, text), (expected_s, expected) in zip(logged, lines, strict=True):
+        assert expected in text
+        assert at_s == pytest.approx(expected_s)
