@@ -216,14 +216,18 @@ def test_a_class_that_ends_its_process_is_deactivated(
         assert system.node("listener").state == "active"
 
 
+@pytest.mark.parametrize(
+    ("name", "callback"),
+    [(f"{CLASSES}:Faulty", "on_command"), (f"{CALLBACK_CLASSES}:HangingTimer", "tick")],
+)
 def test_a_hanging_callback_of_a_class_is_interrupted_and_its_node_restarted(
-    tmp_path: Path, peer: Peer
+    tmp_path: Path, peer: Peer, name: str, callback: str
 ) -> None:
     text = f"""
     system: hangs
     nodes:
       faulty:
-        class: {CLASSES}:Faulty
+        class: {name}
         lifecycle: {{watch: {{callback_ms: 200}}, on_failure: restart, restart: {{backoff_ms: 1}}}}
     """
     with running(text, tmp_path) as system:
@@ -231,7 +235,7 @@ def test_a_hanging_callback_of_a_class_is_interrupted_and_its_node_restarted(
         peer.publisher(String, "/command").publish(String(data="hang"))
         wait_until(lambda: system.node("faulty").activations == 2)
         assert system.node("faulty").instance is not first
-        assert "on_command took longer than 200 ms" in "\n".join(map(str, system.events))
+        assert f"{callback} took longer than 200 ms" in "\n".join(map(str, system.events))
 
 
 def test_the_log_of_a_class_goes_to_the_console_and_to_rosout(tmp_path: Path, peer: Peer) -> None:

@@ -172,6 +172,21 @@ class Sleeper(Node):
         return response
 
 
+class HangingTimer(Node):
+    """A timer whose callback does not return, once it is commanded."""
+
+    def __init__(self) -> None:
+        super().__init__("hanging")
+        self.create_subscription(String, "command", self.on_command, 10)
+
+    def on_command(self, _: String) -> None:
+        self.create_timer(0.01, self.tick)
+
+    def tick(self) -> None:
+        while True:
+            time.sleep(0.01)
+
+
 class SleepingServer(Node):
     """Sleeps in the callback of a goal; the callback is ``async`` or not."""
 

@@ -14,6 +14,7 @@ from composer.base.source import Located
 from composer.model import Period, PeriodUnit, TimerClock
 from composer.model import Timer as TimerModel
 from composer.runtime.callbacks.context import NodeContext
+from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.ports.timer import TimerPort
@@ -131,6 +132,7 @@ class HostedTimerPort(TimerPort):
         elif self._timer.callback is not None:
             self._timer.callback()
 
+    @calls_user_code
     def _call_back(self) -> Any:
         if not self._context.gate.incoming:
             return None  # it waited for its callback group meanwhile
