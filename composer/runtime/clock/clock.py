@@ -83,6 +83,13 @@ class RealClock(Clock):
         """Wait for the end of a thread, at most ``timeout_s`` seconds."""
         thread.join(timeout_s)
 
+    def cpu_s(self, thread: int) -> float:
+        """Return the CPU time that a thread has used, by its identifier; zero if it has ended."""
+        try:
+            return time.clock_gettime(time.pthread_getcpuclockid(thread))
+        except OSError:
+            return 0.0
+
     def since_boot_s(self) -> float:
         """Return the seconds since the computer has started, including suspends."""
         return time.clock_gettime(time.CLOCK_BOOTTIME)

@@ -148,6 +148,14 @@ class VirtualClock(Clock):
                 COMPUTER.sleep(_POLL_S)
         return is_over()
 
+    def pass_turn_on(self) -> None:
+        """Pass the turn on from a thread that does not return, and is not of the system any more.
+
+        Any thread may call it, once the system stops.
+        """
+        self._members.discard(self.running_thread)
+        self._next().turn.release()
+
     def follow(self, follower: Callable[[int], None]) -> None:
         """Call ``follower(nanoseconds since 1970)`` now and after each jump."""
         self._followers.append(follower)

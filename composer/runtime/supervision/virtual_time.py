@@ -116,21 +116,32 @@ class Standstill:
 _LOOK_S = 1.0
 #: The number of looks after which a callback is named, and after which it may be interrupted.
 _NAMED_AFTER, _INTERRUPTED_AFTER = 10, 2
+#: The number of looks after which a callback ends the run that has used no more CPU time between
+#: two looks.
+_ENDED_AFTER, _IDLE_S = 60, 0.01
+#: Code of debuggers, which wait for the user.
+_DEBUGGERS = ("bdb.py", "pydevd.py")
 
 
 class TurnWatch:
     """Names callbacks that do not return, and so keep the turn: no time passes meanwhile.
 
     It looks at them in real time, on a thread that is not of the system. They may compute something
-    long, so it interrupts them only once the system stops.
+    long, so it interrupts them only once the system stops. One that waits, such as for a lock,
+    cannot be interrupted. If it waits for a minute, it loses the turn, and the run ends.
     """
 
     def __init__(
-        self, clock: VirtualClock, is_stopping: Callable[[], bool], warn: Callable[[str], None]
+        self,
+        clock: VirtualClock,
+        is_stopping: Callable[[], bool],
+        warn: Callable[[str], None],
+        fail: Callable[[str], None],
     ) -> None:
         self._clock = clock
         self._is_stopping = is_stopping
         self._warn = warn
+        self._fail = fail
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="turn watch", daemon=True)
 
@@ -144,10 +155,15 @@ class TurnWatch:
         self._thread.join()
 
     def _run(self) -> None:
-        turns = looks = 0
+        turns = looks = idle_looks = 0
+        cpu_s = 0.0
         while not COMPUTER.wait(self._end, _LOOK_S):
             looks = looks + 1 if turns == self._clock.turns else 0
             turns = self._clock.turns
+            before_s, cpu_s = cpu_s, COMPUTER.cpu_s(self._clock.running_thread)
+            idle_looks = idle_looks + 1 if looks and cpu_s - before_s < _IDLE_S else 0
+            if idle_looks == _ENDED_AFTER:
+                self._end_waiting()
             is_over = self._is_stopping() and looks >= _INTERRUPTED_AFTER
             for callback in self._callbacks() if is_over or looks == _NAMED_AFTER else ():
                 at = callback.location()
@@ -157,6 +173,15 @@ class TurnWatch:
                 else:
                     lasts = f"{callback.name} has not returned for {looks * _LOOK_S:g} s"
                     self._warn(f"{lasts}, in which the time does not advance; it is at {at}")
+
+    def _end_waiting(self) -> None:
+        for callback in self._callbacks():
+            if not any(name in callback.stack() for name in _DEBUGGERS):
+                self._fail(
+                    f"the time does not advance, because {callback.name} waits at"
+                    f" {callback.location()} for something that virtual time does not control"
+                )
+                self._clock.pass_turn_on()
 
     def _callbacks(self) -> list[RunningCallback]:
         return [stack[0] for stack in running_callbacks((self._clock.running_thread,))]
@@ -175,5 +200,5 @@ def watched_time(
     ``warn`` receives what may be meant, ``fail`` what has to end the run.
     """
     Standstill(clock, node_set, fail)
-    with outside_calls(warn), TurnWatch(clock, is_stopping, warn):
+    with outside_calls(warn), TurnWatch(clock, is_stopping, warn, fail):
         yield

@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
 
+from composer.runtime.supervision import virtual_time
 from composer.testing.failures import TestFailure
 from composer.testing.system_test import SystemTest
 
 CLASSES = "tests.ros.support.node_classes"
 CALLBACKS = "tests.ros.support.callback_classes"
 TIMED = "tests.ros.support.timed_classes"
+TIMED_FILE = Path(__file__).parents[1] / "support" / "timed_classes.py"
 REFUSED = "tests.ros.support.refused_classes"
 #: Timers, services that call each other in callbacks and coroutines, goals, rates, lifecycle nodes,
 #: constructors that wait, and ports that are declared or not.
@@ -174,13 +177,29 @@ def test_what_a_class_cannot_do_is_reported(
     limits = "{timeout_ms: 2500, on_failure: ignore}"
     path.write_text(f'system: s\nnodes: {{a: {{class: "{node}", lifecycle: {limits}}}}}\n')
     system = SystemTest(path)
-    try:
-        with system:
-            system.advance(0.0)
-    except TestFailure:
-        pass  # it does not come up
+    with suppress(TestFailure), system:  # it may not come up
+        system.advance(0.0)
     logged = [(line.time_s, line.text) for line in system.log]
     assert len(logged) == len(lines)
     for (at_s, text), (expected_s, expected) in zip(logged, lines, strict=True):
         assert expected in text
         assert at_s == pytest.approx(expected_s)
+
+
+@pytest.mark.parametrize("in_callback", ["true", "false"])
+def test_a_class_that_waits_for_a_lock_ends_the_run(
+    tmp_path: Path, in_callback: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(virtual_time, "_LOOK_S", 0.01)
+    path = tmp_path / "locked.yaml"
+    node = f'{{class: "{TIMED}:Locked", arguments: {{in_callback: {in_callback}}}}}'
+    path.write_text(f"system: s\nnodes: {{locked: {node}}}\n")
+    system = SystemTest(path)
+    with suppress(TestFailure), system:
+        system.advance(10.0)
+    assert system.outcome is not None
+    assert system.outcome.exit_code == 1
+    name = "lock_again" if in_callback == "true" else "__init__"
+    reason = f"the time does not advance, because {name} waits at {TIMED_FILE}:"
+    assert reason in system.outcome.reason
+    assert any(f"{name} has not returned for" in line.text for line in system.log)

@@ -103,6 +103,22 @@ class WaitsForever(Node):
             self.get_logger().info("waiting")
 
 
+class Locked(Node):
+    """Waits for a lock in its constructor or in a callback, and nothing releases the lock."""
+
+    def __init__(self, in_callback: bool) -> None:
+        super().__init__("locked")
+        self.lock = threading.Lock()
+        self.lock.acquire()
+        if in_callback:
+            self.create_timer(1.0, self.lock_again)
+        else:
+            self.lock_again()
+
+    def lock_again(self) -> None:
+        self.lock.acquire()
+
+
 class Commander(Node):
     """Sends goals from a timer, and waits there; cancels every second one."""
 
