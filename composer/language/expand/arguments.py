@@ -107,7 +107,8 @@ def typed(tree: Tree, declared: Declared, word: str) -> tuple[Tree, Diagnostic |
         kind = "a number" if declared.type == _NUMBER else f"of type {shown(declared.type)}"
         what = f"'{shown(plain(tree))}'" if isinstance(tree, Scalar) else describe(tree)
         message = f"{word} '{name}' is {kind}, not {what}"
-        return tree, Diagnostic(rules.WRONG_TYPE, message, tree.span, (label,))
+        hint = "write a list: [..., ...]" if declared.type.endswith("_array") else None
+        return tree, Diagnostic(rules.WRONG_TYPE, message, tree.span, (label,), hint)
     values = [plain(item) for item in declared.choices]
     if values and plain(converted) not in values:
         text = shown(plain(converted))

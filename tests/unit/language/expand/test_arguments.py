@@ -59,7 +59,7 @@ def test_a_value_gets_the_declared_type(name: str, written: str, value: object) 
         ("robots", "two", "wrong-type", "argument 'robots' is a number, not 'two'", ""),
         ("robots", "true", "wrong-type", "argument 'robots' is a number, not 'true'", ""),
         ("map", "[a]", "wrong-type", "argument 'map' is of type string, not a list", ""),
-        ("waypoints", "1.5", "wrong-type", "argument 'waypoints' is of type double_array", ""),
+        ("waypoints", "1.5", "wrong-type", "argument 'waypoints' is of type double_array", "list"),
         ("waypoints", "[a]", "wrong-type", "argument 'waypoints' is of type double_array", ""),
         ("lidar", "velodine", "unknown-word", "'velodine' is not a choice of", "'velodyne'?"),
         ("lidar", "sick", "unknown-word", "'sick' is not a choice", "one of 'velodyne', 'ouster'"),
