@@ -156,8 +156,7 @@ def test_an_empty_array_has_its_declared_type(system: RunningSystem, peer: Peer)
 def test_many_requested_values_are_limited(system: RunningSystem, peer: Peer) -> None:
     """A request may name a long value many times."""
     long = "x" * 1000
-    node = system.node("subject")._ros
-    node.declare_parameter("long", long)
+    system.ros_node("subject").declare_parameter("long", long)
     response = peer.call(
         GetParameters, "/subject/get_parameters", GetParameters.Request(names=["long"] * 1000)
     )

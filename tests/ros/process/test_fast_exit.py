@@ -89,11 +89,11 @@ def test_a_state_can_be_read_while_the_node_is_destroyed(tmp_path: Path) -> None
     states: set[str] = set()
     over = threading.Event()
     with running(text, tmp_path) as system:
-        node_set = system.host._node_set
+        running_nodes = [system.node(name) for name in nodes]
 
         def poll() -> None:
             while not over.wait(0.001):
-                states.update(node.state for node in tuple(node_set.nodes.values()))
+                states.update(node.state for node in running_nodes)
 
         poller = threading.Thread(target=poll)
         poller.start()
@@ -102,7 +102,7 @@ def test_a_state_can_be_read_while_the_node_is_destroyed(tmp_path: Path) -> None
         over.set()
         poller.join(PATIENCE_S)
     assert (outcome.exit_code, outcome.hung) == (0, False)
-    assert {node.state for node in node_set.nodes.values()} == {"finalized"}
+    assert {node.state for node in running_nodes} == {"finalized"}
 
 
 def shared_memory_of(pid: int) -> set[Path]:

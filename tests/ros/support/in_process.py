@@ -193,6 +193,9 @@ class RunningSystem:
         wait_until(lambda: part in self.log_text(), f"'{part}' in the log")
         return next(line for line in self.log() if part in line)
 
+    def has_ended(self) -> bool:
+        return not self._thread.is_alive()
+
     def stop(self) -> Outcome:
         """Stop the system, if it runs, and return the outcome."""
         self.host.stop("the test is over")
@@ -226,7 +229,7 @@ def running(
     options = options or HostOptions(stop_within_s=_ENDS_WITHIN_S)
     system = RunningSystem(system_of(text, folder, **modules), options, autostart)
     try:
-        wait_until(lambda: system.reported(BroughtUp) or not system._thread.is_alive(), "bring-up")
+        wait_until(lambda: system.reported(BroughtUp) or system.has_ended(), "bring-up")
         yield system
     except AssertionError as error:
         error.add_note("the system reported:\n" + "\n".join(map(str, system.events)))

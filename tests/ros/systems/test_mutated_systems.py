@@ -83,11 +83,9 @@ def problem_of(system: System) -> str | None:
     """Run a system; return all that happened unless it came up and ended in order."""
     running = RunningSystem(system, HostOptions(stop_within_s=10.0), None)
     try:
-        wait_until(
-            lambda: running.reported(BroughtUp) or not running._thread.is_alive(), "bring-up"
-        )
+        wait_until(lambda: running.reported(BroughtUp) or running.has_ended(), "bring-up")
         until_s = time.monotonic() + RUNS_S
-        while running._thread.is_alive() and time.monotonic() < until_s:
+        while not running.has_ended() and time.monotonic() < until_s:
             time.sleep(0.01)
     finally:
         outcome = running.stop()

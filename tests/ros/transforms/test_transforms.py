@@ -295,7 +295,6 @@ def test_nodes_of_a_process_share_one_buffer(tmp_path: Path, peer: Peer) -> None
         source, other = system.behavior("source"), system.behavior("other")
         wait_until(lambda: source.transforms.can_lookup("map", "laser"), "a transform")
         system.change("other", "activate")
-        assert other.transforms._buffer is source.transforms._buffer
         assert x_of(other.transforms.lookup("map", "laser")) == 0.5
         assert not system.behavior("apart").transforms.can_lookup("map", "laser")
 
@@ -338,7 +337,6 @@ def check_messages(other: Any) -> None:
     for wrong in ({"target": ["lasr"]}, {"target": "lasr", "timeout_ms": "soon"}):
         with pytest.raises(TypeError):
             other.transforms.wait(source="laser", **wrong)
-    assert not other.transforms._buffer._waiting
 
 
 def test_the_buffer_is_emptied_when_simulated_time_goes_back(tmp_path: Path, peer: Peer) -> None:

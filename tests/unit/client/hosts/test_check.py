@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import runpy
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -66,7 +67,7 @@ def test_the_program_answers_with_an_inventory(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "stdin", io.StringIO(written_question(question)))
     print("Welcome to this computer", end="")  # a start-up file of the shell
-    inventory_module._main()
+    runpy.run_path(inventory_module.__file__, run_name="__main__")
     found = read_answer(capsys.readouterr().out)
     assert found == take_inventory(tmp_path, question)
     assert found.files["lost.py"] is None

@@ -24,17 +24,16 @@ def located(text: str) -> Located[str]:
     return Located(text, SPAN)
 
 
-def deployment(folder: Path, write: Callable[[str], None]) -> tuple[Deployment, RemoteProcess]:
+def deployment(folder: Path, write: Callable[[str], None]) -> Deployment:
     host = Host(located("jetson"), SPAN, located("10.0.0.5"), workspace=located("~/robot"))
     process = Process(located("vision"), SPAN, host=host.name)
-    item = RemoteProcess(process, host)
     wait = ("/bin/sh", "-c", "trap '' INT; exec sleep 60", "--")
     options = DeploymentOptions(folder, "robot.yaml", (), wait, write, lambda *_: None)
-    return Deployment([item], options), item
+    return Deployment([RemoteProcess(process, host)], options)
 
 
 def test_the_second_request_ends_everything_at_once(tmp_path: Path) -> None:
-    deployed, _ = deployment(tmp_path, lambda _: None)
+    deployed = deployment(tmp_path, lambda _: None)
 
     async def silent(*_: object, **__: object) -> None:
         await asyncio.sleep(60.0)
@@ -55,19 +54,18 @@ async def refused(*_: object, **__: object) -> None:
 
 def test_a_refused_session_is_not_tried_again(tmp_path: Path) -> None:
     """The connection is not lost. It would be closed, and with it all other processes end."""
-    deployed, item = deployment(tmp_path, lambda _: None)
-    connection: Any = SimpleNamespace(create_process=refused, is_closed=lambda: False)
+    deployed = deployment(tmp_path, lambda _: None)
+    connection: Any = SimpleNamespace(
+        create_process=refused, is_closed=lambda: False, abort=lambda: None
+    )
     with pytest.raises(HostError, match="refuses another session") as refusal:
-        asyncio.run(deployed._keep(item, connection))
+        asyncio.run(deployed.run({"jetson": connection}))
     assert "MaxSessions" in str(refusal.value.hint)
-    closed: Any = SimpleNamespace(create_process=refused, is_closed=lambda: True)
-    with pytest.raises(asyncssh.ChannelOpenError):
-        asyncio.run(deployed._keep(item, closed))
 
 
 def test_a_defect_ends_everything(tmp_path: Path) -> None:
     """It must not leave the system waiting for a process that nothing starts."""
-    deployed, _ = deployment(tmp_path, lambda _: None)
+    deployed = deployment(tmp_path, lambda _: None)
 
     async def broken(*_: object, **__: object) -> None:
         raise KeyError("defect")

@@ -41,12 +41,11 @@ def test_waits_until_the_time_has_come(poller: Poller, wait_s: float) -> None:
 
 
 def test_a_wait_is_not_rounded_to_milliseconds(poller: Poller) -> None:
-    """The figures are in ``benchmarks``; here is what the kernel is asked for."""
-    nanoseconds = 0
-    while not nanoseconds:  # it does not wait if the time has come before it asks
-        poller.wait(monotonic() + 0.0207)
-        nanoseconds = poller._timeout[1] if poller._sleep else poller._time[3]
-    assert nanoseconds % 1_000_000
+    took_s = 1.0
+    while took_s > 0.0009:  # on a busy machine, many waits are longer
+        began_s = monotonic()
+        poller.wait(began_s + 0.0003)
+        took_s = monotonic() - began_s
 
 
 def test_a_wait_that_was_woken_can_continue_until_the_time_has_come(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from math import inf
@@ -125,10 +127,13 @@ def test_a_call_without_a_limit_needs_no_timer_and_ends_on_close(
 def test_a_future_that_is_done_is_discarded(pending: PendingFutures) -> None:
     done: Future[str] = Future()
     done.set_result("answer")
-    pending.add(done)
-    hold(pending, 200.0).cancel()
-    hold(pending, 200.0).set_result("answer")
-    assert not pending._futures
+    futures = [pending.add(done), hold(pending, 200.0), hold(pending, 200.0)]
+    futures[1].cancel()
+    futures[2].set_result("answer")
+    left = weakref.WeakSet(futures)
+    del done, futures
+    gc.collect()
+    assert not left
 
 
 def test_waiting_again_after_a_timeout_holds_again(clock: Clock, pending: PendingFutures) -> None:
