@@ -57,10 +57,12 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
     _begin_elsewhere(config)
-    # The logs of runs do not belong into the home folder of who runs the tests.
-    logs = tempfile.TemporaryDirectory(prefix="ros-log-", ignore_cleanup_errors=True)
-    config.add_cleanup(logs.cleanup)
-    os.environ["ROS_LOG_DIR"] = logs.name
+    # The logs of runs do not belong into the home folder of who runs the tests. Commands would find
+    # the systems that somebody else runs on this computer by their locks.
+    for variable in ("ROS_LOG_DIR", "XDG_RUNTIME_DIR"):
+        folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
+        config.add_cleanup(folder.cleanup)
+        os.environ[variable] = folder.name
     # numpy, which every ROS process imports, would start a thread for each core.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # A background job of a script ignores SIGINT, and its children inherit that: tests could not

@@ -6,23 +6,17 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
 
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
-from composer.language.tree import plain
-from composer.launch.conditions import condition
 from composer.launch.variants import all_visits, mark
 from composer.loading import load, load_files
 from composer.model.resolve import OverrideOptions
-from tests.examples import examples
 from tests.unit.bridges.importing.test_launch_file import node
 
 Nodes = Callable[[Mapping[str, str]], list[dict[str, Any]]]
@@ -319,48 +313,6 @@ def test_a_container_that_something_else_starts_has_the_condition_of_its_compone
     assert conditions(system["nodes"]["box"]) == {"if": "composed"}
 
 
-A, B = ({"a": a, "b": b} for a, b in (("false", "x"), ("false", "y")))
-C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
-
-
-@pytest.mark.parametrize(
-    ("present", "expected"),
-    [
-        ([0, 1, 2, 3], {}),
-        ([0, 1], {"unless": "a"}),
-        ([2, 3], {"if": "a"}),
-        ([0, 2], {"unless": "b == 'y'"}),
-        ([1, 3], {"if": "b == 'y'"}),
-        ([1], {"if": "not a and b == 'y'"}),
-        ([0, 1, 2], {"unless": "a and b == 'y'"}),
-        ([0, 3], {"unless": "not a and b == 'y' or a and b == 'x'"}),
-    ],
-)
-def test_the_condition_is_short(present: list[int], expected: dict[str, str]) -> None:
-    assert condition([A, B, C, D], present) == expected
-
-
-def test_a_condition_that_would_be_too_long_is_divided(tmp_path: Path) -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        is_odd = [*values.values()].count("true") % 2 == 1
-        return [node("odd"), node("nav")] if is_odd else [node("nav")]
-
-    names = "abcdef"
-    system, _ = visited(nodes, *[argument(name, "false") for name in names])
-    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
-    for number, expected in ((0, 1), (1, 2), (2, 1), (5, 2)):
-        arguments = tuple(f"{name}=true" for name in names[:number])
-        result = load(tmp_path / "s.yaml", overrides=OverrideOptions(arguments=arguments))
-        assert result.system is not None
-        assert len(result.system.nodes) == expected
-
-
-def test_a_condition_has_no_double_negation() -> None:
-    visits = [{"viewer": "true"}, {"viewer": "false"}]
-    assert condition(visits, [0]) == {"if": "viewer"}
-    assert condition(visits, [1]) == {"unless": "viewer"}
-
-
 LAUNCH = """\
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -413,77 +365,3 @@ def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
     assert values == {"use_sim_time": "${sim}", "yaml": "${map}", "ip": "${ip}"}
     [result] = load_files([tmp_path / "robot.yaml"])
     assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
-
-
-VALUES = {"a": ["true", "false"], "b": ["True", "False"], "c": ["x", "y", "z"], "d": ["one", "any"]}
-ARGUMENTS = [
-    argument("a", "false"),
-    argument("b", "True"),
-    argument("c", "x", *VALUES["c"]),
-    argument("d", "any"),
-]
-TESTS = st.dictionaries(
-    st.sampled_from(sorted(VALUES)), st.integers(min_value=0, max_value=1), max_size=3
-)
-NODES = st.lists(
-    st.tuples(
-        TESTS,  # the values with which there is a node
-        TESTS,  # those that give it an argument
-        st.sampled_from([None, *VALUES]),  # the argument that is its parameter
-    ),
-    min_size=1,
-    max_size=3,
-)
-
-
-def holds(tests: Mapping[str, int], values: Mapping[str, str]) -> bool:
-    """Return whether each value is the one with that index; of "d", only "one" is compared."""
-    return all(
-        (values[name] == "one") == (index == 0)
-        if name == "d"
-        else values[name] == VALUES[name][index]
-        for name, index in tests.items()
-    )
-
-
-@given(NODES, st.lists(st.sampled_from(list(product(*VALUES.values()))), min_size=4, max_size=4))
-@examples(40)
-def test_a_system_starts_what_the_launch_file_starts(
-    tmp_path_factory: pytest.TempPathFactory,
-    described: list[Any],
-    combinations: list[tuple[str, ...]],
-) -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        return [
-            node(
-                f"n{number}",
-                arguments=["-v"] if holds(verbose, values) else [],
-                parameters={} if name is None else {"p": values[name]},
-            )
-            for number, (present, verbose, name) in enumerate(described)
-            if holds(present, values)
-        ]
-
-    # What a condition compares: of "d", one constant.
-    used = {name for present, verbose, _ in described for name in (*present, *verbose)}
-    compared = {"d": ["one"]} if "d" in used else {}
-    system, _ = visited(nodes, *ARGUMENTS, **compared)
-    path = tmp_path_factory.mktemp("system") / "s.yaml"
-    path.write_text(yaml.safe_dump(system))
-    for chosen in combinations:
-        values = dict(zip(VALUES, chosen, strict=True))
-        expected = {item["name"]: (item["arguments"], item["parameters"]) for item in nodes(values)}
-        words = tuple(f"{k}={v}" for k, v in values.items() if k in system.get("arguments", {}))
-        result = load(path, overrides=OverrideOptions(arguments=words))
-        tree = plain(result.tree) if result.tree is not None else {}
-        assert isinstance(tree, dict)
-        found = {
-            item.get("name", key): (
-                item["executable"].get("arguments", []),
-                {name: str(each["default"]) for name, each in item.get("parameters", {}).items()},
-            )
-            for key, item in tree.get("nodes", {}).items()
-        }
-        assert {k: (a, {n: t.lower() for n, t in p.items()}) for k, (a, p) in found.items()} == {
-            k: (a, {n: t.lower() for n, t in p.items()}) for k, (a, p) in expected.items()
-        }
