@@ -21,6 +21,8 @@ from composer.runtime.ros.qos_profiles import rclpy_profile
 
 #: As of Gazebo and rosbag2.
 _CLOCK_PERIOD_S = 0.01
+#: How often a replay sees whether it is paused while it waits.
+_PAUSE_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +30,13 @@ class ReplayOptions:
     """How a bag is replayed.
 
     ``rate`` is the speed; ``names`` replaces names of topics. With ``clock``, the time of the bag
-    is published on /clock.
+    is published on /clock. While ``is_paused()``, the time stands still.
     """
 
     rate: float = 1.0
     names: Mapping[str, str] = field(default_factory=dict)
     clock: bool = False
+    is_paused: Callable[[], bool] = lambda: False
 
 
 class GraphReplay:
@@ -46,6 +49,8 @@ class GraphReplay:
         self._session = session
         self._options = options
         self.count = 0
+        #: The last time of time.monotonic, and how long the replay has run by then, without pauses.
+        self._seen_s = self._passed_s = 0.0
         self._publishers: dict[str, Any] = {}
         for topic in topics:
             try:
@@ -73,9 +78,9 @@ class GraphReplay:
 
         ``on_message(recorded_ns)`` is called for each.
         """
-        begin_s = time.monotonic()
+        self._seen_s, self._passed_s = time.monotonic(), 0.0
         for message in messages:
-            self._wait_until(message.recorded_ns, start_ns, begin_s)
+            self._wait_until(message.recorded_ns, start_ns)
             self._publishers[message.topic].publish(message.data)
             self.count += 1
             on_message(message.recorded_ns)
@@ -85,14 +90,23 @@ class GraphReplay:
         results = [wait_until_acknowledged(item) for item in self._publishers.values()]
         return all(results)
 
-    def _wait_until(self, at_ns: int, start_ns: int, begin_s: float) -> None:
-        due_s = begin_s + (at_ns - start_ns) / NANOSECONDS / self._options.rate
-        while self._clock is not None and time.monotonic() < due_s:
-            passed_ns = (time.monotonic() - begin_s) * self._options.rate * NANOSECONDS
-            self._publish_time(start_ns + round(passed_ns))
-            self._session.spin_until(min(due_s, time.monotonic() + _CLOCK_PERIOD_S))
-        if time.monotonic() < due_s:
-            self._session.spin_until(due_s)
+    def _wait_until(self, at_ns: int, start_ns: int) -> None:
+        rate = self._options.rate
+        due_s = (at_ns - start_ns) / NANOSECONDS / rate
+        while True:
+            is_paused = self._options.is_paused()
+            now_s = time.monotonic()
+            if not is_paused:
+                self._passed_s += now_s - self._seen_s
+            self._seen_s = now_s
+            if not is_paused and self._passed_s >= due_s:
+                break
+            pause_s = _PAUSE_PERIOD_S if self._clock is None else _CLOCK_PERIOD_S
+            if self._clock is not None:
+                self._publish_time(start_ns + round(self._passed_s * rate * NANOSECONDS))
+            if not is_paused:
+                pause_s = min(pause_s, due_s - self._passed_s)
+            self._session.spin_until(now_s + pause_s)
         if self._clock is not None:
             self._publish_time(at_ns)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,7 +28,7 @@ from composer.cli.support.name_values import Arguments
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Settings, Timeout, examples, finite
 from composer.cli.support.ros import require_interfaces, require_modules, require_ros, ros_session
 from composer.cli.support.system_arguments import complete_system, runnable_system
-from composer.cli.support.terminal import lines, say, write
+from composer.cli.support.terminal import Keys, lines, say, write
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
@@ -109,7 +110,7 @@ def replay(
     """Replay a bag.
 
     Without SYSTEM, the messages are published with the QoS profiles of the bag, once discovery is
-    complete.
+    complete. In a terminal, the space key pauses the replay and resumes it.
 
     With SYSTEM, the system runs in virtual time, isolated from the ROS graph. The topics that it
     receives and does not publish come from the bag. Its clock shows the time of the bag. With
@@ -155,29 +156,56 @@ def _options(rate: float, remap: list[str] | None, *, clock: bool) -> ReplayOpti
     return ReplayOptions(rate, names, clock)
 
 
+class _Progress:
+    """The line of progress, and the key that pauses."""
+
+    def __init__(self, bag: Bag, keys: Keys) -> None:
+        self.next_ns = 0
+        self._summary = bag.summary
+        self._keys = keys
+        self._at_ns = bag.summary.start_ns
+        self._is_paused = False
+
+    def is_paused(self) -> bool:
+        """Read a key; return whether the replay is paused."""
+        if self._keys.pressed() == " ":
+            self._is_paused = not self._is_paused
+            self._show()
+        return self._is_paused
+
+    def show(self, recorded_ns: int) -> None:
+        """Show the time of a message, once per second of the bag."""
+        self._at_ns = recorded_ns
+        if recorded_ns >= self.next_ns:
+            self.next_ns = recorded_ns + _PROGRESS_NS
+            self._show()
+
+    def _show(self) -> None:
+        at_s = (self._at_ns - self._summary.start_ns) / 1e9
+        text = f"{at_s:.0f} of {self._summary.duration_s:.0f} s"
+        if self._keys.enabled:
+            text += ", paused (space resumes)" if self._is_paused else " (space pauses)"
+        show_progress(text)
+
+
 def _publish(
     bag: Bag, chosen: Selection, options: ReplayOptions, timeout_s: float, *, loop: bool
 ) -> None:
     topics = [bag.summary.topics[name] for name in sorted(chosen.topics(bag))]
     start_ns = bag.summary.start_ns + round(chosen.start_s * 1e9)
-    with ros_session("compose replay", timeout_s, carries_messages=True) as (session, _):
+    with (
+        ros_session("compose replay", timeout_s, carries_messages=True) as (session, _),
+        Keys() as keys,
+    ):
         from composer.bags.graph_replay import GraphReplay
 
-        replayed = GraphReplay(session, topics, options)
+        progress = _Progress(bag, keys)
+        replayed = GraphReplay(session, topics, replace(options, is_paused=progress.is_paused))
         replayed.wait_for_subscriptions(timeout_s)
-        next_ns = start_ns
-
-        def show(recorded_ns: int) -> None:
-            nonlocal next_ns
-            if recorded_ns >= next_ns:
-                next_ns = recorded_ns + _PROGRESS_NS
-                at_s = (recorded_ns - bag.summary.start_ns) / 1e9
-                show_progress(f"{at_s:.0f} of {bag.summary.duration_s:.0f} s")
-
         try:
             for _ in count() if loop else range(1):
-                next_ns = start_ns
-                replayed.play(chosen.messages(bag), start_ns, show)
+                progress.next_ns = start_ns
+                replayed.play(chosen.messages(bag), start_ns, progress.show)
         except KeyboardInterrupt:
             pass
         show_progress("")

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import select
 import shutil
 import sys
-import termios
-import tty
 from collections.abc import Callable
-from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
@@ -18,7 +14,7 @@ from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
-from composer.cli.support.terminal import as_json, write, write_raw
+from composer.cli.support.terminal import Keys, as_json, write, write_raw
 
 if TYPE_CHECKING:
     from composer.cli.support.callback_tables import SortKey
@@ -156,18 +152,17 @@ class _Screen:
 
     def __init__(self, *, full: bool = True) -> None:
         self._is_full = full and sys.stdout.isatty() and sys.stdin.isatty()
-        self._before: list[Any] = []
+        self._keys = Keys(enabled=self._is_full)
 
     def __enter__(self) -> Self:
+        self._keys.__enter__()
         if self._is_full:
-            self._before = termios.tcgetattr(sys.stdin)
-            tty.setcbreak(sys.stdin)
             write_raw(_ENTER)
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._keys.__exit__()
         if self._is_full:
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
             write_raw(_LEAVE)
 
     @property
@@ -186,9 +181,5 @@ class _Screen:
 
     def quit_requested(self) -> bool:
         """Say whether the user has pressed q, Escape or Ctrl-C."""
-        if not self._is_full:
-            return False
-        with suppress(OSError):
-            if select.select([sys.stdin], [], [], 0.0)[0]:
-                return sys.stdin.read(1) in _QUIT_KEYS
-        return False
+        key = self._keys.pressed()
+        return key is not None and key in _QUIT_KEYS

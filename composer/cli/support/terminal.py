@@ -11,9 +11,13 @@ import io
 import json
 import math
 import os
+import select
 import sys
+import termios
+import tty
 from collections.abc import Iterable, Sequence
-from typing import Any, BinaryIO, NoReturn, TextIO
+from contextlib import suppress
+from typing import Any, BinaryIO, NoReturn, Self, TextIO
 
 from composer.base.characters import escape_json, escape_line, escape_lines, is_safe, visible, width
 
@@ -148,6 +152,36 @@ def use_color(stream: TextIO) -> bool:
     if os.environ.get("FORCE_COLOR"):
         return True
     return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
+class Keys:
+    """Reads keys from the terminal one by one, without echo, for a ``with`` block.
+
+    There are none if stdin is not a terminal, or if this program is in the background.
+    """
+
+    def __init__(self, *, enabled: bool = True) -> None:
+        self._before: list[Any] = []
+        number = sys.stdin.fileno() if enabled and sys.stdin.isatty() else None
+        #: Whether keys can be read.
+        self.enabled = number is not None and os.tcgetpgrp(number) == os.getpgrp()
+
+    def __enter__(self) -> Self:
+        if self.enabled:
+            self._before = termios.tcgetattr(sys.stdin)
+            tty.setcbreak(sys.stdin)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.enabled:
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+
+    def pressed(self) -> str | None:
+        """Return the next key that was pressed; None if there is none, empty after the last."""
+        with suppress(OSError):
+            if self.enabled and select.select([sys.stdin], [], [], 0.0)[0]:
+                return os.read(sys.stdin.fileno(), 1).decode(errors="replace")
+        return None
 
 
 def keep_stdout_for_data() -> None:
