@@ -27,6 +27,7 @@ class Verb(StrEnum):
     TRANSITION = "transition"
     DROP = "drop"
     DELAY = "delay"
+    DELAY_TIMER = "delay_timer"
     DUPLICATE = "duplicate"
     REORDER = "reorder"
     CORRUPT = "corrupt"
@@ -74,9 +75,9 @@ class Action:
     """One thing that a step does.
 
     ``name`` is a topic, service or action with its full name, or the key of a node; of a parameter,
-    ``node.parameter``; of a replay, its bag as it is written. ``content`` is a message, a request,
-    a goal, or the fields that ``corrupt`` sets; ``value`` is the value of a parameter, or the name
-    of a transition. ``options`` are the other keys.
+    ``node.parameter``; of a timer, ``node.timer``; of a replay, its bag as it is written.
+    ``content`` is a message, a request, a goal, or the fields that ``corrupt`` sets; ``value`` is
+    the value of a parameter, or the name of a transition. ``options`` are the other keys.
     """
 
     verb: Verb
@@ -88,9 +89,9 @@ class Action:
 
     @property
     def node(self) -> str:
-        """The key of the node; with a parameter, what precedes the first dot."""
-        is_parameter = self.verb is Verb.SET_PARAMETER
-        return self.name.value.partition(".")[0] if is_parameter else self.name.value
+        """The key of the node; with a parameter or timer, what precedes the first dot."""
+        is_part = self.verb in (Verb.SET_PARAMETER, Verb.DELAY_TIMER)
+        return self.name.value.partition(".")[0] if is_part else self.name.value
 
 
 class EventKind(StrEnum):
@@ -185,6 +186,20 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
+class Exploration:
+    """What may vary from run to run.
+
+    Messages and timers may be late by ``jitter_ms``, ``drop`` messages may be lost, ``reorder``
+    pairs of messages may be swapped: on ``topics`` (their full names), or on all if there are none.
+    """
+
+    jitter_ms: Located[float] | None = None
+    drop: int = 0
+    reorder: int = 0
+    topics: tuple[Located[str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """A scenario without its system. Times are seconds since the end of the bring-up."""
 
@@ -196,6 +211,7 @@ class Scenario:
     expectations: tuple[Expectation, ...] = ()
     exit_code: int = 0
     allow_errors: bool = False
+    exploration: Exploration = field(default_factory=Exploration)
 
     @property
     def actions(self) -> tuple[Action, ...]:

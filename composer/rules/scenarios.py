@@ -163,6 +163,18 @@ def check_names(context: Context) -> Iterator[Diagnostic]:
     yield from _without_step(scenario)
 
 
+def check_exploration(context: Context) -> Iterator[Diagnostic]:
+    """Check what ``compose test --explore`` may vary."""
+    scenario = context.scenario
+    if scenario is None or context.is_partial:
+        return
+    jitter_ms = scenario.exploration.jitter_ms
+    if jitter_ms is not None and jitter_ms.value > scenario.for_s.value * 1000.0:
+        yield _too_late(scenario, f"{jitter_ms.value:g} ms", jitter_ms.span)
+    for topic in scenario.exploration.topics:
+        yield from _unknown_channel(context, ChannelKind.TOPIC, topic, is_sink=True)
+
+
 def _unknown_node(context: Context, name: Located[str], node: str) -> Iterator[Diagnostic]:
     system = context.system
     if _is_replaced(context, node):
@@ -235,6 +247,8 @@ def check_values(context: Context) -> Iterator[Diagnostic]:
             yield from _parameter(context.system, action.name, action.value)
         elif action.verb in (Verb.RAISE_IN, Verb.HANG):
             yield from _handler(context.system, action)
+        elif action.verb is Verb.DELAY_TIMER:
+            yield from _timer(context.system, action)
     for event in scenario.conditions:
         kind = event.kind.channel
         channel = None if kind is None else channels.get((kind, event.name.value))
@@ -348,3 +362,18 @@ def _handler(system: System, action: Action) -> Iterator[Diagnostic]:
         message = f"node '{action.name}' has no handler '{handler}'"
         hint = suggestion(str(handler), names)
         yield Diagnostic(UNDECLARED_NAME, message, handler.span, hint=hint)
+
+
+def _timer(system: System, action: Action) -> Iterator[Diagnostic]:
+    node: Node | None = system.node(action.node)
+    if node is None:
+        return
+    timer = action.name.value.partition(".")[2]
+    names = [item.name.value for item in node.timers]
+    if timer not in names:
+        message = f"node '{action.node}' has no timer '{timer}'"
+        hint = suggestion(timer, names)
+        span = action.name.span
+        if timer:
+            span = span.part(len(action.node) + 1, len(timer))
+        yield Diagnostic(UNDECLARED_NAME, message, span, hint=hint)

@@ -86,11 +86,14 @@ def check(
             found = _end_state(expectation.states, record)
         case _:
             found = _count(expectation, record, window)
-    return None if found is None else Failure(expectation.span, *found, window.end_s)
+    if found is None:
+        return None
+    wanted, seen, *clear_s = found
+    return Failure(expectation.span, wanted, seen, *clear_s or [window.end_s])
 
 
-#: What was expected, and what was seen.
-Difference = tuple[str, str] | None
+#: What was expected, what was seen, and when that was clear, if before the end of the window.
+Difference = tuple[str, str] | tuple[str, str, float] | None
 
 
 def _matches(
@@ -125,7 +128,9 @@ def _count(expectation: Expectation, record: Record, window: Window) -> Differen
         return None
     limits = _limits(least, most)
     wanted = described(event) + (f", {limits} times" if limits else "")
-    return f"{wanted}{_when(expectation)}", _seen(event, matcher, times, record, window)
+    seen = _seen(event, matcher, times, record, window)
+    clear_s = window.end_s if most is None or len(times) <= most else times[int(most)]
+    return f"{wanted}{_when(expectation)}", seen, clear_s
 
 
 def _seen(
@@ -186,7 +191,7 @@ def _silence(expectation: Expectation, record: Record, window: Window) -> Differ
         return None
     matcher = record.matcher(event)
     wanted = f"no message on {event.name}{_where(event)}{_when(expectation)}"
-    return wanted, _seen(event, matcher, times, record, window)
+    return wanted, _seen(event, matcher, times, record, window), times[0]
 
 
 def _order(expectation: Expectation, record: Record, window: Window) -> Difference:

@@ -40,7 +40,9 @@ class Case:
         if self.result is None:
             return f"ERROR   {self.path}: not run, the file has errors"
         word = "passed" if self.has_passed else "FAILED"
-        return f"{word}  {self.path}: {self.name}, {self.for_s:g} s in {self.result.took_s:.2f} s"
+        line = f"{word}  {self.path}: {self.name}, {self.for_s:g} s in {self.result.took_s:.2f} s"
+        explored = self.result.explored
+        return f"{line}, {explored} variations" if explored else line
 
 
 def details(case: Case, *, color: bool = False) -> str:
@@ -48,6 +50,8 @@ def details(case: Case, *, color: bool = False) -> str:
     if case.result is None:
         return render(case.errors, color=color).rstrip()
     blocks = [f"{case.path}: {case.name} failed"]
+    if case.result.variation:
+        blocks.append(case.result.variation)
     for failure in case.result.failures:
         lines = excerpt(failure.span, color=color)
         lines += [f"  expected: {failure.expected}", f"  seen:     {_indented(failure.seen)}"]

@@ -49,7 +49,11 @@ class Result:
 
     ``timeline`` are the last events before the first failure, ``output`` is what the process of a
     run that failed has printed, ``recorded`` what became of its bag. ``trace`` has the time and a
-    checksum of all that the run reported.
+    checksum of all that the run reported. ``disturbable`` is how many messages and calls faults
+    could have acted on, by topic and timer.
+
+    Of an exploration, this is the result of the smallest variation that fails, or of the scenario
+    itself: ``explored`` is the number of variations, ``variation`` the smallest one as text.
     """
 
     failures: list[Failure] = field(default_factory=list)
@@ -58,6 +62,9 @@ class Result:
     output: str = ""
     recorded: list[str] = field(default_factory=list)
     trace: list[tuple[float, int]] = field(default_factory=list)
+    disturbable: dict[str, int] = field(default_factory=dict)
+    explored: int = 0
+    variation: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,10 @@ def run_scenario(
     result = Result()
     try:
         with test:
+            before = test.disturbable
             result.failures += run.run()
+            for name, number in test.disturbable.items():
+                result.disturbable[name] = number - before.get(name, 0)
             if result.failures:
                 result.timeline = test.timeline(result.failures[0].until_s + _EPSILON_S)
         result.failures += run.end()
@@ -248,6 +258,9 @@ class _Run:
                 test.transition(name, str(value))
             case Verb.DELAY:
                 test.delay(name, options.pop("by_s"), **options)
+            case Verb.DELAY_TIMER:
+                node, _, timer = name.partition(".")
+                test.delay_timer(node, timer, options.pop("by_s"), **options)
             case Verb.CORRUPT:
                 test.corrupt(name, partial(self._corrupted, action), **options)
             case Verb.REPLAY if action.replay is not None:

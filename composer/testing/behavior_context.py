@@ -119,6 +119,7 @@ class TestContext(UserCode):
     router: None = None
     statistics: Statistics = field(default_factory=Statistics)
     mutations: None = None
+    instruments: None = None
     strand: InlineStrand = field(default_factory=InlineStrand)
     tasks: set[Future[Any]] = field(default_factory=set)
 

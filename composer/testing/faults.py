@@ -1,10 +1,12 @@
-"""Faults that a test injects: messages that get lost or late, handlers that raise or hang."""
+"""Faults that a test injects: messages that get lost or late, late timers, handlers that raise."""
 
 from __future__ import annotations
 
 import functools
-from collections import defaultdict
-from collections.abc import Callable, Collection
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import field
+from functools import partial
 from math import inf
 from typing import Any, Protocol, TypeVar, cast
 
@@ -24,16 +26,22 @@ R = TypeVar("R")
 
 
 @dataclass(slots=True)
-class TopicFault:
-    """A fault of a topic, for the next ``count`` messages until ``until_s`` (monotonic)."""
+class Fault:
+    """A fault of a topic or a timer, until ``until_s`` (monotonic).
+
+    It acts on ``count`` messages for each subscription, or calls, after the next ``skip``.
+    """
 
     disturb: Disturb
+    skip: int = 0
     count: float = inf
     until_s: float = inf
+    #: How many messages had come before, by subscription.
+    before: Counter[object] = field(default_factory=Counter)
 
 
 class Faults:
-    """The faults of the topics and handlers of a system: :class:`.Instruments` of its host."""
+    """The faults of topics, timers and handlers of a system: :class:`.Instruments` of its host."""
 
     def __init__(
         self, clock: Clock, ports_of_test: Collection[Port], on_tester: Callable[[Tester], None]
@@ -42,7 +50,8 @@ class Faults:
         self._clock = clock
         self._on_tester = on_tester
         self._not_disturbed = {id(port) for port in ports_of_test}
-        self._topics: dict[str, list[TopicFault]] = {}
+        self._faults: dict[str, list[Fault]] = {}
+        self._seen: defaultdict[str, Counter[object]] = defaultdict(Counter)
         self._handlers: defaultdict[str, list[BeforeHandler]] = defaultdict(list)
 
     # --- the seams of the runtime
@@ -51,7 +60,15 @@ class Faults:
         """Return what receives the messages of a subscription in its place."""
         if id(port) in self._not_disturbed:
             return receiver
-        return cast(R, _DisturbedReceiver(cast(Receiver, receiver), self, port.full_name))
+        return cast(R, _DisturbedReceiver(cast(Receiver, receiver), self, port))
+
+    def timer(self, node: str, timer: str, tick: Callable[[], None]) -> Callable[[], None]:
+        """Return what a timer calls in the place of ``tick``."""
+
+        def receive(_: None) -> None:
+            tick()
+
+        return partial(self.put, timer_name(node, timer), None, None, receive)
 
     def behavior(self, node: Node, behavior: object) -> None:
         """Let faults act before each handler of a behavior."""
@@ -66,13 +83,19 @@ class Faults:
 
     # --- the verbs of a test
 
-    def add(self, topic: str, fault: TopicFault) -> None:
-        """Disturb a topic. Of several faults, the first one that is not over acts."""
-        self._topics.setdefault(topic, []).append(fault)
+    def add(self, name: str, fault: Fault) -> None:
+        """Disturb a topic or a timer. Of several faults of a message, the first one acts."""
+        fault.before = self._seen[name].copy()
+        self._faults.setdefault(name, []).append(fault)
 
-    def end(self, topic: str) -> None:
-        """End all faults of a topic."""
-        self._topics.pop(topic, None)
+    def end(self, name: str) -> None:
+        """End all faults of a topic or a timer."""
+        self._faults.pop(name, None)
+
+    @property
+    def seen(self) -> Mapping[str, int]:
+        """How many messages or calls have come so far, by topic or timer."""
+        return {name: max(counts.values(), default=0) for name, counts in self._seen.items()}
 
     def before_next_handler(self, node: str, handler: str | None, act: Callable[[], None]) -> None:
         """Call ``act()`` once, before the next call of a handler; None for any."""
@@ -85,14 +108,21 @@ class Faults:
 
         waiting.append(before)
 
-    def put(self, topic: str, message: Any, receive: Callable[[Any], None]) -> None:
-        """Pass a message on, or what the current fault of its topic makes of it."""
-        for fault in self._topics.get(topic, ()):
-            if fault.count > 0 and self._clock.monotonic() < fault.until_s:
-                fault.count -= 1
+    def put(self, name: str, end: object, message: Any, receive: Callable[[Any], None]) -> None:
+        """Pass on a message for a subscription (``end``), or what a fault makes of it."""
+        seen = self._seen[name]
+        seen[end] += 1
+        for fault in self._faults.get(name, ()):
+            number = seen[end] - fault.before[end] - fault.skip
+            if 0 < number <= fault.count and self._clock.monotonic() < fault.until_s:
                 fault.disturb(message, receive)
                 return
         receive(message)
+
+
+def timer_name(node: str, timer: str) -> str:
+    """Return the name of a timer among the faults; ``node`` is a full name."""
+    return f"{node}.{timer}"
 
 
 def drop(_message: Any, _receive: Callable[[Any], None]) -> None:
@@ -142,14 +172,13 @@ def reordered() -> Disturb:
 class _DisturbedReceiver:
     """Receives the messages of one subscription."""
 
-    def __init__(self, receiver: Receiver, faults: Faults, topic: str) -> None:
+    def __init__(self, receiver: Receiver, faults: Faults, port: Port) -> None:
         self._receiver = receiver
-        self._faults = faults
-        self._topic = topic
+        self._put = partial(faults.put, port.full_name, id(port))
 
     def put(self, message: Any) -> None:
         """Receive the message, from any thread."""
-        self._faults.put(self._topic, message, self._receiver.put)
+        self._put(message, self._receiver.put)
 
     def close(self) -> None:
         """Receive nothing more."""

@@ -43,7 +43,7 @@ from composer.runtime.supervision.events import Event, Outcome
 from composer.testing import faults
 from composer.testing.bag_messages import messages_of
 from composer.testing.failures import LogLine, Received, TestFailure, short, unknown, unmet
-from composer.testing.faults import Faults, TopicFault
+from composer.testing.faults import Fault, Faults
 from composer.testing.goal import Goal
 from composer.testing.observation import Answer, Observation
 from composer.testing.system_run import SystemRun, load_system
@@ -331,22 +331,28 @@ class SystemTest:
 
     # --- faults
 
-    def drop(self, topic: str, count: float = inf, for_s: float = inf) -> None:
-        """Lose the next ``count`` messages on a topic, at most for this time."""
-        self._disturb(topic, faults.drop, count, for_s, "drop")
+    # Each acts on the next ``count`` messages after ``skip`` others, for ``for_s`` at most.
 
-    def delay(self, topic: str, delay_s: float, count: float = inf, for_s: float = inf) -> None:
+    def drop(self, topic: str, count: float = inf, for_s: float = inf, *, skip: int = 0) -> None:
+        """Lose messages on a topic."""
+        self._disturb(topic, "drop", Fault(faults.drop, skip, count, for_s))
+
+    def delay(
+        self, topic: str, delay_s: float, count: float = inf, for_s: float = inf, *, skip: int = 0
+    ) -> None:
         """Deliver messages on a topic late."""
-        fault = faults.delayed(delay_s, self._run.host.nodes[TESTER].loop.call_later)
-        self._disturb(topic, fault, count, for_s, f"delay by {delay_s:g} s")
+        disturb = faults.delayed(delay_s, self._run.host.nodes[TESTER].loop.call_later)
+        self._disturb(topic, f"delay by {delay_s:g} s", Fault(disturb, skip, count, for_s))
 
-    def duplicate(self, topic: str, count: float = inf, for_s: float = inf) -> None:
+    def duplicate(
+        self, topic: str, count: float = inf, for_s: float = inf, *, skip: int = 0
+    ) -> None:
         """Deliver messages on a topic twice."""
-        self._disturb(topic, faults.duplicate, count, for_s, "duplicate")
+        self._disturb(topic, "duplicate", Fault(faults.duplicate, skip, count, for_s))
 
-    def reorder(self, topic: str, count: float = inf, for_s: float = inf) -> None:
+    def reorder(self, topic: str, count: float = inf, for_s: float = inf, *, skip: int = 0) -> None:
         """Swap each two messages on a topic."""
-        self._disturb(topic, faults.reordered(), count, for_s, "reorder")
+        self._disturb(topic, "reorder", Fault(faults.reordered(), skip, count, for_s))
 
     def corrupt(
         self,
@@ -354,9 +360,42 @@ class SystemTest:
         change: Callable[[Any], object],
         count: float = inf,
         for_s: float = inf,
+        *,
+        skip: int = 0,
     ) -> None:
         """Deliver what ``change`` makes of a copy of each message on a topic."""
-        self._disturb(topic, faults.corrupted(change), count, for_s, "corrupt")
+        self._disturb(topic, "corrupt", Fault(faults.corrupted(change), skip, count, for_s))
+
+    def delay_timer(
+        self,
+        node: str,
+        timer: str,
+        delay_s: float,
+        count: float = inf,
+        for_s: float = inf,
+        *,
+        skip: int = 0,
+    ) -> None:
+        """Let calls of a timer come late."""
+        found = self._node(node)
+        timers = [item.name.value for item in found.model.timers]
+        if timer not in timers:
+            raise unknown(f"{node} has no timer '{timer}'", timer, timers)
+        fault = Fault(faults.delayed(delay_s, found.loop.call_later), skip, count, for_s)
+        name = faults.timer_name(found.full_name, timer)
+        self._add_fault(name, f"delay by {delay_s:g} s: timer {node}.{timer}", fault)
+
+    @property
+    def disturbable(self) -> Mapping[str, int]:
+        """How many messages and calls faults could have acted on, by topic and ``node.timer``."""
+        numbers = self._faults.seen
+        found = {name: number for name, number in numbers.items() if name.startswith("/")}
+        for node in self._system.nodes:
+            for timer in node.timers:
+                number = found.pop(faults.timer_name(node.full_name, timer.name.value), 0)
+                if node.name.value != TESTER and number:
+                    found[f"{node.name}.{timer.name}"] = number
+        return found
 
     def end_faults(self, topic: str) -> None:
         """End the faults of a topic."""
@@ -416,13 +455,14 @@ class SystemTest:
     def _port(self, kind: PortKind, full_name: str) -> str:
         return port_to(self._run.host.nodes[TESTER].model, kind, full_name)
 
-    def _disturb(
-        self, topic: str, disturb: faults.Disturb, count: float, for_s: float, what: str
-    ) -> None:
+    def _disturb(self, topic: str, what: str, fault: Fault) -> None:
         self._port(PortKind.PUBLISHER, topic)  # there is a subscription
-        self._observation.on_action(f"{what}: {topic}")
-        until_s = self._run.clock.monotonic() + for_s
-        self._faults.add(topic, TopicFault(disturb, count, until_s))
+        self._add_fault(topic, f"{what}: {topic}", fault)
+
+    def _add_fault(self, name: str, text: str, fault: Fault) -> None:
+        self._observation.on_action(text)
+        fault.until_s += self._run.clock.monotonic()
+        self._faults.add(name, fault)
 
     def _before_handler(
         self, node: str, handler: str | None, act: Callable[[], None], what: str

@@ -7,8 +7,10 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,13 +26,14 @@ if TYPE_CHECKING:
     from composer.loading.reported import LoadResult
     from composer.scenarios.processes import Job
     from composer.scenarios.report import Case
-    from composer.scenarios.runner import Options
+    from composer.scenarios.runner import Result
 
 EPILOG = examples(
     "compose test                                  run the scenarios in the folder 'scenarios'",
     "compose test scenarios/docking.yaml           run one scenario",
     "compose test -k 'docking and not slow'        run those with such names",
     "compose test --repeat 50 -j 4                 run each 50 times, four side by side",
+    "compose test --explore 200 scenarios/dock.yaml  look for timing that makes it fail",
     "compose test --real-time                      with the time of the computer",
     "compose test --junit build/scenarios.xml      write the results for CI",
     "compose test --bag-on-failure                 keep what failed runs have published",
@@ -64,6 +67,15 @@ def test(
             "--repeat", metavar="N", min=1, help="Run each scenario N times, and compare the runs."
         ),
     ] = 1,
+    variations: Annotated[
+        int | None,
+        typer.Option(
+            "--explore",
+            metavar="N",
+            min=1,
+            help="Run each scenario with N variations as well, within the bounds in `explore`.",
+        ),
+    ] = None,
     expression: Annotated[
         str | None,
         typer.Option(
@@ -112,8 +124,11 @@ def test(
     Exit code 1 if a scenario fails or its file has errors.
     """
     started_s = time.monotonic()
+    if variations is not None:
+        _check_exploration(real_time, repeat, bag_on_failure)
     results = _selected(_loaded(paths or [_FOLDER]), expression)
     require_ros("compose test")
+    from composer.scenarios.processes import run_jobs
     from composer.scenarios.report import details, summary
     from composer.scenarios.runner import Options
 
@@ -121,7 +136,12 @@ def test(
     cases: list[Case] = []
     options = Options(real_time, seed, traced=repeat > 1 and not real_time)
     bags = _new_bags() if bag_on_failure else None
-    for case in _run(results, options, (workers, timeout, repeat), bags):
+    run_all = partial(run_jobs, options=options, workers=workers, timeout_s=timeout)
+    if variations is not None:
+        from composer.scenarios.exploration import explore
+
+        run_all = partial(explore, options=options, count=variations, timeout_s=timeout)
+    for case in _run(results, run_all, repeat, bags):
         cases.append(case)
         write(case.line)
     color = use_color(sys.stdout)
@@ -134,6 +154,22 @@ def test(
     say(summary(cases, took_s))
     if not all(case.has_passed for case in cases):
         raise typer.Exit(FAILED)
+
+
+def _check_exploration(real_time: bool, repeat: int, bag_on_failure: bool) -> None:
+    """Raise UsageError or CommandError if ``--explore`` cannot be used."""
+    if real_time:
+        raise UsageError("--explore needs virtual time: leave out --real-time")
+    if repeat > 1:
+        raise UsageError("--explore runs each variation once: leave out --repeat")
+    if bag_on_failure:
+        hint = "repeat what was found, then record it with --bag-on-failure"
+        raise UsageError("--explore records no bags: leave out --bag-on-failure", hint=hint)
+    if find_spec("hypothesis") is None:
+        raise CommandError(
+            "--explore needs 'hypothesis', which is not installed in this Python",
+            hint='pip install "ros2-composer[explore]"',
+        )
 
 
 def _loaded(paths: Sequence[Path]) -> list[LoadResult]:
@@ -199,19 +235,17 @@ def _new_bags() -> Path:
 
 def _run(
     results: Sequence[LoadResult],
-    options: Options,
-    limits: tuple[int, float, int],
+    run_all: Callable[[Sequence[Job]], Iterator[Result]],
+    repeat: int,
     bags: Path | None,
 ) -> Iterator[Case]:
     """Run the scenarios without errors, and yield all cases in order.
 
-    ``limits`` are the number of processes, the seconds for a run and the number of repetitions.
     ``bags`` is a folder for a bag of each failed run. If a run of several fails, the bag of the
     first one that has passed is kept as well, to be compared with.
     """
-    workers, timeout_s, repeat = limits
     from composer.base.diagnostics import Severity
-    from composer.scenarios.processes import Job, run_jobs
+    from composer.scenarios.processes import Job
     from composer.scenarios.report import Case
     from composer.scenarios.runner import difference
 
@@ -224,7 +258,7 @@ def _run(
                 name = f"{len(jobs) + 1}-{_UNSAFE.sub('_', _name(result))[:_LONGEST_NAME]}"
                 bag = None if bags is None else bags / name
                 jobs.append(Job(result.scenario, result.system, bag))
-    outcomes = zip(jobs, run_jobs(jobs, options, workers, timeout_s), strict=True)
+    outcomes = zip(jobs, run_all(jobs), strict=True)
     for result in results:
         path, scenario = result.source.path, result.scenario
         if not result.is_runnable or scenario is None:

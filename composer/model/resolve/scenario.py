@@ -32,6 +32,7 @@ from composer.model.scenario import (
     EventKind,
     Expectation,
     ExpectationKind,
+    Exploration,
     Replay,
     Scenario,
     States,
@@ -60,6 +61,7 @@ def resolve_scenario(
         expectations=tuple(reader.expectations(tree)),
         exit_code=value_or(integer(tree.get("exit_code")), 0),
         allow_errors=flag(tree.get("allow_errors"), default=False),
+        exploration=reader.exploration(tree.get("explore")),
     )
     return scenario, reader.diagnostics
 
@@ -126,6 +128,14 @@ class _Reader:
         if kind.channel is None:
             return name
         return name.map(lambda written: join(self._namespace, written))
+
+    def exploration(self, tree: Tree | None) -> Exploration:
+        return Exploration(
+            jitter_ms=number(_get(tree, "jitter_ms")),
+            drop=value_or(integer(_get(tree, "drop")), 0),
+            reorder=value_or(integer(_get(tree, "reorder")), 0),
+            topics=tuple(self._name(EventKind.MESSAGE, it) for it in texts(_get(tree, "topics"))),
+        )
 
     def _condition(self, tree: Mapping) -> Condition:
         kind = next((kind for kind in EventKind if tree.entry(kind) is not None), EventKind.LOG)

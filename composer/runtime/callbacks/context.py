@@ -22,6 +22,7 @@ from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.strand import Strand
+from composer.runtime.host_options import Instruments
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.statistics import Statistics
@@ -38,7 +39,7 @@ class NodeContext(UserCode):
     the chains of the system, ``events`` reports QoS events. ``mutations`` is set if messages are
     checked for changes. ``names`` are the names of every expression of the node: ``parameters``,
     ``state``, ``node``. ``group`` is the callback group of its ports. ``hot_objects`` are used by
-    most of its callbacks: the behavior and its publishers.
+    most of its callbacks: the behavior and its publishers. ``instruments`` belong to a test.
     """
 
     node: Node
@@ -57,6 +58,7 @@ class NodeContext(UserCode):
     tasks: set[Future[Any]] = field(default_factory=set)
     group: CallbackGroup = field(default_factory=MutuallyExclusiveCallbackGroup)
     hot_objects: tuple[object, ...] = ()
+    instruments: Instruments | None = None
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""

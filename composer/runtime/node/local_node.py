@@ -102,6 +102,7 @@ class LocalNode(ABC):
             chains=options.chains.of(model),
             events=options.process.events,
             mutations=_mutation_check(options.seen_messages, error_log),
+            instruments=options.instruments,
         )
         record_parameter_events(self._ros, recorder)  # with stamps of the clock that it has now
         # Ports that are always on have a gate of their own and share the rest.

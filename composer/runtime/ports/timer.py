@@ -47,6 +47,9 @@ class TimerPort(Callback, RunningPort):
         super().__init__(context, f"on_{name}", handle, statistics, timer.budget_ms)
         self._queue = queue_for(context, self._call, None, depth=0, reentrant=timer.reentrant)
         self._scheduled: TimerHandle | None = None
+        self._on_time = self._tick
+        if context.instruments is not None:
+            self._on_time = context.instruments.timer(context.names["node"], name, self._tick)
 
     def follow_parameters(self) -> None:
         """Apply the period that the parameters have now. Raises PeriodError."""
@@ -63,7 +66,7 @@ class TimerPort(Callback, RunningPort):
     def activate(self) -> None:
         """Start the timer; the first call is one period from now."""
         if self._scheduled is None:
-            self._scheduled = self._clock.call_every(self._period_s, self._tick)
+            self._scheduled = self._clock.call_every(self._period_s, self._on_time)
 
     def deactivate(self) -> None:
         """Stop the timer."""

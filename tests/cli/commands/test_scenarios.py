@@ -31,6 +31,8 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["empty"], "there is no scenario in empty"),
         (["-k", "docking and not slow"], "-k 'docking and not slow' selects none of 1 scenarios"),
         (["-k", "docking and"], "-k 'docking and': "),
+        (["--explore", "5", "--real-time"], "--explore needs virtual time"),
+        (["--explore", "5", "--repeat", "2"], "--explore runs each variation once"),
     ],
 )
 def test_usage_error(project: Path, arguments: list[str], message: str) -> None:

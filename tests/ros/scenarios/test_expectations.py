@@ -128,6 +128,10 @@ STEPS = [
     "drop: {/count: {count: 2}}, expect: [{silence: /sums, for_s: 0.2}, {message: /sums}]",
     "drop: {/count: {for_s: 0.5}}, expect: [{silence: /sums, for_s: 0.45}, {message: /sums}]",
     "delay: {/count: {by_s: 0.05, count: 1}}, expect: [{message: /sums, where: now % 0.1 > 0.04}]",
+    "drop: {/count: {skip: 1, count: 1}}, expect: [{message: /sums, within_s: 0.1},"
+    " {silence: /sums, after_s: 0.1, for_s: 0.1}]",
+    "delay_timer: {counter.tick: {by_s: 0.05, skip: 1, count: 1}},"
+    " expect: [{message: /count, where: now % 0.1 > 0.04, after_s: 0.1, within_s: 0.2}]",
     "duplicate: {/count: {count: 1}}, expect: [{message: /sums, within_s: 0.15, at_least: 2}]",
     "reorder: {/count: {count: 2}}, expect: [{order: [{log: got 10}, {log: got 9}]}]",
     'corrupt: {/count: {set: {data: "{message.data + 900}"}}}, expect: [{log: got 909}]',

@@ -113,6 +113,7 @@ def _numbers(system: SystemTest, count: int = 4) -> list[int]:
     [
         (lambda system: system.drop("/numbers", count=2), [2, 3]),
         (lambda system: system.drop("/numbers", for_s=1.5), [2, 3]),
+        (lambda system: system.drop("/numbers", count=2, skip=1), [0, 3]),
         (lambda system: system.duplicate("/numbers", count=1), [0, 0, 1, 2, 3]),
         (lambda system: system.reorder("/numbers"), [1, 0, 3, 2]),
         (lambda system: system.delay("/numbers", 2.5, count=1), [1, 2, 0, 3]),
