@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.base.fast_dataclass import dataclass
 from composer.interfaces.definitions import (
     Field,
     Interface,
@@ -17,34 +16,28 @@ from composer.interfaces.parser import SEPARATOR, parse_line
 _INDENT = "\t"
 
 
-@dataclass(frozen=True, slots=True)
-class ListingOptions:
-    """What to show: the comments and empty lines of the outer message; nested messages."""
-
-    comments: bool = True
-    nested: bool = True
-
-
 def listing(
-    name: str, interfaces: Interfaces, options: ListingOptions, above: tuple[str, ...] = ()
+    name: str, interfaces: Interfaces, *, comments: bool = True, above: tuple[str, ...] = ()
 ) -> Iterator[str]:
     """Yield the lines of the definition ``name``, each message below the field that has its type.
+
+    ``comments`` are those of the outer message, with its empty lines.
 
     A definition without text, as in the snapshot or of OMG IDL, has no comments. A message that
     contains itself, ``above``, is not expanded again.
     """
-    nested = ListingOptions(comments=False)
     for line in definition_text(name, interfaces).splitlines():
         content = line.partition("#")[0].strip()
-        if options.comments:
+        if comments:
             yield line.rstrip()
         elif content:
             yield line.partition("#")[0].rstrip()
-        if not options.nested or content in ("", SEPARATOR):
+        if content in ("", SEPARATOR):
             continue
         field = parse_line(content, name)
         if isinstance(field, Field) and field.type.name not in (name, *above):
-            for inner in listing(field.type.name, interfaces, nested, (name, *above)):
+            within = (name, *above)
+            for inner in listing(field.type.name, interfaces, comments=False, above=within):
                 yield f"{_INDENT}{inner}" if inner else ""
 
 

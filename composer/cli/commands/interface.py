@@ -63,7 +63,7 @@ def list_interfaces(
     "show",
     epilog=examples(
         "compose interface show nav_msgs/msg/Odometry",
-        "compose interface show composer_interfaces/action/Navigate --flat",
+        "compose interface show composer_interfaces/action/Navigate --no-comments",
     ),
 )
 def show(
@@ -77,7 +77,6 @@ def show(
     no_comments: Annotated[
         bool, typer.Option("--no-comments", help="Show no comments and no empty lines.")
     ] = False,
-    flat: Annotated[bool, typer.Option("--flat", help="Do not expand nested messages.")] = False,
     json: Json = False,
 ) -> None:
     """Print the definition of a type.
@@ -85,7 +84,7 @@ def show(
     Nested messages are expanded and indented, without their comments.
     """
     from composer.interfaces import parts
-    from composer.interfaces.listing import ListingOptions, listing
+    from composer.interfaces.listing import listing
 
     interfaces = _interfaces()
     definition = _find(interfaces, name)
@@ -93,8 +92,7 @@ def show(
         data = {title: _as_data(part) for title, part in parts(definition).items()}
         write(as_json({"name": name, **data}, indent=2))
         return
-    options = ListingOptions(not no_comments, nested=not flat)
-    write("\n".join(listing(name, interfaces, options)))
+    write("\n".join(listing(name, interfaces, comments=not no_comments)))
 
 
 @interface_app.command(

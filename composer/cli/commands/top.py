@@ -11,7 +11,7 @@ import typer
 
 from composer.base.characters import escape_lines
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
 from composer.cli.support.terminal import Keys, as_json, write, write_raw
@@ -31,8 +31,8 @@ EPILOG = examples(
 )
 _SORT_KEYS = "busy, calls, mean, p99, max, late, dropped or node"
 #: Managers report about every second; accept a report that is this much early.
-_EARLY_S = 0.5
-#: A system without a report for this long, beyond the interval, may have ended.
+_PERIOD_S, _EARLY_S = 1.0, 0.5
+#: A system without a report for this long, beyond the period, may have ended.
 _NO_REPORT_S = 5.0
 #: The other processes of a system report in the same period, at times of their own.
 _OTHERS_WITHIN_S = 1.5
@@ -49,12 +49,6 @@ def top(
         str, typer.Option("--sort", metavar="KEY", help=f"Sort by {_SORT_KEYS}.")
     ] = "busy",
     once: Annotated[bool, typer.Option("--once", help="Print one table and exit.")] = False,
-    interval: Annotated[
-        float,
-        typer.Option(
-            "--interval", metavar="SECONDS", min=1.0, callback=finite, help="Time between updates."
-        ),
-    ] = 1.0,
     json: Annotated[
         bool, typer.Option("--json", help="Print one line of JSON per update.")
     ] = False,
@@ -62,7 +56,7 @@ def top(
 ) -> None:
     """Show the timings of callbacks in a running system.
 
-    'calls/s' is the rate of the last seconds, 'busy' the share of a thread in the last interval.
+    'calls/s' is the rate of the last seconds, 'busy' the share of a thread in the last second.
     All other values are since the start: 'late' is how late a timer is called (99th percentile),
     'over' counts calls that took longer than their budget_ms, and 'dropped' counts messages dropped
     from full queues.
@@ -80,7 +74,7 @@ def top(
         follower = _Follower(session, systems, systems.report(found))
         key = SortKey(sort)
         with _Screen(full=not (once or json)) as screen:
-            while follower.wait(interval, screen.quit_requested):
+            while follower.wait(screen.quit_requested):
                 text = follower.json(key) if json else follower.table(key, screen.lines)
                 if once:
                     write(text)
@@ -99,18 +93,18 @@ class _Follower:
         self._now = systems.whole(report)
         self._meter = SystemMeter()
         self._rates = self._meter.read(self._now)
-        self._silent: set[str] = set()  # processes that did not report during the last interval
+        self._silent: set[str] = set()  # processes that did not report during the last period
 
-    def wait(self, interval_s: float, quit_requested: Callable[[], bool]) -> bool:
+    def wait(self, quit_requested: Callable[[], bool]) -> bool:
         """Wait for the next report; return False if ``quit_requested`` is true first.
 
         Raises CommandError if the system stops reporting.
         """
         from composer.client.session import Deadline
 
-        due_s = self._now.callbacks_at_s + interval_s - _EARLY_S
-        deadline = Deadline(interval_s + _NO_REPORT_S)
-        others = Deadline(interval_s + _OTHERS_WITHIN_S)
+        due_s = self._now.callbacks_at_s + _PERIOD_S - _EARLY_S
+        deadline = Deadline(_PERIOD_S + _NO_REPORT_S)
+        others = Deadline(_PERIOD_S + _OTHERS_WITHIN_S)
         while not quit_requested():
             report = self._systems.newer(self._now.name, due_s)
             if report is not None:

@@ -41,15 +41,10 @@ def test_only_the_comments_of_nested_messages_are_left_out() -> None:
     assert "#" not in compose(*show, "--no-comments").out
 
 
-def test_flat_does_not_expand_nested_messages() -> None:
-    done = compose("interface", "show", "geometry_msgs/msg/PointStamped", "--flat")
-    assert done.out.endswith("std_msgs/Header header\nPoint point\n")
-
-
 def test_services_actions_and_constants_are_shown() -> None:
     shown = compose("interface", "show", "std_srvs/srv/SetBool", "--no-comments").out
     assert shown == "bool data\n---\nbool success\nstring message\n"
-    action = compose("interface", "show", "composer_interfaces/action/Navigate", "--flat").out
+    action = compose("interface", "show", "composer_interfaces/action/Navigate").out
     assert action.count("---\n") == 2
     assert "uint8 DEBUG=10" in compose("interface", "show", "rcl_interfaces/msg/Log").out
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from composer.interfaces import Interfaces
-from composer.interfaces.listing import ListingOptions, listing
+from composer.interfaces.listing import listing
 from composer.interfaces.sources import Prefix
 
 OUTER = """\
@@ -35,28 +35,27 @@ def interfaces(tmp_path: Path) -> Interfaces:
 
 
 @pytest.mark.parametrize(
-    ("options", "expected"),
+    ("comments", "expected"),
     [
         (
-            ListingOptions(),
+            True,
             "# outside\n\nInner[2] inner  # below\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\n"
             "int8 LIMIT=1",
         ),
         (
-            ListingOptions(comments=False),
+            False,
             "Inner[2] inner\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\nint8 LIMIT=1",
         ),
-        (ListingOptions(nested=False), OUTER.rstrip()),
     ],
 )
 def test_comments_and_nested_messages(
-    interfaces: Interfaces, options: ListingOptions, expected: str
+    interfaces: Interfaces, comments: bool, expected: str
 ) -> None:
-    assert "\n".join(listing("my_msgs/msg/Outer", interfaces, options)) == expected
+    assert "\n".join(listing("my_msgs/msg/Outer", interfaces, comments=comments)) == expected
 
 
 def test_services_keep_their_separator(interfaces: Interfaces) -> None:
-    shown = list(listing("my_msgs/srv/Ask", interfaces, ListingOptions()))
+    shown = list(listing("my_msgs/srv/Ask", interfaces))
     assert shown == ["Inner what", "\tint32 x 3", "\tbool[] flags", "---", "# why", "bool ok"]
 
 
@@ -64,7 +63,7 @@ def test_a_definition_without_text_is_written_from_its_description(
     interfaces: Interfaces, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(interfaces, "text", lambda _: None)
-    assert list(listing("my_msgs/msg/Outer", interfaces, ListingOptions())) == [
+    assert list(listing("my_msgs/msg/Outer", interfaces)) == [
         "int8 LIMIT=1",
         "my_msgs/msg/Inner[2] inner",
         "\tint32 x 3",
@@ -82,5 +81,5 @@ def test_a_message_that_contains_itself_is_expanded_once(tmp_path: Path) -> None
     (folder / "Tree.msg").write_text("Leaf leaf\n")
     (folder / "Leaf.msg").write_text("Tree tree\n")
     interfaces = Interfaces([Prefix(tmp_path)])
-    shown = list(listing("my_msgs/msg/Tree", interfaces, ListingOptions()))
+    shown = list(listing("my_msgs/msg/Tree", interfaces))
     assert shown == ["Leaf leaf", "\tTree tree"]
