@@ -58,7 +58,7 @@ def pytest_configure(config: pytest.Config) -> None:
     sys.dont_write_bytecode = False
     _begin_elsewhere(config)
     # The logs of runs do not belong into the home folder of who runs the tests. Commands would find
-    # the systems that somebody else runs on this computer by their locks.
+    # the systems that another user runs on this computer by their locks.
     for variable in ("ROS_LOG_DIR", "XDG_RUNTIME_DIR"):
         folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
         config.add_cleanup(folder.cleanup)

@@ -30,7 +30,7 @@ class ReplayOptions:
     """How a bag is replayed.
 
     ``rate`` is the speed; ``names`` replaces names of topics. With ``clock``, the time of the bag
-    is published on /clock. While ``is_paused()``, the time stands still.
+    is published on /clock. While ``is_paused()``, no time passes.
     """
 
     rate: float = 1.0

@@ -45,7 +45,7 @@ class _NodeRates:
             self._busy = max(0.0, self._busy_s - before_busy_s) / (self._at_s - before_s)
 
     def current(self) -> dict[str, float | None]:
-        """Return the rates at the last reading; nobody asks for most of them."""
+        """Return the rates at the last reading; most of them are never asked for."""
         return {
             "sent_hz": self._sent.current_hz(self._at_s),
             "received_hz": self._received.current_hz(self._at_s),

@@ -376,7 +376,7 @@ class _StalledDisk(_FullDisk):
         super().write(message)
 
 
-def test_a_stalled_disk_delays_nobody_and_costs_limited_memory() -> None:
+def test_a_stalled_disk_delays_no_node_and_costs_limited_memory() -> None:
     sink = _StalledDisk()
     recorder = Recorder(sink, COMPUTER)
     source = recorder.source(BagTopic("/image", "sensor_msgs/msg/Image"))
