@@ -14,7 +14,7 @@ from pathlib import Path
 
 from composer.cli.support.console import FileDescriptor, OutputQueue
 
-LIMIT_S = 20.0
+LIMIT_S = 60.0
 
 
 def queue_to(fd: int, max_waiting: int = 1_048_576) -> OutputQueue:

@@ -148,7 +148,7 @@ def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> N
 
     class Sink(Behavior):
         def on_configure(self):
-            self.both = threading.Barrier(2, timeout=20.0)
+            self.both = threading.Barrier(2, timeout=60.0)
 
         def on_input(self, message):
             self.both.wait()

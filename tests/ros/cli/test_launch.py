@@ -66,7 +66,7 @@ def launched(folder: Path) -> Iterator[subprocess.Popen[str]]:
 def test_ctrl_c_shuts_the_system_down_in_order(tmp_path: Path) -> None:
     with launched(tmp_path) as process:
         os.killpg(process.pid, signal.SIGINT)
-        output, _ = process.communicate(timeout=20.0)
+        output, _ = process.communicate(timeout=60.0)
     assert process.returncode == 0
     assert "shutting down: SIGINT" in output
     assert "/fleet/robot1/talker finalized" in output

@@ -36,7 +36,7 @@ def get(
 ) -> http.client.HTTPResponse:
     """Return the response to a request with the cookie; an empty header is not sent."""
     given = {"Host": address.host, "Cookie": address.cookie, **headers}
-    connection = http.client.HTTPConnection("127.0.0.1", address.port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", address.port, timeout=60)
     connection.putrequest(method, path, skip_host=True)
     for name, value in given.items():
         if value:

@@ -113,7 +113,7 @@ def test_an_early_response_waits_until_its_request_is_registered(
         client = own_client(on)
 
         def add_late(future: Any) -> None:
-            has_come.wait(10.0)
+            has_come.wait(60.0)
             ActionClient.add_future(client, future)
 
         monkeypatch.setattr(client, "add_future", add_late)

@@ -88,7 +88,7 @@ def test_a_full_queue_starves_no_other_subscription(on: Bench) -> None:
             floods.publish(Int64(data=number))
         rare.publish(Int64(data=0))
 
-    on.loop.run(publish_all, 10.0)
+    on.loop.run(publish_all, 60.0)
     wait_until(lambda: len(flood) == 2000)
     assert len(served_at) == 1
     assert served_at[0] < 200  # not after the two thousand
@@ -116,7 +116,7 @@ def test_a_response_behind_those_to_other_clients_is_taken_at_once(on: Bench) ->
         while sum(seen) < len(requests) and time.monotonic() < until_s:
             seen.append(answers_there.count())
 
-    on.loop.run(answer_all, 10.0)
+    on.loop.run(answer_all, 60.0)
     wait_until(lambda: all(future.done() for future in futures))
     assert [future.result().message for future in futures] == ["0", "1", "2", "3"]
     answers_there.close()
@@ -152,7 +152,7 @@ def test_an_exception_between_two_callbacks_loses_nothing(on: Bench) -> None:
         for number in range(5):
             publisher.publish(Int64(data=number))
 
-    on.loop.run(publish, 5.0)
+    on.loop.run(publish, 60.0)
     wait_until(lambda: seen == [0, 1, 2, 3, 4])
     assert on.errors() == [SystemExit]
 
@@ -164,7 +164,7 @@ def test_destroying_before_removing_is_harmless(on: Bench) -> None:
         publisher = on.node.create_publisher(Int64, "numbers", 10)
         on.node.destroy_subscription(subscription)
         publisher.publish(Int64(data=1))
-        on.loop.run(lambda: None, 5.0)
+        on.loop.run(lambda: None, 60.0)
         on.loop.remove(subscription)
         on.node.destroy_publisher(publisher)
     assert on.reports == []
@@ -185,9 +185,9 @@ def test_a_callback_may_remove_and_destroy_its_own_subscription(on: Bench) -> No
         for number in range(5):
             publisher.publish(Int64(data=number))
 
-    on.loop.run(publish, 5.0)
+    on.loop.run(publish, 60.0)
     wait_until(lambda: seen)
-    on.loop.run(lambda: None, 5.0)
+    on.loop.run(lambda: None, 60.0)
     assert seen == [0]
     assert on.reports == []
 
@@ -226,7 +226,7 @@ def test_taking_under_a_flood_of_another_process_does_not_deadlock(on: Bench) ->
     on.subscribe(Int64, "flood", lambda message: seen.append(message.data), depth=10)
     with peer("flood", "flood", 10_000_000, 10):  # it never ends and is killed
         wait_until(lambda: seen and seen[-1] > 20_000 and len(seen) > 100, "twenty thousand")
-    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    assert on.loop.run(lambda: "alive", 60.0) == "alive"
     assert seen == sorted(seen)
 
 
@@ -253,7 +253,7 @@ def test_a_failing_exception_handler_does_not_end_the_loop(
 
     on.loop._on_exception = lambda *report: Full().append(report)  # type: ignore[attr-defined]
     on.loop.call_soon(fall_over)
-    assert on.loop.run(lambda: "alive", 5.0) == "alive"
+    assert on.loop.run(lambda: "alive", 60.0) == "alive"
     assert "no room for reports" in capfd.readouterr().err
 
 
@@ -291,7 +291,7 @@ def test_each_wait_ends_as_soon_as_its_future_is_done(on: Bench) -> None:
 
     on.loop.call_soon(lambda: wait("outer", outer))
     on.loop.call_soon(lambda: wait("inner", inner))
-    on.loop.run(lambda: order.append("served"), 5.0)
+    on.loop.run(lambda: order.append("served"), 60.0)
     on.loop.call_soon(lambda: outer.set_result(None))
     wait_until(lambda: len(order) == 2)
     inner.set_result(None)  # from another thread
@@ -326,7 +326,7 @@ def test_another_thread_serves_the_loop_while_a_watched_call_blocks(on: Bench) -
     assert sum(ended) >= 2  # the last one may have been too short
     timer.cancel()
     wait_until(lambda: not on.loop.busy_threads())
-    assert on.loop.run(lambda: "served", 5.0) == "served"
+    assert on.loop.run(lambda: "served", 60.0) == "served"
     assert len(threads) == 4
     assert on.errors() == []
 
@@ -353,6 +353,6 @@ def test_a_wait_ends_in_time_and_when_the_loop_stops(on: Bench) -> None:
     assert results == [False]
     waiting = threading.Event()
     on.loop.call_soon(lambda: (waiting.set(), results.append(wait_for(on.loop, never))))
-    assert waiting.wait(5.0)
+    assert waiting.wait(60.0)
     assert on.loop.stop(5.0)
     assert results == [False, False]

@@ -104,7 +104,7 @@ def test_a_class_has_the_names_and_parameters_of_ros2_run(tmp_path: Path, peer: 
         finally:
             program.send_signal(signal.SIGINT)
             try:
-                program.wait(10.0)
+                program.wait(60.0)
             except subprocess.TimeoutExpired:
                 program.kill()
     wait_until(lambda: peer.node.count_publishers("/all/scan") == 0)

@@ -209,7 +209,7 @@ def test_dds_is_used_only_while_an_external_subscription_matches(tmp_path: Path)
                 try:
                     wait_for_matches(system, lambda count: count == 3)
                     send(system, 5)
-                    printed, _ = listener.communicate(timeout=20.0)
+                    printed, _ = listener.communicate(timeout=60.0)
                 finally:
                     listener.kill()
             first = visit * 25 + 20

@@ -163,7 +163,7 @@ def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
             assert states(system) == {"active"}
             for member, node in zip(members, ("camera", "detector"), strict=True):
                 if system.node(node).pid is not None:
-                    assert member.wait(20) == 1
+                    assert member.wait(60.0) == 1
                     assert member.stderr is not None
                     assert "already runs in ROS domain" in member.stderr.read()
             assert "already runs" not in system.log_text()
@@ -171,7 +171,7 @@ def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
     finally:
         for member in members:
             member.send_signal(signal.SIGINT)
-            member.communicate(timeout=20)
+            member.communicate(timeout=60.0)
 
 
 def test_the_last_counters_of_processes_that_stay(tmp_path: Path) -> None:

@@ -179,7 +179,7 @@ def test_external_container(tmp_path: Path, peer: Peer) -> None:
 
             process.send_signal(signal.SIGINT)
             wait_until(lambda: failures(system, "/robot/camera"), "the fault of the other one")
-            process.wait(10)
+            process.wait(60)
             with external_container():
                 wait_until(lambda: is_active(system, "talker", "camera"), "its return")
                 assert sorted(loaded(peer)) == ["/robot/camera", "/robot/left/talker"]
@@ -199,4 +199,4 @@ def external_container() -> Iterator[subprocess.Popen[bytes]]:
         yield process
     finally:
         process.kill()
-        process.wait(10)
+        process.wait(60)

@@ -89,7 +89,7 @@ def printed_by(*words: str) -> str:
         return process.stdout.readline().strip()
     finally:
         process.send_signal(signal.SIGINT)
-        process.wait(10)
+        process.wait(60)
 
 
 def test_up_and_down_in_order_with_names_and_parameters(tmp_path: Path, peer: Peer) -> None:

@@ -49,7 +49,7 @@ def test_an_external_node_is_awaited_and_observed(tmp_path: Path) -> None:
             assert system.states()[-2:] == ["/lidar active", "/filter active"]
             system.wait_for_log("tick")
             process.send_signal(signal.SIGINT)
-            process.wait(10)
+            process.wait(60)
             failed = system.wait_for_failure("/lidar")
             assert failed.reason == "it has disappeared from the ROS graph"
             wait_until(lambda: system.node("filter").state == "inactive", "the pause")

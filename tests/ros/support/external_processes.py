@@ -81,7 +81,7 @@ class ExternalProcess:
             self._process.kill()
         else:
             self._process.stdin.close()
-        code = self._process.wait(timeout=20.0)
+        code = self._process.wait(timeout=60.0)
         self._reader.join()
         return code
 

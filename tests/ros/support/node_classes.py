@@ -109,11 +109,11 @@ class WaitingConstructor(Node):
     def __init__(self) -> None:
         super().__init__("waiting")
         client = self.create_client(Trigger, "count")
-        assert client.wait_for_service(5.0)
+        assert client.wait_for_service(60.0)
         executor = SingleThreadedExecutor()
         executor.add_node(self)
         future = client.call_async(Trigger.Request())
-        executor.spin_until_future_complete(future, 5.0)
+        executor.spin_until_future_complete(future, 60.0)
         self.answer = future.result()
         self.get_logger().info(f"answer {self.answer.message}")
 
