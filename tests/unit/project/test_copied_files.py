@@ -10,16 +10,15 @@ from pathlib import Path
 import pytest
 
 from composer.project.copied_files import copied_files, patterns_for_images
+from tests.unit.support.checking import write_files
 
 PRIVATE_KEY = "Bag Attributes\n-----BEGIN ENCRYPTED PRIVATE KEY-----\nMII\n"
 
 
 def write(root: Path, files: dict[str, str], mode: int = 0o644) -> None:
-    for name, text in files.items():
-        path = root / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        path.chmod(mode)
+    write_files(root, files)
+    for name in files:
+        (root / name).chmod(mode)
 
 
 def staying(root: Path, *private: Path) -> set[str]:

@@ -9,6 +9,7 @@ import pytest
 
 from composer.base.diagnostics import Diagnostic
 from composer.loading import load
+from tests.unit.support.checking import write_files
 
 FILES = {
     "motor.py": "SPEED = 1\n\n\ndef start(): ...\n",
@@ -107,9 +108,7 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Mapping[tuple[str, int
     }
     imports = "".join(f"import {name}\n" for name in codes)
     files = {**FILES, "code.py": imports + BEHAVIOR}
-    for name, text in {**files, **{f"{name}.py": code for name, code in codes.items()}}.items():
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
+    write_files(folder, files | {f"{name}.py": code for name, code in codes.items()})
     diagnostics = load(folder / "system.yaml").diagnostics
     return {(Path(x.primary.file.path).stem, x.primary.line): x for x in diagnostics}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.support.checking import diagnostics_in, quoted
+from tests.unit.support.checking import diagnostics_in, quoted, write_files
 
 
 def test_two_nodes_with_one_class_report_it_once(tmp_path: Path) -> None:
@@ -42,10 +42,7 @@ def test_the_modules_that_a_behavior_imports_are_checked_as_well(tmp_path: Path)
         "math.py": "def sqroot(): pass\n",  # does not hide the standard library
         "unused.py": "import nothing\n",
     }
-    for path, text in files.items():
-        file = tmp_path / path
-        file.parent.mkdir(exist_ok=True)
-        file.write_text(text, encoding="utf-8")
+    write_files(tmp_path, files)
     system = "system: s\nnodes:\n  n: {behavior: robot_code:Code, on_activate: {log: go}}\n"
     found = [
         (Path(item.primary.file.path).name, item.primary.line, item.rule.name, item.message)

@@ -9,6 +9,7 @@ import pytest
 from composer.base.diagnostics import Diagnostic
 from composer.loading import load
 from composer.loading.reported import project_diagnostics
+from tests.unit.support.checking import write_files
 
 FILES = {
     "nodes/planner.yaml": "node: planner\non_activate: {log: ready}\n",
@@ -19,10 +20,7 @@ FILES = {
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name, text in FILES.items():
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+    write_files(tmp_path, FILES)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -24,6 +24,7 @@ from composer.loading import load
 
 pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 from composer.client.hosts.start import differences, question_about
+from tests.unit.support.checking import write_files
 
 HERE = Inventory(
     python="3.11",
@@ -110,10 +111,7 @@ def test_the_files_of_a_system(tmp_path: Path) -> None:
         "nodes/scripts/drive.py": "",
         "nodes/unused.py": "",
     }
-    for name, text in files.items():
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+    write_files(tmp_path, files)
     path = tmp_path / "systems" / "robot.yaml"
     result = load(path)
     assert result.system is not None

@@ -9,6 +9,7 @@ import pytest
 from composer.loading import load, load_files
 from composer.loading.reported import LoadResult
 from composer.model.scenario import EventKind, ExpectationKind, Verb
+from tests.unit.support.checking import write_files
 
 SYSTEM = """\
 system: robot
@@ -40,9 +41,7 @@ STAND_IN = "overrides: {nodes: {lidar: {type: fake_lidar, parameters: {text: wal
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     files = {"composer.yaml": "", "systems/robot.yaml": SYSTEM, "nodes/fake_lidar.yaml": FAKE}
-    for name, text in files.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text)
+    write_files(tmp_path, files)
     (tmp_path / "scenarios").mkdir()
     return tmp_path
 
