@@ -242,8 +242,7 @@ class Stress:
 
     def _is_alone(self) -> bool:
         """Return whether the publishers match only the three in-process subscriptions."""
-        nodes = [self._system.node(name) for name in WRITERS]
-        ports = [node._entities.publishers["stream"] for node in nodes]
+        ports = [self._system.publisher(name, "stream") for name in WRITERS]
         return all(port._publisher.get_subscription_count() == 3 for port in ports)
 
     def _sent_by(self, name: str) -> dict[int, int]:

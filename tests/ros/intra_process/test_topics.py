@@ -44,7 +44,7 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
 
     The middleware counts a match before it reports it.
     """
-    port = system.node("source")._entities.publishers["numbers"]
+    port = system.publisher("source", "numbers")
     publisher = port.gated
 
     def is_counted() -> bool:
@@ -102,8 +102,8 @@ def test_every_external_subscription_is_noticed(
     apart = NUMBERS.replace("KIND", "events").replace("executors:", "namespace: /apart\nexecutors:")
     options = HostOptions(log_level=LogLevel(level))
     with running(apart, tmp_path, options=options, counting=MODULE) as system:
-        source = system.node("source")
-        publisher = source._entities.publishers["numbers"]._publisher
+        publisher = system.publisher("source", "numbers")._publisher
+        count = system.ros_node("source").count_subscribers
         for turn in range(5):
             send(system, 10)
             before = publisher.get_subscription_count()
@@ -114,7 +114,7 @@ def test_every_external_subscription_is_noticed(
             assert [take(subscription) for _ in range(10)] == list(range(first, first + 10))
             node.destroy_subscription(subscription)
             # Otherwise its end would hide the next one.
-            wait_until(lambda: source._context.node.count_subscribers("/apart/numbers") == 2)
+            wait_until(lambda: count("/apart/numbers") == 2)
         near = system.behavior("near")
         wait_until(lambda: numbers(near.received) == list(range(100)))
     node.destroy_node()

@@ -170,7 +170,7 @@ def test_steps_whose_responses_are_lost_are_requested_again() -> None:
         wait_until(results[1].done, "the response")
         assert results[1].result().success
         assert not problems
-        assert not requests._sent
+        assert not requests.has_messages
 
 
 @pytest.mark.usefixtures("impatience")

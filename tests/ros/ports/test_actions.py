@@ -72,7 +72,7 @@ def test_a_declared_action_gives_feedback_and_a_result(
 ) -> None:
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
         navigator = Navigator(peer)
-        server = system.node("server")._context.node
+        server = system.ros_node("server")
         wait_until(
             lambda: server.count_subscribers("/navigate/_action/feedback"),
             "the feedback subscription",

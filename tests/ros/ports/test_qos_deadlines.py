@@ -143,7 +143,7 @@ def test_a_deadline_missed_by_an_external_node_is_logged_with_its_name(
     with running(LISTENER, tmp_path) as system:
         qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=200_000_000))
         publisher = peer.publisher(String, "/beat", qos)
-        node = system.node("listener")._context.node
+        node = system.ros_node("listener")
         wait_until(lambda: publishers(node, "/beat") == [peer.node.get_name()], "its name")
         publisher.publish(String())
         system.wait_for_log("got a message")

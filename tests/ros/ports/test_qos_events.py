@@ -26,7 +26,7 @@ def counts(system: RunningSystem, node: str) -> dict[str, int]:
 
 def publishers(system: RunningSystem, name: str, topic: str) -> list[str]:
     """Return the names of the publishers that a node of the system has discovered."""
-    node = system.node(name)._context.node
+    node = system.ros_node(name)
     return [end.node_name for end in node.get_publishers_info_by_topic(topic)]
 
 
@@ -50,7 +50,7 @@ def test_external_nodes_with_incompatible_qos_are_named_with_the_policy(
 ) -> None:
     with running(ENDS.format(kind=kind), tmp_path) as system:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        known = system.node("a")._context.node.get_node_names
+        known = system.ros_node("a").get_node_names
         wait_until(lambda: peer.node.get_name() in known(), "the peer's name")
         peer.node.create_publisher(String, "/input", BEST_EFFORT)
         peer.node.create_subscription(String, "/output", lambda _: None, latched)

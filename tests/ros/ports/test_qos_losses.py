@@ -84,7 +84,7 @@ def test_a_silent_publisher_is_logged_and_one_that_leaves_is_not(
         leaving = peer.publisher(String, "/alive", qos)
         with hand_written("hand_written_flood.py", "3000", "0") as flood:
             system.wait_for_log("got a message")
-            node = system.node("listener")._context.node
+            node = system.ros_node("listener")
             wait_until(lambda: "flood" in node.get_node_names(), "its name")
             before = counts(system)
             peer.node.destroy_publisher(leaving)
@@ -130,7 +130,7 @@ def test_events_are_watched_from_the_start(tmp_path: Path) -> None:
     # Starting to watch takes a status, too. rclpy's handlers were watched once their node's loop
     # had found them, when messages could be lost already: one in hundreds of runs deadlocked.
     with running(RESTLESS, tmp_path) as system:
-        subscriptions = list(system.node("listener")._context.node.subscriptions)
+        subscriptions = list(system.ros_node("listener").subscriptions)
         assert [ends.topic_name for ends in subscriptions] == ["/big", "/alive"]
         assert [ends.event_handlers for ends in subscriptions] == [[], []]
 

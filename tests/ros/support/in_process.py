@@ -178,9 +178,13 @@ class RunningSystem:
             wait_until(future.done, f"{node} {goal}")
             assert running_node.state == goal
 
+    def publisher(self, node: str, name: str) -> Any:
+        """Return the port of a publisher."""
+        return self.node(node)._entities.publishers[name]
+
     def wait_for_listener(self, node: str, publisher: str) -> None:
         """Wait until a publisher has an external subscription; earlier messages are lost."""
-        port: Any = self.node(node)._entities.publishers[publisher]
+        port = self.publisher(node, publisher)
         wait_until(port._publisher.get_subscription_count, f"a subscription of {publisher}")
 
     def log(self) -> list[str]:
