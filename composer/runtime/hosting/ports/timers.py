@@ -15,6 +15,7 @@ from composer.model import Period, PeriodUnit, TimerClock
 from composer.model import Timer as TimerModel
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction, call_in_group
 from composer.runtime.ports.timer import TimerPort
@@ -82,7 +83,8 @@ class HostedTimerPort(TimerPort):
         context = instance.context_for(timer.callback_group, timer)
         self._function = UserFunction(instance, self._call_back)
         super().__init__(context, self._model(context), None, self._function)
-        self._name = self._function.__name__ = getattr(timer.callback, "__name__", self._name)
+        if timer.callback is not None:
+            self._name = self._function.__name__ = name_of(timer.callback).rpartition(".")[2]
         if self._is_rate:
             self.follow()
 
