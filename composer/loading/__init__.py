@@ -76,19 +76,21 @@ def load(
     shown: str | None = None,
     overrides: OverrideOptions = NO_OVERRIDES,
     interfaces: Interfaces | None = None,
+    needs_values: bool = True,
 ) -> LoadResult:
     """Read, resolve and check the system or node type in the file ``path``.
 
     ``shown`` is the name of the file in diagnostics, ``overrides`` are words of a command line.
-    Only the combination of arguments that these give is checked. Pass ``interfaces`` to load many
-    files of one project: reading the interfaces takes most time.
+    Only the combination of arguments that these give is checked; if it ``needs_values``, each
+    argument must have one. Pass ``interfaces`` to load many files of one project: reading the
+    interfaces takes most time.
     """
     parsed, diagnostics = read_overrides(overrides)
     definitions = Definitions.of(real_folder(path), interfaces)
     document = read(path, shown)
     resolved = _resolve(document, definitions, parsed, diagnostics)
     [variant] = resolved.variants
-    if not has_errors(variant.diagnostics):  # else a declaration may be wrong
+    if needs_values and not has_errors(variant.diagnostics):  # else a declaration may be wrong
         variant.diagnostics += _missing_arguments(document, parsed.arguments)
     return _check([resolved])[0]
 

@@ -53,13 +53,13 @@ def export_launch(
 ) -> None:
     """Write a launch file that runs a system.
 
-    It has the arguments of the system as launch arguments, and others for the namespace, simulated
-    time and the log level. It ends with the system. To run a system from a launch file of your own,
-    use its action ComposeSystem.
+    It has the arguments of the system as launch arguments, also those without a value, and others
+    for the namespace, simulated time and the log level. It ends with the system. To run a system
+    from a launch file of your own, use its action ComposeSystem.
     """
     from composer.bridges.export.launch_file import launch_file
 
-    declared, path, _ = exported_system(system, arguments)
+    declared, path, _ = exported_system(system, arguments, needs_values=False)
     text = launch_file(declared, declared_arguments(path), path, output)
     write_output(text, output, replace=force)
 

@@ -133,10 +133,14 @@ def export_kubernetes(
 
 
 def exported_system(
-    text: str, arguments: list[str] | None = None, namespace: str | None = None
+    text: str,
+    arguments: list[str] | None = None,
+    *,
+    namespace: str | None = None,
+    needs_values: bool = True,
 ) -> RunnableSystem:
     """Return a system whose path can be a line of any format. Raises CommandError."""
-    found = runnable_system(text, arguments, namespace=namespace)
+    found = runnable_system(text, arguments, namespace=namespace, needs_values=needs_values)
     if not str(found.path.resolve()).isprintable():
         raise CommandError(
             f"the path '{found.path}' has control characters", hint="rename the file or its folder"

@@ -182,6 +182,7 @@ def load_system(
     namespace: str | None = None,
     use_sim_time: bool = False,
     warnings: ShowWarnings = ShowWarnings.COUNT,
+    needs_values: bool = True,
 ) -> LoadResult:
     """Read and check the system in ``path``; print errors, and warnings as chosen, to stderr.
 
@@ -196,6 +197,7 @@ def load_system(
         path,
         shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
         overrides=OverrideOptions(tuple(settings), namespace, use_sim_time, tuple(arguments or ())),
+        needs_values=needs_values,
     )
     severities = {Severity.ERROR, *([Severity.WARNING] if warnings is ShowWarnings.ALL else [])}
     reported = [item for item in result.diagnostics if item.severity in severities]
@@ -223,11 +225,13 @@ def runnable_system(
     namespace: str | None = None,
     use_sim_time: bool = False,
     warnings: ShowWarnings = ShowWarnings.COUNT,
+    needs_values: bool = True,
     exit_code: int = FAILED,
 ) -> RunnableSystem:
     """Return the system of a SYSTEM argument; print its diagnostics as :func:`load_system` does.
 
-    ``arguments`` are values of its arguments, as ``name=value``.
+    ``arguments`` are values of its arguments, as ``name=value``; if it ``needs_values``, all
+    arguments without a default have one.
 
     Raises UsageError; CommandError or typer.Exit with ``exit_code`` if it is not runnable.
     """
@@ -240,6 +244,7 @@ def runnable_system(
         namespace=namespace,
         use_sim_time=use_sim_time,
         warnings=warnings,
+        needs_values=needs_values,
     )
     if result.scenario is not None:
         raise CommandError(

@@ -30,7 +30,7 @@ def calls(tmp_path: Path) -> dict[str, list[ast.Call]]:
     """Return the calls in the launch file, by the name of the function."""
     path = tmp_path / "robot.yaml"
     path.write_text(SYSTEM, encoding="utf-8")
-    done = compose("export", "launch", str(path), "lidar=ouster", "map=lab", "namespace=field")
+    done = compose("export", "launch", str(path), "lidar=ouster", "namespace=field")
     assert done.code == 0, done.err
     found: dict[str, list[ast.Call]] = {}
     for node in ast.walk(ast.parse(done.out)):
@@ -53,7 +53,7 @@ def test_arguments_are_launch_arguments(calls: dict[str, list[ast.Call]]) -> Non
     }
     assert declared["lidar"] == {"default_value": "ouster", "choices": ["velodyne", "ouster"]}
     assert declared["names"] == {"default_value": '["a", "b"]'}
-    assert declared["map"] == {"default_value": "lab"}
+    assert declared["map"] == {}  # it needs a value
 
 
 def test_the_system_gets_them(calls: dict[str, list[ast.Call]]) -> None:
