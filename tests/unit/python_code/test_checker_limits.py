@@ -84,3 +84,13 @@ def test_problems_of_unchanged_files_are_kept(
     ):
         entry.write_bytes(damaged)
         assert [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)] == ["not-checked"]
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 12), reason="this Python parses the file")
+def test_a_file_for_a_newer_python_is_a_note(tmp_path: Path) -> None:
+    code = "class Counter:\n    def on_tick(self):\n        self.log.info(f'{self.a['b']}')\n"
+    (tmp_path / "code.py").write_text(code)
+    [found] = diagnostics_in(SYSTEM, tmp_path)
+    assert (found.rule.name, found.severity) == ("not-checked", Severity.INFO)
+    assert "cannot parse the file, which needs a newer one" in found.message
+    assert found.primary.line == 3
