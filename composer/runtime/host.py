@@ -55,7 +55,8 @@ from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
-from composer.runtime.process.signals import stop_signals
+from composer.runtime.process.signals import WakeupSocket, stop_signals
+from composer.runtime.process.watchdog import signal_watchdog
 from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.protocol.requests import Instance
 from composer.runtime.ros.message_sizes import sends_large_messages
@@ -78,6 +79,8 @@ from composer.runtime.supervision.virtual_time import (
 )
 
 _KEY_BYTES = 32
+#: The watchdog comes after the timer of a shutdown that hangs.
+_WATCHDOG_MARGIN_S = 1.0
 
 
 class Host:
@@ -164,10 +167,14 @@ class Host:
         if isinstance(self._clock, VirtualClock):
             parts = (self._clock, self._node_set, lambda: queue.stopping)
             watched = watched_time(*parts, self._warn, self._fail)
+        watchdog: AbstractContextManager[None] = nullcontext()
+        if ends_process and isinstance(queue.wakeup, WakeupSocket):
+            limit_s = self._options.grace_s + _WATCHDOG_MARGIN_S
+            watchdog = signal_watchdog(queue.wakeup.read_fd, limit_s)
         lock: AbstractContextManager[None] = nullcontext()
         if not is_isolated:  # otherwise the same system may run at the same time
             lock = hold_instance_lock(namespace, variables, self._report_key)
-        with lock, signals, servers, watched:
+        with lock, watchdog, signals, servers, watched:
             self._limits.limit_start()
             try:
                 with self._segment():

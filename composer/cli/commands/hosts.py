@@ -241,12 +241,12 @@ def _run_server(discovery: Discovery) -> None:
         READY,
         STOPPING,
         ServiceManager,
-        WakeupPipe,
+        WakeupSocket,
         stop_signals,
     )
 
     require_ros("compose hosts discovery-server")
-    manager, wakeup = ServiceManager(), WakeupPipe(COMPUTER)
+    manager, wakeup = ServiceManager(), WakeupSocket(COMPUTER)
     received: list[str] = []
 
     def stop(name: str) -> None:

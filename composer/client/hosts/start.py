@@ -35,7 +35,7 @@ from composer.model import BehaviorReference, Executable, Host, Process, System
 from composer.project import SETTINGS_FILE, Project
 from composer.python_code.lookup import find_behavior
 from composer.runtime.process.computer import is_this_computer
-from composer.runtime.process.signals import STOP_SIGNALS
+from composer.runtime.process.watchdog import STOP_SIGNALS
 
 _HASH_CHARACTERS = 14  # of RIHS01_ and the digest: enough to compare by eye
 

@@ -26,7 +26,7 @@ from websockets.exceptions import InvalidState
 from composer.dashboard.access import Refusal
 from composer.dashboard.protocol.outbox import MAX_MESSAGE
 from composer.dashboard.web.app import AccessCheck, refusal_page, security_headers
-from composer.runtime.process.signals import STOP_SIGNALS
+from composer.runtime.process.watchdog import STOP_SIGNALS
 
 DEFAULT_PORT = 8800
 #: Ports that are tried if the default one is in use.

@@ -14,25 +14,34 @@ from types import FrameType
 
 from composer.runtime.clock.clock import Clock
 from composer.runtime.clock.virtual import VirtualClock, Wakeup
+from composer.runtime.process.watchdog import STOP_SIGNALS
 
 _MILLISECONDS = 1000
 _LONGEST_MS = 2**31 - 1  # the longest timeout of poll(2): 24 days
 _READ_BYTES = 65536
 
 
-class WakeupPipe:
+class WakeupSocket:
     """Wakes the current wait, or the next one.
 
     A lock does not work here: a signal that arrives just before the wait for a lock does not end
-    it, and Python never runs the handler. A byte in a pipe is still there for the wait.
+    it, and Python never runs the handler. A byte in a socket is still there for the wait.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
+        self._reader, self._writer = socket.socketpair()
+        for end in (self._reader, self._writer):
+            end.setblocking(False)
         #: Any byte written here wakes, also by ``signal.set_wakeup_fd``.
-        self._read_fd, self.fd = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self.fd = self._writer.fileno()
         self._poll = select.poll()
-        self._poll.register(self._read_fd, select.POLLIN)
+        self._poll.register(self._reader, select.POLLIN)
+
+    @property
+    def read_fd(self) -> int:
+        """The socket from which the wait reads."""
+        return self._reader.fileno()
 
     def wake(self) -> None:
         """End the current or the next wait, from any thread or a signal handler."""
@@ -44,31 +53,27 @@ class WakeupPipe:
         while not self._poll.poll(self._milliseconds_until(until_s)):
             if self._clock.monotonic() >= until_s:
                 return False
-        os.read(self._read_fd, _READ_BYTES)
+        self._reader.recv(_READ_BYTES)
         return True
 
     def __del__(self) -> None:
         # Not sooner: a late wake-up must not write to a descriptor that was reused.
-        os.close(self._read_fd)
-        os.close(self.fd)
+        self._reader.close()
+        self._writer.close()
 
     def _milliseconds_until(self, end_s: float) -> int:
         left_ms = max(0.0, end_s - self._clock.monotonic()) * _MILLISECONDS
         return math.ceil(min(left_ms, _LONGEST_MS))
 
 
-def wakeup_for(clock: Clock) -> WakeupPipe | Wakeup:
+def wakeup_for(clock: Clock) -> WakeupSocket | Wakeup:
     """Return what wakes a thread that waits by ``clock``."""
-    return Wakeup(clock) if isinstance(clock, VirtualClock) else WakeupPipe(clock)
-
-
-#: SIGQUIT would leave sockets and shared memory behind.
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+    return Wakeup(clock) if isinstance(clock, VirtualClock) else WakeupSocket(clock)
 
 
 @contextmanager
 def stop_signals(
-    stop: Callable[[str], None], wakeup: WakeupPipe | Wakeup, *, ends_process: bool
+    stop: Callable[[str], None], wakeup: WakeupSocket | Wakeup, *, ends_process: bool
 ) -> Iterator[None]:
     """Call ``stop(name of the signal)`` for each signal, on the main thread.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import array
 import fcntl
-import os
 import signal
 import subprocess
 import termios
@@ -38,6 +37,20 @@ class Stubborn(Behavior):
     def on_deactivate(self):
         self.log.info("deactivating")
         time.sleep(60.0)
+"""
+
+CATASTROPHE = """
+system: robot
+nodes: {parser: {behavior: "parser:Parser", timers: {tick: {period_ms: 100}}}}
+"""
+PARSER = """import re
+from pathlib import Path
+from composer.behavior import Behavior
+
+class Parser(Behavior):
+    def on_tick(self):
+        Path(__file__).with_name("parsing").touch()
+        re.match(r"(a+)+$", "a" * 60 + "b")
 """
 
 
@@ -107,12 +120,31 @@ def test_a_run_with_a_dashboard(tmp_path: Path) -> None:
         system.wait_for("1 of 1 nodes active")
         system.wait_for("dashboard: http")
         children = Path(f"/proc/{system.process.pid}/task/{system.process.pid}/children")
-        (dashboard,) = map(int, children.read_text(encoding="ascii").split())
+        processes = [int(number) for number in children.read_text(encoding="ascii").split()]
         system.process.send_signal(signal.SIGINT)
         system.wait_for("deactivating")
         time.sleep(PAUSE_S)
         _, took_s = system.stop()
         assert took_s < AT_ONCE_S
         assert "Traceback" not in system.output
-        with pytest.raises(ProcessLookupError):
-            os.kill(dashboard, 0)
+        assert not [number for number in processes if Path(f"/proc/{number}").exists()]
+
+
+@pytest.mark.parametrize(("signals", "grace"), [(1, "0.5"), (2, "60")])
+def test_a_regular_expression_that_never_ends(tmp_path: Path, signals: int, grace: str) -> None:
+    """It keeps the interpreter's lock, so that no signal handler runs."""
+    path = tmp_path / "robot.yaml"
+    path.write_text(CATASTROPHE, encoding="utf-8")
+    path.with_name("parser.py").write_text(PARSER, encoding="utf-8")
+    with RunningSystem(str(path), "--grace", grace) as system:
+        end_s = time.monotonic() + PATIENCE_S
+        while not path.with_name("parsing").exists():  # a line of the log would wait for the lock
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+        for _ in range(signals):
+            system.process.send_signal(signal.SIGINT)
+            time.sleep(PAUSE_S)
+        code = system.process.wait(timeout=PATIENCE_S)
+    assert code == -signal.SIGABRT
+    assert "compose: SIGINT was not handled" in system.output
+    assert f'"{path.with_name("parser.py")}", line 8 in on_tick' in system.output
