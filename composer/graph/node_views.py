@@ -17,10 +17,12 @@ from composer.graph.diagram import (
     worst,
 )
 from composer.graph.scene import (
+    MAX_PAIRS,
     Scene,
     SceneNode,
     SceneTransform,
     channels,
+    drawn_pairs,
     node_key,
 )
 from composer.model import ChannelKind
@@ -98,12 +100,13 @@ def _deployment_edges(scene: Scene) -> Iterator[Edge]:
     """Return one arrow per pair of nodes and kind of channel."""
     names: dict[tuple[str, str, ChannelKind], dict[str, None]] = {}
     for channel in channels(scene.nodes):
-        for source in channel.sources:
-            for sink in channel.sinks:
-                keys = (node_key(source.node), node_key(sink.node))
-                if channel.kind is not ChannelKind.TOPIC:
-                    keys = keys[::-1]
-                names.setdefault((*keys, channel.kind), {})[channel.name] = None
+        sources = [*dict.fromkeys(node_key(end.node) for end in channel.sources)]
+        sinks = [*dict.fromkeys(node_key(end.node) for end in channel.sinks)]
+        is_complete = len(sources) * len(sinks) <= MAX_PAIRS
+        name = channel.name if is_complete else f"{channel.name}, not all are drawn"
+        for keys in drawn_pairs(sources, sinks):
+            begin, end = keys if channel.kind is ChannelKind.TOPIC else keys[::-1]
+            names.setdefault((begin, end, channel.kind), {})[name] = None
     for (begin, end, kind), joined in sorted(names.items()):
         yield Edge(
             key=f"{begin} -> {end} {kind}",

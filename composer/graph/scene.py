@@ -5,12 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
+from itertools import chain, product
+from typing import TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.graph.diagram import Details, Problem
 from composer.model import ChannelKind, PortKind
+
+T = TypeVar("T")
+
+#: Arrows for one channel in views that have no channels.
+MAX_PAIRS = 400
 
 _SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
 #: Ports that send messages or requests: their arrows point to the channel.
@@ -157,6 +164,13 @@ def channels(nodes: Iterable[SceneNode]) -> tuple[SceneChannel, ...]:
         )
         for (kind, name), endpoints in sorted(by_channel.items())
     )
+
+
+def drawn_pairs(sources: Sequence[T], sinks: Sequence[T]) -> Iterator[tuple[T, T]]:
+    """Yield each source with each sink; of more than MAX_PAIRS, those with the first of either."""
+    if len(sources) * len(sinks) <= MAX_PAIRS:
+        return product(sources, sinks)
+    return chain(product(sources[:1], sinks), product(sources[1:], sinks[:1]))
 
 
 def node_key(node: SceneNode) -> str:

@@ -29,6 +29,7 @@ from composer.graph.node_views import (
     states_view,
 )
 from composer.graph.scene import (
+    MAX_PAIRS,
     SENDING,
     Scene,
     SceneChannel,
@@ -36,6 +37,7 @@ from composer.graph.scene import (
     SceneNode,
     channel_key,
     channels,
+    drawn_pairs,
     node_key,
     port_key,
 )
@@ -159,21 +161,23 @@ def _ports_of(node: SceneNode, namespaces: Namespaces) -> Iterator[Vertex]:
 
 
 def _port_edges(channel: SceneChannel) -> Iterator[Edge]:
-    for source in channel.sources:
-        for sink in channel.sinks:
-            # A message goes from source to sink, a request from the client to the server.
-            towards_sink = channel.kind is ChannelKind.TOPIC
-            begin, end = (source, sink) if towards_sink else (sink, source)
-            source_key, target_key = _key(begin), _key(end)
-            yield Edge(
-                key=f"{source_key} -> {target_key}",
-                source=source_key,
-                target=target_key,
-                kind=EdgeKind(channel.kind.value),
-                lines=(channel.name, *_label_lines(source, sink)),
-                details=(("from", dict(begin.port.details)), ("to", dict(end.port.details))),
-                problem=worst((source.port.problem, sink.port.problem)),
-            )
+    sources, sinks = channel.sources, channel.sinks
+    is_complete = len(sources) * len(sinks) <= MAX_PAIRS
+    note = () if is_complete else (f"{len(sources)} by {len(sinks)}, not all are drawn",)
+    for source, sink in drawn_pairs(sources, sinks):
+        # A message goes from source to sink, a request from the client to the server.
+        towards_sink = channel.kind is ChannelKind.TOPIC
+        begin, end = (source, sink) if towards_sink else (sink, source)
+        source_key, target_key = _key(begin), _key(end)
+        yield Edge(
+            key=f"{source_key} -> {target_key}",
+            source=source_key,
+            target=target_key,
+            kind=EdgeKind(channel.kind.value),
+            lines=(channel.name, *_label_lines(source, sink), *note),
+            details=(("from", dict(begin.port.details)), ("to", dict(end.port.details))),
+            problem=worst((source.port.problem, sink.port.problem)),
+        )
 
 
 def _label_lines(source: SceneEndpoint, sink: SceneEndpoint) -> Iterator[str]:

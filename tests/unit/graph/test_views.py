@@ -84,6 +84,22 @@ def test_the_deployment_view_draws_components_in_their_containers() -> None:
     }
 
 
+@pytest.mark.parametrize("view", [View.CONNECTIONS, View.DEPLOYMENT])
+def test_a_topic_with_many_ports_has_few_arrows(view: View) -> None:
+    port = "{type: std_msgs/msg/String, topic: /status}"
+    text = f"""
+        system: crowd
+        nodes:
+          in${{i}}: {{for_each: {{i: 30}}, publishers: {{out: {port}}}}}
+          out${{i}}: {{for_each: {{i: 30}}, subscriptions: {{in: {port}}}}}
+    """
+    edges = drawn(text, view).edges
+    assert len(edges) == 59
+    assert all("not all are drawn" in "\n".join(edge.lines) for edge in edges)
+    nodes = {name.partition("/")[2] for edge in edges for name in (edge.source, edge.target)}
+    assert len(nodes) == 60
+
+
 def test_the_position_of_a_diagnostic_is_marked() -> None:
     text = """
         system: broken
