@@ -27,7 +27,7 @@ from composer.rules.parameters import UNMATCHED_PARAMETERS
 
 MAX_COMBINATIONS = 64
 #: Keys and values to read for all combinations together: of a large system, fewer are checked.
-MAX_VALUES = 200_000
+MAX_VALUES = 100_000
 _MAX_NAMED = 3  # arguments in one message
 #: Rules about a missing use. A use in any combination is a use.
 _RULES_ABOUT_USES = frozenset(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping as Map
 from dataclasses import field, replace
+from itertools import chain
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, shown
@@ -19,6 +20,7 @@ from composer.language.schema import check_schema, kind_of, kinds
 from composer.language.schema.kinds import check_kind, with_intended_sections
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree
 from composer.language.tree import Sequence as ListTree
+from composer.language.tree_values import entries
 from composer.model.assembly import (
     AssembledSystem,
     NodeTypeFile,
@@ -114,7 +116,7 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
     if not tree:
         return Merged()
     match kind_of(tree):
-        case kinds.SYSTEM if (surplus := _surplus_entry(tree)) is not None:
+        case kinds.SYSTEM | kinds.NODE if (surplus := _surplus_entry(tree)) is not None:
             return Merged(diagnostics=[surplus])
         case kinds.SYSTEM:
             return _merged(
@@ -176,11 +178,12 @@ def _system_path(name: Tree, folder: Path, project: Project) -> Tree:
 
 
 def _surplus_entry(tree: Mapping) -> Diagnostic | None:
-    """Return the diagnostic for a section with too many entries."""
-    for section in tree:
+    """Return the diagnostic for a section of a file, or of one of its nodes, with many entries."""
+    inner = (section for node in entries(tree.get("nodes")) for section in entries(node.value))
+    for section in chain(tree, inner):
         match section.value:
-            case Mapping(entries=entries) if len(entries) > MAX_ENTRIES:
-                span = entries[MAX_ENTRIES].key.span
+            case Mapping(entries=own) if len(own) > MAX_ENTRIES:
+                span = own[MAX_ENTRIES].key.span
             case ListTree(items=items) if len(items) > MAX_ENTRIES:
                 span = items[MAX_ENTRIES].span
             case _:

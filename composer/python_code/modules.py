@@ -10,6 +10,7 @@ import sys
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 
@@ -205,12 +206,19 @@ def _modules_in(folders: Iterable[Path]) -> dict[str, str]:
     """Return the names of the files and folders that may be modules, with their suffixes."""
     modules: dict[str, str] = {}
     for folder in folders:
-        with suppress(OSError, ValueError), os.scandir(folder) as items:
-            for item in islice(items, _MAXIMUM_FILES):
-                name = item.name.partition(".")[0]
-                if item.name.endswith(_MODULES) or item.is_dir():
-                    modules[name] = Path(item.name).suffix
+        with suppress(OSError, ValueError):
+            modules |= _modules_in_folder(folder, folder.stat().st_mtime_ns)
     return modules
+
+
+@lru_cache(maxsize=64)
+def _modules_in_folder(folder: Path, changed_ns: int) -> dict[str, str]:  # noqa: ARG001 - a key
+    with os.scandir(folder) as items:
+        return {
+            item.name.partition(".")[0]: Path(item.name).suffix
+            for item in islice(items, _MAXIMUM_FILES)
+            if item.name.endswith(_MODULES) or item.is_dir()
+        }
 
 
 def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:

@@ -10,6 +10,7 @@ from typing import TypeAlias
 from composer.base.diagnostics import Diagnostic, Label, error, info, suggestion, warning
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
+from composer.language.document.limits import MAX_ERRORS
 from composer.model import ChannelKind, PortKind, PortOfNode, channels
 from composer.model.names import join, matches_wildcard
 from composer.rules.analysis.context import Context, is_unresolved
@@ -145,13 +146,28 @@ def nearest_channel(context: Context, endpoint: PortOfNode) -> str | None:
 
 
 def _nearest_name(context: Context, endpoint: PortOfNode) -> str | None:
+    """Return the most similar name of a possible counterpart, or None.
+
+    Names are searched for the first ports only, since each search takes about a millisecond.
+    """
+    searched = context.once(_nearest_names)
+    key = _key(endpoint)
+    if key not in searched and len(searched) < MAX_ERRORS:
+        searched[key] = next(_similar_names(context, endpoint), None)
+    return searched.get(key)
+
+
+def _nearest_names(_: Context) -> dict[tuple[str, str], str | None]:
+    return {}
+
+
+def _similar_names(context: Context, endpoint: PortOfNode) -> Iterator[str]:
     port = endpoint.port
     counterpart = (COUNTERPARTS[port.kind], port.interface.value)
     nodes = context.once(_channel_names).get(counterpart, {})
     for name in vocabulary(tuple(nodes)).close(port.full_name, _MAXIMUM_CANDIDATES):
         if name != port.full_name and nodes[name] != {endpoint.node.name.value}:
-            return name
-    return None
+            yield name
 
 
 def is_meant_by_another(context: Context, publisher: PortOfNode) -> bool:

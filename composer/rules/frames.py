@@ -134,6 +134,7 @@ def _unconnected(tree: FrameTree, gap: Gap) -> Diagnostic:
 
 
 _PAIR = 2  # of trees
+_MAX_SEARCHED = 20  # roots that may be misspelled
 
 
 def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:
@@ -145,7 +146,7 @@ def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:
         roots = tree.roots()
         others = [root for root in (*roots[1:], *roots[:1]) if root not in reported]
         if len(roots) > 1 and others:
-            meant = ((root, _meant_frame(tree, root, roots)) for root in others)
+            meant = ((root, _meant_frame(tree, root, roots)) for root in others[:_MAX_SEARCHED])
             root, close = next((item for item in meant if item[1]), (others[0], None))
             yield _several_trees(tree, roots, root, close)
 

@@ -11,6 +11,7 @@ from composer.model import (
     ChannelKind,
     Event,
     ImplementationKind,
+    Node,
     Port,
     PortKind,
     PortOfNode,
@@ -44,18 +45,20 @@ def _steps(context: Context) -> _Steps:
     steps: _Steps = {}
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.SUBSCRIPTION):
-            for target in _republished(node.ports_of(PortKind.PUBLISHER), port):
+            for target in _republished(node, port):
                 if not is_unresolved(port.full_name) and not is_unresolved(target):
                     steps.setdefault(port.full_name, {})[target] = PortOfNode(node, port)
     return steps
 
 
-def _republished(publishers: tuple[Port, ...], port: Port) -> Iterator[str]:
+def _republished(node: Node, port: Port) -> Iterator[str]:
     reaction = port.reaction(Event.MESSAGE)
     if reaction is None or reaction.when is not None:
         return
-    names = {send.port.value for send in reaction.publish}
-    yield from (item.full_name for item in publishers if item.name.value in names)
+    for send in reaction.publish:
+        target = node.port(send.port.value)
+        if target is not None and target.kind is PortKind.PUBLISHER:
+            yield target.full_name
 
 
 def _first_cycle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOfNode]]:

@@ -155,6 +155,9 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
         "c]}}\nnodes: {n: {on_activate: {log: '${a}'}}}\n",
     ),
     "arguments": ("nodes: {x: {executor: fast}}\narguments:\n", "  a#: {choices: [x]}\n", ""),
+    "frames": ("nodes:\n  x:\n    transforms:\n      static:\n", "        f#: {parent: g#}\n", ""),
+    "missing includes": ("nodes: {x: {}}\ninclude:\n", "  - no#.yaml\n", ""),
+    "missing modules": ("nodes:\n", "  n#: {behavior: no_module#:Node}\n", ""),
     "one topic": (
         "nodes:\n",
         f"  n#: {{publishers: {{p: {{{STRING}, topic: /t}}}}, "
@@ -176,6 +179,34 @@ def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
         load_bytes(content, tmp_path, shown="large.yaml")
 
     assert_linear(validate, 50_000, 400_000)
+
+
+NODE_TYPE = "node: big\npublishers:\n" + "".join(f"  p{n}: {{{STRING}}}\n" for n in range(400))
+PARAMETERS = ", ".join(f"a{number}: 1" for number in range(5_001))
+LOG = f"log: '{{{' + '.join(['1'] * 30)} + ${{i}}}}'"
+TOO_MANY_VALUES = (
+    "with this node, the nodes declare more than 250,000 values, counting expressions by "
+    "their length"
+)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "message"),
+    [
+        (f"x: {{parameters: {{{PARAMETERS}}}}}", "'parameters' has more than 5,000 entries"),
+        (
+            f"n${{i}}: {{for_each: {{i: 5000}}, timers: {{t: {{rate_hz: 1, {LOG}}}}}}}",
+            TOO_MANY_VALUES,
+        ),
+        ("n${i}: {for_each: {i: 1000}, type: big}", TOO_MANY_VALUES),
+    ],
+)
+def test_a_small_file_that_stands_for_much(tmp_path: Path, nodes: str, message: str) -> None:
+    folder = tmp_path / "nodes"
+    folder.mkdir()
+    (folder / "big.yaml").write_text(NODE_TYPE)
+    loading = load_bytes(f"system: a\nnodes:\n  {nodes}\n".encode(), tmp_path, shown="a.yaml")
+    assert [item.message for item in loading.diagnostics] == [message]
 
 
 def test_loading_pauses_the_cycle_collection_only_while_it_runs(tmp_path: Path) -> None:

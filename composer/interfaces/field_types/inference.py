@@ -154,9 +154,10 @@ def _number(node: ast.expr, inference: Inference) -> ValueType:
 
 
 def _common_number(types: list[ValueType]) -> ValueType:
-    if any(not is_integer(found) and is_number(found) for found in types):
-        return NUMBER
-    return INTEGER if all(is_integer(found) for found in types) else ANYTHING
+    if all(map(is_integer, types)):
+        return INTEGER
+    is_known_float = any(not is_integer(found) and is_number(found) for found in types)
+    return NUMBER if is_known_float else ANYTHING
 
 
 def _boolean(node: ast.BoolOp, inference: Inference) -> ValueType:

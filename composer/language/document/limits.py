@@ -7,7 +7,7 @@ most about two seconds for each megabyte, whatever it contains, and 200 MB.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Self
+from typing import Self, SupportsIndex
 
 from composer.base.diagnostics import Diagnostic, Severity
 from composer.language.rules import TOO_LARGE
@@ -21,7 +21,8 @@ MAX_DEPTH = 32
 #: Keys, values, maps and lists in a file, counting values repeated by aliases again.
 MAX_VALUES = 200_000
 
-#: Entries of a section of a system, such as its nodes, and of the systems that it includes.
+#: Entries of a section of a system, such as its nodes, and of the systems that it includes. Also
+#: entries of a section of a node, such as its parameters.
 MAX_ENTRIES = 5_000
 
 #: Errors of one stage of checking a file.
@@ -35,6 +36,9 @@ MAX_INCLUDES = 5_000
 
 #: Keys, values, maps and lists in all files that a system includes, again for each include.
 MAX_INCLUDED_VALUES = 200_000
+
+#: Keys and values that the nodes of a system declare, those of a node type for each of its nodes.
+MAX_DECLARED_VALUES = 250_000
 
 #: Node names that the patterns of a system stand for.
 MAX_MATCHES = 50_000
@@ -83,6 +87,10 @@ class LimitedDiagnostics(list[Diagnostic]):
             message = f"there are more than {MAX_ERRORS:,} errors; the rest is not checked"
             raise TooManyErrors([*self], Diagnostic(TOO_LARGE, message, item.primary))
         super().append(item)
+
+    def __delitem__(self, index: SupportsIndex | slice) -> None:
+        super().__delitem__(index)
+        self._errors = sum(item.severity is Severity.ERROR for item in self)
 
     def __iadd__(self, items: Iterable[Diagnostic]) -> Self:  # type: ignore[misc,override]
         for item in items:

@@ -154,6 +154,8 @@ def _count_nodes(source: str, tree: ast.expr) -> None:
 
 def _count_characters(text: str, tree: ast.expr, skipped: int) -> None:
     """Convert Python's columns, in UTF-8 bytes of ``text``, to columns of the source."""
+    if not skipped and text.isascii():
+        return
     data = text.encode()
     for node in ast.walk(tree):
         if isinstance(node, ast.expr):

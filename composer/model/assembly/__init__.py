@@ -14,7 +14,7 @@ from types import MappingProxyType
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
-from composer.language.document.limits import Stopped
+from composer.language.document.limits import LimitedDiagnostics, Stopped, TooManyErrors
 from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
 from composer.language.tree import Entry, LeftOut, Mapping
@@ -96,11 +96,13 @@ def assemble_included(
 def _assembled(
     project: Project, merge: Callable[[IncludeResolver], tuple[Mapping | None, SourceFile]]
 ) -> AssembledSystem:
-    diagnostics: list[Diagnostic] = []
+    diagnostics = LimitedDiagnostics()
     limits = IncludeLimits()
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
         merged, source = merge(resolver)
+    except TooManyErrors as stopped:
+        return AssembledSystem(None, stopped.diagnostics)
     except Stopped as stopped:
         return AssembledSystem(None, [stopped.diagnostic])
     if merged is None:

@@ -22,13 +22,12 @@ def add_include_labels(
     diagnostics: Iterable[Diagnostic], included: Map[str, tuple[Span, ...]]
 ) -> list[Diagnostic]:
     """Return the diagnostics; those in included files get labels where these are included."""
-    return [
-        replace(
-            diagnostic,
-            related=(*diagnostic.related, *_includes(diagnostic.primary.file.path, included)),
-        )
-        for diagnostic in diagnostics
-    ]
+    labelled = []
+    for diagnostic in diagnostics:
+        labels = tuple(_includes(diagnostic.primary.file.path, included))
+        related = (*diagnostic.related, *labels)
+        labelled.append(replace(diagnostic, related=related) if labels else diagnostic)
+    return labelled
 
 
 def _includes(path: str, included: Map[str, tuple[Span, ...]]) -> Iterator[Label]:

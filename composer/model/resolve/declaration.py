@@ -166,6 +166,7 @@ class Declaration:
     introspection: Tree | None = None
     only_declared: bool = False
     transforms: Transforms | None = None
+    size: int = 0  # in values: how much of the limit each node takes
 
     @property
     def gets_undeclared(self) -> bool:
@@ -192,7 +193,27 @@ def declare(
         introspection=tree.get("introspection"),
         only_declared=flag(tree.get("only_declared"), default=False),
         transforms=read_transforms(tree.entry("transforms")),
+        size=_size(tree),
     )
+
+
+#: Compiling and checking an expression takes the time of this many values, and of one more for a
+#: few of its characters.
+_VALUES_PER_EXPRESSION = 20
+_CHARACTERS_PER_VALUE = 2
+
+
+def _size(tree: Tree, name: str = "") -> int:
+    """Return the number of keys and values under the key ``name``."""
+    match tree:
+        case Mapping():
+            return 1 + sum(1 + _size(entry.value, entry.name) for entry in tree)
+        case Sequence(items=items):
+            return 1 + sum(_size(item, name) for item in items)
+        case Scalar(value=str() as text) if "{" in text or name in ("when", "accept"):
+            return _VALUES_PER_EXPRESSION + len(text) // _CHARACTERS_PER_VALUE
+        case _:
+            return 1
 
 
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")

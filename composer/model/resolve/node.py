@@ -10,7 +10,9 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import Located
+from composer.base.source import Located, Span
+from composer.language.document.limits import MAX_DECLARED_VALUES, TooManyErrors
+from composer.language.rules import TOO_LARGE
 from composer.language.tree import Entry, Mapping, Sequence, Tree
 from composer.language.tree_values import (
     choice,
@@ -84,6 +86,25 @@ class SystemContext:
     use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
     processes: Map[str, Located[str]]  # by the nodes that they name
     diagnostics: list[Diagnostic]
+    declared: DeclaredValues
+
+
+@dataclass(slots=True)
+class DeclaredValues:
+    """The number of keys and values that nodes declare, those of a node type for each node."""
+
+    count: int = 0
+
+    def add(self, size: int, span: Span, diagnostics: list[Diagnostic]) -> None:
+        """Add the size of a node. Raises TooManyErrors beyond the limit."""
+        self.count += size
+        if self.count > MAX_DECLARED_VALUES:
+            message = (
+                f"with this node, the nodes declare more than {MAX_DECLARED_VALUES:,} values, "
+                "counting expressions by their length"
+            )
+            hint = "split the system"
+            raise TooManyErrors(diagnostics, Diagnostic(TOO_LARGE, message, span, hint=hint))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +131,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     else:
         made = _typed(type_entry, tree, context)
     declared = made.declaration
+    context.declared.add(declared.size, entry.key.span, context.diagnostics)
     external = read_external(tree.entry("external"))
     is_passed_on = external is not None and not declared.only_declared
     gets_undeclared = declared.gets_undeclared or is_passed_on

@@ -46,6 +46,7 @@ from composer.model.names import join
 from composer.model.recording import Recording
 from composer.model.resolve.connections import read_chains, read_connections
 from composer.model.resolve.node import (
+    DeclaredValues,
     SystemContext,
     resolve_node,
 )
@@ -186,6 +187,7 @@ def resolve_system(
         clock,
         processes_of_nodes(processes),
         diagnostics,
+        DeclaredValues(),
     )
     nodes = without_sections_of_others(
         [resolve_node(entry, context) for entry in entries(tree.get("nodes"))]

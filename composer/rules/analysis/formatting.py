@@ -51,7 +51,7 @@ def with_short_values(diagnostic: Diagnostic) -> Diagnostic:
         diagnostic.hint or "",
         *(label.message for label in diagnostic.related),
     ]
-    if all(len(text) <= MAXIMUM_VALUE_LENGTH for text in texts):
+    if not any(len(text) > MAXIMUM_VALUE_LENGTH and _LONG_VALUE.search(text) for text in texts):
         return diagnostic
     return replace(
         diagnostic,

@@ -136,9 +136,11 @@ class FrameTree:
     lookups: list[Lookup] = field(default_factory=list)
     is_open: bool = False
     by_child: dict[str, Broadcast] = field(default_factory=dict)  # the first of each
+    _roots: dict[str, str] = field(default_factory=dict)
 
     def add(self, broadcast: Broadcast) -> None:
         """Add a transform."""
+        self._roots.clear()
         self.broadcasts.append(broadcast)
         self.by_child.setdefault(broadcast.child, broadcast)
 
@@ -150,11 +152,13 @@ class FrameTree:
 
     def root(self, frame: str) -> str:
         """Return the frame at which the tree of ``frame`` begins; in a cycle, any of it."""
-        seen = set()
-        while frame in self.by_child and frame not in seen:
-            seen.add(frame)
+        path: dict[str, None] = {}
+        while frame in self.by_child and frame not in self._roots and frame not in path:
+            path[frame] = None
             frame = self.by_child[frame].parent
-        return frame
+        root = self._roots.get(frame, frame)
+        self._roots.update(dict.fromkeys(path, root))
+        return root
 
     def roots(self) -> tuple[str, ...]:
         """Return the frames without a parent, in order."""
