@@ -22,12 +22,12 @@ def add_include_labels(
     diagnostics: Iterable[Diagnostic], included: Map[str, tuple[Span, ...]]
 ) -> list[Diagnostic]:
     """Return the diagnostics; those in included files get labels where these are included."""
-    labelled = []
+    labeled = []
     for diagnostic in diagnostics:
         labels = tuple(_includes(diagnostic.primary.file.path, included))
         related = (*diagnostic.related, *labels)
-        labelled.append(replace(diagnostic, related=related) if labels else diagnostic)
-    return labelled
+        labeled.append(replace(diagnostic, related=related) if labels else diagnostic)
+    return labeled
 
 
 def _includes(path: str, included: Map[str, tuple[Span, ...]]) -> Iterator[Label]:
