@@ -1,10 +1,10 @@
 """A small process that ends a system whose C code keeps the interpreter's lock.
 
 Python notes a signal without the lock and writes its number to the socket that wakes the main
-loop. The watchdog looks at the same socket. A number that is still there after the time
-limit means that no signal handler runs: a regular expression, for example, keeps the lock until it
-has its result. As the watchdog of systemd, this one sends SIGABRT, which prints the stacks, and then
-SIGKILL. It runs this file as a program and imports only the standard library.
+loop. The watchdog looks at the same socket. A number that is still there after the time limit
+means that no signal handler runs: a regular expression, for example, keeps the lock until it has
+its result. Like the watchdog of systemd, this one sends SIGABRT, which prints the stacks, and
+then SIGKILL. It runs this file as a program and imports only the standard library.
 """
 
 from __future__ import annotations
