@@ -27,20 +27,22 @@ class Selection:
     start_s: float = 0.0
     duration_s: float = inf
 
-    def topics(self, bag: Bag) -> frozenset[str]:
-        """Return the topics. Raises BagError if there is none."""
-        found = frozenset(filter(self.is_wanted, bag.summary.topics))
-        if not found:
-            known = ", ".join(sorted(bag.summary.topics)) or "none"
-            raise BagError("no topic of the bag matches", f"its topics: {known}")
+    def topics(self, *bags: Bag) -> frozenset[str]:
+        """Return the topics in these bags. Raises BagError if the bags only have others."""
+        known = {name for bag in bags for name in bag.summary.topics}
+        found = frozenset(filter(self.is_wanted, known))
+        if known and not found:
+            what = "the bag" if len(bags) == 1 else "the bags"
+            raise BagError(f"no topic of {what} matches", f"topics: {', '.join(sorted(known))}")
         return found
 
     def messages(self, bag: Bag) -> Iterator[BagMessage]:
-        """Yield the messages, in order. Raises BagError."""
+        """Yield the messages of the topics, if there are any, in order. Raises BagError."""
+        names = frozenset(filter(self.is_wanted, bag.summary.topics))
         start_ns = bag.summary.start_ns + round(self.start_s * NANOSECONDS)
         length = self.duration_s * NANOSECONDS
         end_ns = min(start_ns + round(length), END_NS) if length < inf else END_NS
-        return bag.messages(self.topics(bag), start_ns, end_ns)
+        return bag.messages(names, start_ns, end_ns) if names else iter(())
 
 
 def write_bag(
@@ -48,17 +50,22 @@ def write_bag(
 ) -> BagWriter:
     """Write the messages of several bags in the order of their times; return the closed writer.
 
-    Raises BagError; for a topic that has different types in the bags, too.
+    Raises BagError, also for a topic that has different types in the bags. Then, and if it is
+    interrupted, there is no new bag.
     """
     topics = _joined_topics(bags, selection)
     attached = [item for bag in bags for item in bag.attachments()]
     writer = BagWriter(folder, limits, tuple(dict.fromkeys(attached)))
-    for topic in topics:
-        writer.add_topic(topic)
     parts: Iterable[Iterator[BagMessage]] = [selection.messages(bag) for bag in bags]
-    for message in heapq.merge(*parts, key=attrgetter("recorded_ns")):
-        writer.write(message)
-    writer.close()
+    try:
+        for topic in topics:
+            writer.add_topic(topic)
+        for message in heapq.merge(*parts, key=attrgetter("recorded_ns")):
+            writer.write(message)
+        writer.close()
+    except BaseException:
+        writer.discard()
+        raise
     return writer
 
 
@@ -66,8 +73,9 @@ def _joined_topics(bags: Sequence[Bag], selection: Selection) -> list[BagTopic]:
     """Return the topics of all bags; with definitions from this computer if they have none."""
     interfaces = Interfaces.load()
     found: dict[str, BagTopic] = {}
+    wanted = sorted(selection.topics(*bags))
     for bag in bags:
-        for name in sorted(selection.topics(bag)):
+        for name in (name for name in wanted if name in bag.summary.topics):
             topic = bag.summary.topics[name]
             other = found.get(name, topic)
             if other.type_name != topic.type_name:

@@ -97,8 +97,12 @@ class Recorder:
     notice the wait.
     """
 
-    def __init__(self, sink: Sink, clock: Clock) -> None:
+    def __init__(
+        self, sink: Sink, clock: Clock, on_problem: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """``on_problem`` receives why nothing more is recorded, on the thread that writes."""
         self._sink = sink
+        self._on_problem = on_problem
         self._clock = clock
         self._sources: dict[str, Source] = {}
         self._numbers = count()
@@ -196,6 +200,7 @@ class Recorder:
                     self._sink.flush_if_due()
             except BagError as error:
                 self.problem = str(error)
+                self._on_problem(self.problem)
 
     def _write_and_call(self, until_s: float | None = None) -> None:
         """Write what is pending, and make the calls that are due."""

@@ -84,7 +84,11 @@ class SystemRecording:
         self._writer: BagWriter | None = None
         if recording.ring_s is None:
             self._writer = self._new_writer(**{STARTED: clock.time_ns()})
-            self._recorder = Recorder(self._writer, clock)
+            self._recorder = Recorder(
+                self._writer,
+                clock,
+                lambda problem: say(f"warning: nothing more is recorded: {problem}"),
+            )
         else:
             self._ring = Ring(recording.ring_s)
             self._recorder = Recorder(self._ring, clock)

@@ -54,12 +54,12 @@ def info(bag: BagPath, *, json: Json = False) -> None:
         facts = {"files": found.files, "size_bytes": size, "start_ns": summary.start_ns}
         write(as_json({**facts, "end_ns": summary.end_ns, "topics": topics, "attached": attached}))
         return
-    start = datetime.fromtimestamp(summary.start_ns / 1e9, UTC)
     count = sum(summary.counts.values())
+    start = f"{datetime.fromtimestamp(summary.start_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC"
     shown = [
         f"files:     {', '.join(map(str, found.files))}",
         f"size:      {size / 1e6:.1f} MB",
-        f"start:     {start:%Y-%m-%d %H:%M:%S} UTC",
+        f"start:     {start if count else '-'}",
         f"duration:  {summary.duration_s:.3f} s",
         f"messages:  {count}",
     ]
@@ -134,6 +134,7 @@ def diff(
 
         ours, theirs = opened(expected), opened(actual)
         chosen = selection(topics, 0.0, None)
+        chosen.topics(ours, theirs)
         shift_ns = ours.summary.start_ns - theirs.summary.start_ns
         found = differences(
             chosen.messages(ours),

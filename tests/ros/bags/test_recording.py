@@ -343,12 +343,15 @@ class _FullDisk:
 
 def test_a_full_disk_does_not_stop_publishers() -> None:
     sink = _FullDisk(10)
-    recorder = Recorder(sink, COMPUTER)
+    problems: list[str] = []
+    recorder = Recorder(sink, COMPUTER, problems.append)
     source = recorder.source(BagTopic("/chat", "std_msgs/msg/String"))
     with recorder:
         for number in range(30):
             source.put(String(data=str(number)))
-    assert recorder.problem == "the disk is full"
+        wait_until(lambda: problems, "the report")
+        source.put(String())
+    assert problems == [recorder.problem] == ["the disk is full"]
     assert len(sink.written) == 10
 
 

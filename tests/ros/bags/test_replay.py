@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import select
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -20,7 +26,7 @@ from composer.testing.bag_replay import Replay, replay, without_nodes
 from composer.testing.system_run import load_system
 from tests.ros.support.commands import compose, error, finished, output_of, start
 from tests.ros.support.forked import ForkedCommand
-from tests.ros.support.in_process import Peer
+from tests.ros.support.in_process import PATIENCE_S, Peer
 
 SYSTEMS = Path(__file__).parents[3] / "systems"
 PIPELINE = SYSTEMS / "pipeline.yaml"
@@ -116,6 +122,39 @@ def test_the_graph_receives_a_bag(tmp_path: Path, peer: Peer) -> None:
     assert got == [f"{number:02d}" for number in range(1, 51)]
     assert maps == ["00"]
     assert set(times) == {10**9}
+
+
+def test_the_space_key_pauses(tmp_path: Path) -> None:
+    ours, theirs = pty.openpty()
+    # setsid makes the terminal theirs: in the background, a program reads no keys.
+    words = ("setsid", "--ctty", sys.executable, "-m", "composer", "replay", "--rate", "0.1")
+    text = ""
+
+    def wait_for(part: str) -> None:
+        nonlocal text
+        until_s = time.monotonic() + PATIENCE_S
+        while part not in text:
+            assert time.monotonic() < until_s, text
+            if select.select([ours], [], [], 0.1)[0]:
+                text += os.read(ours, 1000).decode()
+        text = text.partition(part)[2]
+
+    with subprocess.Popen(
+        (*words, str(_chat(tmp_path))), stdin=theirs, stdout=subprocess.PIPE, stderr=theirs
+    ) as process:
+        os.close(theirs)
+        try:
+            wait_for("0 of 0 s (space pauses)")
+            os.write(ours, b" ")
+            wait_for("0 of 0 s, paused (space resumes)")
+            os.write(ours, b" ")
+            wait_for("0 of 0 s (space pauses)")
+            os.write(ours, b"\x03")
+            output, _ = process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
+            os.close(ours)
+    assert (process.returncode, output.endswith(b" messages\n")) == (0, True)
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from composer.bags import qos_yaml
 from composer.bags.bag import Attachment, Bag, BagError, BagMessage, BagTopic
 from composer.bags.definitions import full_definition
+from composer.bags.editing import Selection, write_bag
 from composer.bags.reader import open_bag
 from composer.bags.writer import BagWriter, SplitLimits
 from composer.interfaces import Interfaces
@@ -244,6 +245,22 @@ def test_damage_is_named(tmp_path: Path, damage: Callable[[Path], object], text:
     damage(path)
     with pytest.raises(BagError, match=text):
         read(open_bag(tmp_path / "bag"))
+
+
+def test_new_bags_are_made_of_all_or_not_at_all(tmp_path: Path) -> None:
+    write(tmp_path / "bag", count=1000)
+    [path] = (tmp_path / "bag").glob("*.mcap")
+    BagWriter(tmp_path / "empty").close()
+    bags = [open_bag(tmp_path / name) for name in ("empty", "bag", "empty")]
+    joined = write_bag(bags, Selection(), tmp_path / "joined", SplitLimits())
+    assert joined.count == 1000
+    with pytest.raises(BagError, match="no topic of the bags matches"):
+        write_bag(bags, Selection(lambda _: False), tmp_path / "none", SplitLimits())
+    damaged = open_bag(tmp_path / "bag")
+    _damage_chunk(path)
+    with pytest.raises(BagError, match="is corrupt"):
+        write_bag([damaged], Selection(), tmp_path / "new", SplitLimits())
+    assert {item.name for item in tmp_path.iterdir()} == {"bag", "empty", "joined"}
 
 
 def test_damaged_databases_are_named(tmp_path: Path) -> None:
