@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +13,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.model.qos import QosProfile
 
 NANOSECONDS = 1_000_000_000
+#: How ROS 2 serializes messages.
+CDR = "cdr"
 
 
 class BagError(Exception):
@@ -27,7 +30,8 @@ class BagTopic:
     """A topic of a bag.
 
     ``qos`` are the profiles that its publishers offered. ``definition`` is the text of the message
-    and of all messages in it, in ``encoding``; empty if it is not known.
+    and of all messages in it, in ``encoding``; empty if it is not known. ``message_encoding`` is
+    ``cdr``, except in bags of other programs than ROS 2.
     """
 
     name: str
@@ -36,10 +40,11 @@ class BagTopic:
     definition: str = ""
     encoding: str = "ros2msg"
     type_hash: str = ""
+    message_encoding: str = CDR
 
 
 class BagMessage(NamedTuple):
-    """A serialized message (CDR). Times are nanoseconds since 1970."""
+    """A serialized message. Times are nanoseconds since 1970."""
 
     topic: str
     recorded_ns: int
@@ -96,6 +101,24 @@ class Bag(Protocol):
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the attached files. Raises BagError for a corrupt file."""
+
+
+def joined(summaries: Iterable[Summary]) -> Summary:
+    """Return the summary of a bag of several files."""
+    topics: dict[str, BagTopic] = {}
+    counts = Counter[str]()
+    parts = list(summaries)
+    for part in parts:
+        topics |= part.topics
+        counts.update(part.counts)
+    timed = [part for part in parts if sum(part.counts.values())]
+    start_ns = min((part.start_ns for part in timed), default=0)
+    return Summary(topics, counts, start_ns, max((part.end_ns for part in timed), default=0))
+
+
+def full_type_name(name: str) -> str:
+    """Return the name of a message type as in ROS 2: ``std_msgs/String`` is the one of ROS 1."""
+    return name.replace("/", "/msg/") if name.count("/") == 1 else name
 
 
 @contextmanager

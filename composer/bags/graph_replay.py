@@ -11,7 +11,7 @@ from builtin_interfaces.msg import Time
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from composer.bags.bag import NANOSECONDS, BagError, BagMessage, BagTopic
+from composer.bags.bag import CDR, NANOSECONDS, BagError, BagMessage, BagTopic
 from composer.base.fast_dataclass import dataclass
 from composer.client.messages.topics import wait_until_acknowledged
 from composer.client.messages.values import InvalidValueError, class_of
@@ -43,23 +43,33 @@ class GraphReplay:
     """Publishers of the topics of a bag, with the QoS profiles of the bag."""
 
     def __init__(
-        self, session: Session, topics: Iterable[BagTopic], options: ReplayOptions
+        self,
+        session: Session,
+        topics: Iterable[BagTopic],
+        options: ReplayOptions,
+        warn: Callable[[str], None],
     ) -> None:
-        """Raise BagError if types are not installed."""
+        """``warn`` receives why a topic is not published. Raises BagError if none is."""
         self._session = session
         self._options = options
         self.count = 0
         #: The last time of time.monotonic, and how long the replay has run by then, without pauses.
         self._seen_s = self._passed_s = 0.0
         self._publishers: dict[str, Any] = {}
+        problems: list[BagError] = []
         for topic in topics:
             try:
-                kind = class_of(topic.type_name)
-            except InvalidValueError as error:
-                raise BagError(f"'{topic.name}': {error}", error.hint) from error
+                kind = _message_class(topic)
+            except BagError as error:
+                problems.append(error)
+                continue
             name = options.names.get(topic.name, topic.name)
             profile = rclpy_profile(offered(topic.qos))
             self._publishers[topic.name] = session.node.create_publisher(kind, name, profile)
+        if problems and not self._publishers:
+            raise problems[0]
+        for problem in problems:
+            warn(f"{problem}: it is not published")
         self._clock: Any = None
         if options.clock:
             self._clock = session.node.create_publisher(ClockMessage, "/clock", QoSProfile(depth=1))
@@ -80,8 +90,11 @@ class GraphReplay:
         """
         self._seen_s, self._passed_s = time.monotonic(), 0.0
         for message in messages:
+            publisher = self._publishers.get(message.topic)
+            if publisher is None:
+                continue
             self._wait_until(message.recorded_ns, start_ns)
-            self._publishers[message.topic].publish(message.data)
+            publisher.publish(message.data)
             self.count += 1
             on_message(message.recorded_ns)
 
@@ -113,6 +126,15 @@ class GraphReplay:
     def _publish_time(self, at_ns: int) -> None:
         seconds, nanoseconds = divmod(at_ns, NANOSECONDS)
         self._clock.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
+
+
+def _message_class(topic: BagTopic) -> Any:
+    if topic.message_encoding != CDR:
+        raise BagError(f"'{topic.name}' has messages in {topic.message_encoding}, not in {CDR}")
+    try:
+        return class_of(topic.type_name)
+    except InvalidValueError as error:
+        raise BagError(f"'{topic.name}': {error}", error.hint) from error
 
 
 def offered(profiles: Iterable[QosProfile]) -> QosProfile:

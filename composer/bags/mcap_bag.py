@@ -17,7 +17,16 @@ from mcap.summary import Summary as McapSummary
 from mcap.writer import MCAP0_MAGIC
 
 from composer.bags import qos_yaml
-from composer.bags.bag import Attachment, BagError, BagMessage, BagTopic, Summary, reading
+from composer.bags.bag import (
+    Attachment,
+    BagError,
+    BagMessage,
+    BagTopic,
+    Summary,
+    full_type_name,
+    joined,
+    reading,
+)
 from composer.base.fast_dataclass import dataclass
 from composer.base.regular_files import open_regular
 
@@ -28,10 +37,11 @@ _COMPRESSIONS = ("", "zstd", "lz4")
 
 @dataclass(slots=True)
 class _McapFile:
-    """A file of a bag; ``problem`` says why it has no index, as after the end of its writer."""
+    """A file of a bag; ``problem`` says what is missing, as after the end of its writer."""
 
     path: Path
     summary: Summary
+    has_index: bool = True
     problem: str = ""
 
 
@@ -42,7 +52,7 @@ class McapBag:
         """Raise BagError if a file cannot be read at all."""
         files = [_open_mcap(path) for path in paths]
         self._files = sorted(files, key=lambda file: file.summary.start_ns)
-        self.summary = _joined([file.summary for file in self._files])
+        self.summary = joined([file.summary for file in self._files])
         self.files = [str(file.path) for file in self._files]
         self.warnings = [
             f"{file.path} is not complete ({file.problem}): it is read as far as possible"
@@ -57,7 +67,7 @@ class McapBag:
         """
         for file in self._files:
             with reading(file.path), open_regular(file.path) as stream:
-                if file.problem:
+                if not file.has_index:
                     found = _scanned(stream, topics)
                     yield from (item for item in found if start_ns <= item.recorded_ns < end_ns)
                 else:
@@ -79,7 +89,7 @@ def _open_mcap(path: Path) -> _McapFile:
         start = stream.read(len(MCAP0_MAGIC))
         if start != MCAP0_MAGIC:
             raise BagError(f"{path} is {'not an MCAP file' if start else 'empty'}")
-        problem = "it has no index"
+        problem = ""  # an index is optional
         stream.seek(0)
         try:
             found = SeekingReader(stream, record_size_limit=_LONGEST_RECORD_BYTES).get_summary()
@@ -91,7 +101,7 @@ def _open_mcap(path: Path) -> _McapFile:
         except Exception:  # whatever the library raises for the wrong bytes
             problem = "its end is missing or damaged"
         stream.seek(0)
-        return _McapFile(path, _scanned_summary(stream), problem)
+        return _McapFile(path, _scanned_summary(stream), has_index=False, problem=problem)
 
 
 def _check_compressions(names: Iterable[str]) -> None:
@@ -115,25 +125,13 @@ def _summary(found: McapSummary, statistics: Statistics) -> Summary:
 def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
     return BagTopic(
         channel.topic,
-        "" if schema is None else schema.name,
+        "" if schema is None else full_type_name(schema.name),
         qos_yaml.from_text(channel.metadata.get("offered_qos_profiles", "")),
         "" if schema is None else schema.data.decode(errors="replace"),
         "" if schema is None else schema.encoding,
         channel.metadata.get("topic_type_hash", ""),
+        channel.message_encoding,
     )
-
-
-def _joined(summaries: Iterable[Summary]) -> Summary:
-    """Return the summary of a bag of several files."""
-    topics: dict[str, BagTopic] = {}
-    counts = Counter[str]()
-    parts = list(summaries)
-    for part in parts:
-        topics |= part.topics
-        counts.update(part.counts)
-    timed = [part for part in parts if sum(part.counts.values())]
-    start_ns = min((part.start_ns for part in timed), default=0)
-    return Summary(topics, counts, start_ns, max((part.end_ns for part in timed), default=0))
 
 
 def _indexed(

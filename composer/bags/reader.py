@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING
+from weakref import finalize
 
-from composer.bags.bag import Bag, BagError, require
+from composer.bags.bag import Bag, BagError, reading, require
+
+if TYPE_CHECKING:
+    from composer.bags.mcap_bag import McapBag
+    from composer.bags.sqlite_bag import SqliteBag
+
+#: The suffix of a file that rosbag2 has compressed, with ``--compression-mode file``.
+_COMPRESSED = ".zstd"
 
 
 def open_bag(path: Path) -> Bag:
@@ -17,6 +28,33 @@ def open_bag(path: Path) -> Bag:
     files = _files(path)
     if not files:
         raise BagError(f"{path} is not a bag: it has neither .mcap nor .db3 files")
+    if files[0].suffix == _COMPRESSED:
+        return _decompressed(path, files)
+    return _open(path, files)
+
+
+def _decompressed(path: Path, files: tuple[Path, ...]) -> Bag:
+    """Return a bag whose files are compressed as a whole; they are decompressed until its end."""
+    require("zstandard")
+    import zstandard  # noqa: PLC0415 - an extra
+
+    folder = Path(mkdtemp(prefix="compose-bag-"))
+    try:
+        plain = []
+        for file in files:
+            plain.append(folder / file.stem)
+            with reading(file), file.open("rb") as source, plain[-1].open("wb") as target:
+                zstandard.ZstdDecompressor().copy_stream(source, target)
+        bag = _open(path, tuple(plain))
+    except BaseException:
+        rmtree(folder, ignore_errors=True)
+        raise
+    bag.files = [str(file) for file in files]
+    finalize(bag, rmtree, folder, ignore_errors=True)
+    return bag
+
+
+def _open(path: Path, files: tuple[Path, ...]) -> McapBag | SqliteBag:
     if files[0].suffix == ".mcap":
         require("mcap")
         from composer.bags.mcap_bag import McapBag  # noqa: PLC0415 - an extra
@@ -30,14 +68,14 @@ def open_bag(path: Path) -> Bag:
 
 def _files(path: Path) -> tuple[Path, ...]:
     if path.is_file():
-        if path.suffix not in (".mcap", ".db3"):
-            raise BagError(f"{path} is not a bag: expected a folder, or a .mcap or .db3 file")
-        return (path,)
+        if path.name.removesuffix(_COMPRESSED).endswith((".mcap", ".db3")):
+            return (path,)
+        raise BagError(f"{path} is not a bag: expected a folder, or a .mcap or .db3 file")
     try:
         names = sorted(path.iterdir())
     except OSError as error:
         raise BagError(f"cannot read {path}: {error.strerror}") from error
-    for pattern in ("*.mcap", "*.db3*"):
+    for pattern in ("*.mcap", "*.db3", f"*.mcap{_COMPRESSED}", f"*.db3{_COMPRESSED}"):
         found = tuple(name for name in names if name.match(pattern) and name.is_file())
         if found:
             return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,46 +12,79 @@ from typing import Any
 from rosbags.rosbag2 import Reader
 
 from composer.bags import qos_yaml
-from composer.bags.bag import Attachment, BagMessage, BagTopic, Summary, reading
+from composer.bags.bag import (
+    Attachment,
+    BagMessage,
+    BagTopic,
+    Summary,
+    full_type_name,
+    joined,
+    reading,
+)
+
+#: In metadata.yaml: that each message is compressed, of which the databases know nothing.
+_COMPRESSED_MESSAGES = re.compile(
+    r"^\s*compression_mode: *[\"']?message", re.IGNORECASE | re.MULTILINE
+)
 
 
 class SqliteBag:
-    """A bag of sqlite3 databases, read by the library ``rosbags``."""
+    """A bag of sqlite3 databases, read by the library ``rosbags``.
+
+    Each file is read on its own: for a folder, the library leaves out the messages of each topic
+    whose QoS profiles or definition metadata.yaml writes in another way than the database.
+    """
 
     warnings = ()
 
     def __init__(self, path: Path, files: tuple[Path, ...]) -> None:
         """Raise BagError if the bag cannot be read."""
-        self._path = path
         self.files = [str(file) for file in files]
-        with self._reader() as reader:
-            topics = [_sqlite_topic(item) for item in reader.connections]
-            counts = Counter[str]()
-            for item in reader.connections:
-                counts[item.topic] += item.msgcount
-            times = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
-            self.summary = Summary({item.name: item for item in topics}, counts, *times)
+        parts = [(_summary(file), file) for file in _parts(path, files)]
+        parts.sort(key=lambda part: part[0].start_ns)
+        self._parts = [file for _, file in parts]
+        self.summary = joined(summary for summary, _ in parts)
 
     def messages(self, topics: frozenset[str], start_ns: int, end_ns: int) -> Iterator[BagMessage]:
         """Yield the messages of these topics from ``start_ns`` to before ``end_ns``, in order.
 
         Raises BagError for a corrupt file.
         """
-        with self._reader() as reader:
-            chosen = [item for item in reader.connections if item.topic in topics]
-            if not chosen:
-                return
-            for item, at_ns, data in reader.messages(chosen, start_ns, end_ns):
-                yield BagMessage(item.topic, at_ns, at_ns, bytes(data))
+        for part in self._parts:
+            with _reader(part) as reader:
+                chosen = [item for item in reader.connections if item.topic in topics]
+                found = reader.messages(chosen, start_ns, end_ns) if chosen else ()
+                for item, at_ns, data in found:
+                    yield BagMessage(item.topic, at_ns, at_ns, bytes(data))
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield nothing: such bags have none."""
         return iter(())
 
-    @contextmanager
-    def _reader(self) -> Iterator[Any]:
-        with reading(self._path), Reader(self._path) as reader:
-            yield reader
+
+def _parts(path: Path, files: tuple[Path, ...]) -> tuple[Path, ...]:
+    metadata = path / "metadata.yaml"
+    if metadata.is_file():
+        with reading(metadata):
+            if _COMPRESSED_MESSAGES.search(metadata.read_text(encoding="utf-8", errors="replace")):
+                return (path,)
+    return files
+
+
+@contextmanager
+def _reader(path: Path) -> Iterator[Any]:
+    with reading(path), Reader(path) as reader:
+        yield reader
+
+
+def _summary(path: Path) -> Summary:
+    with _reader(path) as reader:
+        topics = {item.topic: _sqlite_topic(item) for item in reader.connections}
+        counts = Counter[str]()
+        for item in reader.connections:
+            counts[item.topic] += item.msgcount
+        times = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
+        return Summary(topics, counts, *times)
 
 
 def _sqlite_topic(connection: Any) -> BagTopic:
@@ -66,9 +100,10 @@ def _sqlite_topic(connection: Any) -> BagTopic:
     encoding = {1: "ros2msg", 2: "ros2idl"}.get(connection.msgdef.format.value, "")
     return BagTopic(
         connection.topic,
-        connection.msgtype,
+        full_type_name(connection.msgtype),
         tuple(map(qos_yaml.from_plain, profiles)),
         connection.msgdef.data,
         encoding,
         connection.digest,
+        connection.ext.serialization_format,
     )

@@ -173,7 +173,7 @@ class BagWriter:
         metadata = {"offered_qos_profiles": qos_yaml.to_text(topic.qos)}
         if topic.type_hash:
             metadata["topic_type_hash"] = topic.type_hash
-        channel = file.writer.register_channel(topic.name, "cdr", schema, metadata)
+        channel = file.writer.register_channel(topic.name, topic.message_encoding, schema, metadata)
         file.channels[topic.name] = channel
         return channel
 
@@ -200,7 +200,7 @@ class BagWriter:
                 "topic_metadata": {
                     "name": topic.name,
                     "type": topic.type_name,
-                    "serialization_format": "cdr",
+                    "serialization_format": topic.message_encoding,
                     "offered_qos_profiles": [qos_yaml.to_plain(profile) for profile in topic.qos],
                     "type_description_hash": topic.type_hash,
                 },

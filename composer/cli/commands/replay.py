@@ -200,7 +200,8 @@ def _publish(
         from composer.bags.graph_replay import GraphReplay
 
         progress = _Progress(bag, keys)
-        replayed = GraphReplay(session, topics, replace(options, is_paused=progress.is_paused))
+        options = replace(options, is_paused=progress.is_paused)
+        replayed = GraphReplay(session, topics, options, lambda text: say(f"warning: {text}"))
         replayed.wait_for_subscriptions(timeout_s)
         try:
             for _ in count() if loop else range(1):

@@ -18,7 +18,9 @@ import yaml
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
+import zstandard
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.enums import StoragePlugin
 from rosbags.rosbag2.writer import Writer as RosbagsWriter
@@ -167,6 +169,74 @@ def test_we_read_what_rosbags_writes(tmp_path: Path, plugin: StoragePlugin) -> N
     assert bag.summary.topics["/chat"].type_name == "std_msgs/msg/String"
     [part] = bag.messages(frozenset({"/chat"}), START_NS + 3, START_NS + 4)
     assert part.recorded_ns == START_NS + 3
+
+
+def _with_other_profiles(bag: Path) -> None:
+    """The database writes the profiles of its topics in another way than metadata.yaml."""
+    [path] = bag.glob("*.db3")
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("update topics set offered_qos_profiles = ''")
+        database.commit()
+
+
+def _without_metadata(bag: Path) -> None:
+    (bag / "metadata.yaml").unlink()
+
+
+def _compressed(bag: Path) -> None:
+    for path in list(bag.glob("*.mcap")) + list(bag.glob("*.db3")):
+        data = zstandard.ZstdCompressor().compress(path.read_bytes())
+        path.with_name(f"{path.name}.zstd").write_bytes(data)
+        path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("plugin", "change"),
+    [
+        (StoragePlugin.SQLITE3, _with_other_profiles),
+        (StoragePlugin.SQLITE3, _without_metadata),
+        (StoragePlugin.SQLITE3, _compressed),
+        (StoragePlugin.MCAP, _compressed),
+    ],
+)
+def test_we_read_what_rosbag2_and_users_make_of_it(
+    tmp_path: Path, plugin: StoragePlugin, change: Callable[[Path], None]
+) -> None:
+    with RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=STORE)
+        for number in range(20):
+            writer.write(connection, START_NS + number, text(str(number)))
+    change(tmp_path / "bag")
+    bag = open_bag(tmp_path / "bag")
+    assert [item.data for item in read(bag)] == [text(str(number)) for number in range(20)]
+    assert bag.summary.counts["/chat"] == 20
+    assert list(bag.warnings) == []
+    assert all(Path(path).exists() for path in bag.files)
+
+
+def test_files_of_other_programs(tmp_path: Path) -> None:
+    """Types of ROS 1, other encodings and missing statistics are kept as they are."""
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        writer = Writer(stream, use_statistics=False)
+        writer.start()
+        schema = writer.register_schema("std_msgs/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/chat", "cdr", schema)
+        writer.add_message(channel, 1, text("a"), 1)
+        schema = writer.register_schema("Pose", "jsonschema", b"{}")
+        channel = writer.register_channel("/pose", "json", schema)
+        writer.add_message(channel, 2, b"{}", 2)
+        writer.finish()
+    first = open_bag(tmp_path / "a.mcap")
+    assert first.warnings == []
+    write_bag([first], Selection(), tmp_path / "b", SplitLimits())
+    for bag in (first, open_bag(tmp_path / "b")):
+        topics = bag.summary.topics
+        assert topics["/chat"].type_name == "std_msgs/msg/String"
+        facts = topics["/pose"]
+        assert (facts.type_name, facts.encoding, facts.message_encoding, facts.definition) == (
+            *("Pose", "jsonschema", "json", "{}"),
+        )
+        assert [item.data for item in read(bag)] == [text("a"), b"{}"]
 
 
 _ENDLESS = """
