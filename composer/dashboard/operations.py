@@ -17,6 +17,7 @@ from composer.dashboard.channels.topics import shown_qos
 from composer.dashboard.context import Dashboard, Operation, Prepared
 from composer.dashboard.declared import required
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe
+from composer.dashboard.recordings import RECORDINGS
 from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:
@@ -288,6 +289,28 @@ def fields(values: Values, _: Dashboard) -> Prepared:
     return run, _DESCRIBED_WITHIN_S
 
 
+def record(values: Values, _: Dashboard) -> Prepared:
+    """Begin or end to record topics of the ROS graph."""
+    is_on, topics = values.flag("on"), values.texts("topics", _MAX_ITEMS)
+
+    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
+        del ros
+        return {"message": RECORDINGS.record(topics) if is_on else RECORDINGS.stop("record")}
+
+    return run, _CHANGE_S
+
+
+def replay(values: Values, _: Dashboard) -> Prepared:
+    """Begin to publish a bag, or end it."""
+    is_on, bag = values.flag("on"), values.text("bag", "")
+
+    def run(ros: RosGraph, _: Deadline) -> dict[str, Any]:
+        del ros
+        return {"message": RECORDINGS.replay(bag) if is_on else RECORDINGS.stop("replay")}
+
+    return run, _CHANGE_S
+
+
 OPERATIONS: dict[str, Operation] = {
     "node": Operation(node),
     "plan": Operation(plan),
@@ -300,4 +323,6 @@ OPERATIONS: dict[str, Operation] = {
     "call": Operation(call, changes=True),
     "publish": Operation(publish, changes=True),
     "set_parameter": Operation(set_parameter, changes=True),
+    "record": Operation(record, changes=True),
+    "replay": Operation(replay, changes=True),
 }

@@ -12,6 +12,7 @@ from composer.dashboard.context import Dashboard, Options
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.forms import Forms
+from composer.dashboard.recordings import RECORDINGS
 from composer.dashboard.ros_side import RosSide
 from composer.dashboard.web.app import make_app
 from composer.dashboard.web.server import listen, serve
@@ -76,6 +77,7 @@ def run_dashboard(
     try:
         serve(make_app(dashboard), listening, prepare)
     finally:
+        RECORDINGS.close()
         ros.close(_LEAVES_WITHIN_S)
 
 

@@ -27,11 +27,16 @@ from composer.rules.types import TYPE_MISMATCH
 
 
 @dataclass(frozen=True, slots=True)
-class _Recorded:
-    """What the metadata of a bag say: the types of its topics, and how long it is."""
+class Recorded:
+    """What the metadata of a bag say: the types of its topics, its length, start and messages.
+
+    ``start_s`` is in seconds since 1970.
+    """
 
     types: Mapping[str, str]
     duration_s: float
+    start_s: float = 0.0
+    messages: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +65,7 @@ def check_replays(context: Context) -> Iterator[Diagnostic]:
             hint = suggestion(path.name, siblings)
             yield Diagnostic(UNREADABLE_FILE, f"there is no bag '{name}'", name.span, hint=hint)
             continue
-        recorded = _recorded(path)
+        recorded = read_metadata(path)
         if recorded is None:
             continue
         start_s = replay.start_s
@@ -81,21 +86,23 @@ def _topics(context: Context, replaced: tuple[str, ...]) -> Mapping[str, _Topic]
     }
 
 
-def _recorded(path: Path) -> _Recorded | None:
+def read_metadata(path: Path) -> Recorded | None:
     """Return what is in a bag; None if that is not known."""
     try:
         content = read_regular(path / "metadata.yaml", MAX_BYTES)
         tree, _, _ = parse_bytes(content, "metadata.yaml")
         metadata = None if tree is None else tree.get("rosbag2_bagfile_information")
         facts: Any = None if metadata is None else plain(metadata)
-        return _Recorded(
+        return Recorded(
             {
                 item["topic_metadata"]["name"]: item["topic_metadata"]["type"]
                 for item in facts["topics_with_message_count"]
             },
             facts["duration"]["nanoseconds"] / 1e9,
+            facts.get("starting_time", {}).get("nanoseconds_since_epoch", 0) / 1e9,
+            int(facts.get("message_count", 0)),
         )
-    except (OSError, ValueError, TypeError, LookupError):  # it may contain anything
+    except (OSError, ValueError, TypeError, LookupError, AttributeError):  # it may contain anything
         return None
 
 
@@ -109,7 +116,7 @@ def _unknown_nodes(context: Context, replay: Replay) -> Iterator[Diagnostic]:
 
 
 def _listed(
-    replay: Replay, recorded: _Recorded, topics: Mapping[str, _Topic]
+    replay: Replay, recorded: Recorded, topics: Mapping[str, _Topic]
 ) -> Iterator[Diagnostic]:
     """Check the topics that are listed."""
     for pattern in replay.topics:
@@ -138,7 +145,7 @@ def _conflict(topic: Located[str], publishers: tuple[PortOfNode, ...]) -> Diagno
 
 
 def _played(
-    name: Located[str], replay: Replay, recorded: _Recorded, topics: Mapping[str, _Topic]
+    name: Located[str], replay: Replay, recorded: Recorded, topics: Mapping[str, _Topic]
 ) -> Iterator[Diagnostic]:
     """Check that something is played, and its types."""
     received = {

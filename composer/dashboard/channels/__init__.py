@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from composer.dashboard.channels.bags import BagsFeed
 from composer.dashboard.channels.graph import LiveFeed, PictureFeed
 from composer.dashboard.channels.messages import EchoFeed, ImageFeed, LogFeed, PlotFeed
 from composer.dashboard.channels.nodes import NodesFeed, ParametersFeed, TimingFeed
@@ -31,4 +32,5 @@ CHANNELS: dict[str, Callable[[Values, Declared | None], Feed]] = {
     "goal": GoalFeed,
     "parameters": ParametersFeed,
     "log": LogFeed,
+    "bags": BagsFeed,
 }

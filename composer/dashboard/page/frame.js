@@ -13,6 +13,7 @@ const VIEWS = [
   ["parameters", "Parameters", "Params"],
   ["log", "Log", "Log"],
   ["timing", "Timing", "Timing"],
+  ["bags", "Bags", "Bags"],
 ];
 const COMMANDS = {
   startup: { label: "Start up" },
@@ -135,7 +136,7 @@ export function createFrame(app) {
     }));
   }
 
-  /** 1 ... 7 show a view, / goes to its search field. */
+  /** 1 ... 8 show a view, / goes to its search field. */
   function listenToKeys(go) {
     document.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return;

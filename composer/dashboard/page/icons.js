@@ -9,6 +9,7 @@ const PATHS = {
   parameters: "M2.5 4.5h6m3 0h2M2.5 11.5h2m3 0h6M8.5 3v3h3V3zM4.5 10v3h3v-3z",
   log: "M3 3.5h10M3 6.5h7M3 9.5h10M3 12.5h5",
   timing: "M8 2.5a5.5 5.5 0 1 0 0 11 5.5 5.5 0 0 0 0-11zM8 5v3.2l2.2 1.6",
+  bags: "M2.5 8a5.5 5.5 0 1 0 11 0 5.5 5.5 0 0 0-11 0zM6 8a2 2 0 1 0 4 0 2 2 0 0 0-4 0z",
   pause: "M5.5 3.5v9M10.5 3.5v9",
   resume: "M5 3.5v9l7.5-4.5z",
   startup: "M5 3.5v9l7.5-4.5z",

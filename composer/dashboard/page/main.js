@@ -16,6 +16,7 @@ const VIEWS = {
   parameters: () => import("./views/parameters.js"),
   log: () => import("./views/log.js"),
   timing: () => import("./views/timing.js"),
+  bags: () => import("./views/bags.js"),
 };
 /** How long a page may be hidden before it stops receiving. */
 const HIDDEN_MS = 3000;

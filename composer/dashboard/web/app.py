@@ -40,7 +40,7 @@ AsgiSend = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 _TRY_AGAIN_LATER = 1013
 _METHODS = ("GET", "HEAD")
 #: The addresses of the views; the page reads the rest of the path.
-_VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing")
+_VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing", "bags")
 #: The page shares a folder with Python code.
 _SUFFIXES = (".css", ".html", ".js", ".svg", ".txt", "LICENSE")
 _MAX_PATH = 200

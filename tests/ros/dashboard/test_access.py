@@ -167,6 +167,8 @@ def test_a_read_only_dashboard_changes_nothing(server: Dashboard) -> None:
             ("call", {"service": "/a", "request": {}}),
             ("publish", {"topic": "/a", "type": "std_msgs/msg/String", "message": {}}),
             ("set_parameter", {"node": "/a", "name": "b", "value": 1}),
+            ("record", {"on": True}),
+            ("replay", {"on": True, "bag": "a"}),
             ("subscribe", {"channel": "goal", "params": {"action": "/a", "type": "t", "goal": {}}}),
             (
                 "subscribe",

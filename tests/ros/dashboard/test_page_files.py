@@ -8,7 +8,18 @@ import pytest
 
 from composer.dashboard.web.app import file_of_page, index_of
 
-VIEWS = ("", "graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing")
+VIEWS = (
+    "",
+    "graph",
+    "nodes",
+    "topics",
+    "services",
+    "actions",
+    "parameters",
+    "log",
+    "timing",
+    "bags",
+)
 _LINK = re.compile(r'<link rel="modulepreload" href="/page/([^"]+)">')
 
 

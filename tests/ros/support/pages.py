@@ -14,9 +14,11 @@ if TYPE_CHECKING:
 
 PATIENCE_MS = 60_000
 SIZE: ViewportSize = {"width": 1280, "height": 800}
-VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing")
+VIEWS = ("graph", "nodes", "topics", "services", "parameters", "log", "timing", "bags")
 #: What a view shows once its data has arrived.
-_READY = ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head"
+_READY = (
+    ".data tbody tr:visible, .world, .log li, .detail:visible .detail-head, .empty .hint:visible"
+)
 
 
 @contextmanager
