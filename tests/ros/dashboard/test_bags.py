@@ -26,7 +26,7 @@ pytestmark = pytest.mark.browser
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """The folder of the dashboard, with what is no bag, or not in the folder."""
+    """The folder of the dashboard, also with a folder that is not a bag, and a link."""
     bags = tmp_path / "work" / "bags"
     (bags / "notes").mkdir(parents=True)
     (tmp_path / "elsewhere").mkdir()
