@@ -37,6 +37,7 @@ class Matcher:
         #: The last message, answer or log line of the right name or node that is not such an event.
         self.other: Received | Answer | LogLine | None = None
         self._explain: Callable[[], str] = str
+        self._describe: Callable[[], str] = str
 
     @property
     def states(self) -> Mapping[str, str]:
@@ -96,6 +97,7 @@ class Matcher:
                 return self._differs(entry, lambda: reason)
             if not is_right:
                 return self._differs(entry, lambda: ", ".join(_values(expression, scope)))
+            self._describe = lambda: ", ".join(_values(expression, scope))
         if condition.fields is not None:
             wanted = evaluate(condition.fields, scope)
             differences = _differences(wanted, message, condition.tolerance)
@@ -106,6 +108,11 @@ class Matcher:
     def _differs(self, entry: Received | Answer | LogLine, explain: Callable[[], str]) -> bool:
         self.other, self._explain = entry, explain
         return False
+
+    @property
+    def values(self) -> str:
+        """The values in the last event that met ``where``; empty without ``where``."""
+        return self._describe()
 
     @property
     def difference(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from math import inf
 
 from composer.base.fast_dataclass import dataclass
@@ -186,16 +187,20 @@ def _silence(expectation: Expectation, record: Record, window: Window) -> Differ
     [event] = expectation.events
     start_s = record.start_s if window.first == 0 else window.start_s
     window = Window(window.first, max(start_s, window.start_s), window.end_s)
-    times = [time_s for _, time_s in _matches(record.matcher(event), record, window)]
+    matcher = record.matcher(event)
+    matches = _matches(matcher, record, window)
+    times = [time_s for _, time_s in islice(matches, 1)]
     if not times:
         return None
-    matcher = record.matcher(event)
+    first = f"; in the first one, {matcher.values}" if matcher.values else ""
+    times += [time_s for _, time_s in matches]
     wanted = f"no message on {event.name}{_where(event)}{_when(expectation)}"
-    return wanted, _seen(event, matcher, times, record, window), times[0]
+    return wanted, _seen(event, matcher, times, record, window) + first, times[0]
 
 
 def _order(expectation: Expectation, record: Record, window: Window) -> Difference:
     done: list[str] = []
+    last_s = 0.0
     for event in expectation.events:
         matcher = record.matcher(event)
         found = next(_matches(matcher, record, window, at_start=not done), None)
@@ -204,11 +209,13 @@ def _order(expectation: Expectation, record: Record, window: Window) -> Differen
             after = f"after {' and '.join(done)}, " if done else ""
             times = [at for _, at in _matches(record.matcher(event), record, Window(0, 0.0, inf))]
             seen = f"{after}no {described(event)}"
+            clear_s = window.end_s
             if times:
                 seen += f", only before, at {_since(times[-1], record)} s"
-            return f"{wanted}{_when(expectation)}", seen
-        index, time_s = found
-        done.append(f"{described(event)} at {_since(time_s, record)} s")
+                clear_s = max(times[-1], last_s)
+            return f"{wanted}{_when(expectation)}", seen, clear_s
+        index, last_s = found
+        done.append(f"{described(event)} at {_since(last_s, record)} s")
         window = Window(index + 1, window.start_s, window.end_s)
     return None
 

@@ -60,7 +60,7 @@ MISTAKES = {
         "nodes/planner.py",
         "velocity = min(request.max_velocity, self.parameters.max_velocity)",
         "velocity = 3.0",
-        "1, at",
+        "in the first one, message.twist.twist.linear.x is",
     ),
     "late_alarm": Mistake(
         "nodes/watchdog.yaml",
