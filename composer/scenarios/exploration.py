@@ -201,38 +201,35 @@ def _variations(
     counts = {name: count for name, count in sorted(disturbable.items()) if count}
     timers = {name: count for name, count in counts.items() if not name.startswith("/")}
     topics = {name: counts[name] for name in counts.keys() - timers if not chosen or name in chosen}
-    faults: list[SearchStrategy[list[Fault]]] = []
+    lists: list[SearchStrategy[list[Fault]]] = []
     if bounds.jitter_ms is not None:
         step_s = bounds.jitter_ms.value / 1000.0 / _LATE_STEPS
-        late = strategies.integers(1, _LATE_STEPS).map(lambda steps: round(steps * step_s, 7))
-        faults.append(
-            strategies.lists(_faults({**topics, **timers}, None, late), max_size=_MOST_LATE)
-        )
+        by_s = strategies.integers(1, _LATE_STEPS).map(lambda steps: round(steps * step_s, 7))
+        lists.append(_faults({**topics, **timers}, None, by_s, _MOST_LATE))
     for verb, most in ((Verb.DROP, bounds.drop), (Verb.REORDER, bounds.reorder)):
-        several = strategies.lists(_faults(topics, verb, strategies.just(0.0)), max_size=most)
-        faults.append(several.map(partial(_limited, most)))
+        several = _faults(topics, verb, strategies.just(0.0), most)
+        lists.append(several.map(partial(_limited, most)))
     return strategies.builds(
-        lambda added, *lists: Variation(seed + added, tuple(chain.from_iterable(lists))),
+        lambda added, *faults: Variation(seed + added, tuple(chain.from_iterable(faults))),
         strategies.integers(0, _SEEDS),
-        *faults,
+        *lists,
     )
 
 
 def _faults(
-    counts: Mapping[str, int], verb: Verb | None, by_s: SearchStrategy[float]
-) -> SearchStrategy[Fault]:
-    """Return faults of topics and timers; by default, delays."""
+    counts: Mapping[str, int], verb: Verb | None, by_s: SearchStrategy[float], most: int
+) -> SearchStrategy[list[Fault]]:
+    """Return lists of faults of topics and timers; without a verb, they are late."""
+    if not counts:
+        return strategies.just([])
 
     def faults_of(name: str) -> SearchStrategy[Fault]:
         number = strategies.integers(1, counts[name])
         delay = Verb.DELAY if name.startswith("/") else Verb.DELAY_TIMER
         return strategies.builds(partial(Fault, verb or delay, name), number, number, by_s)
 
-    return (
-        strategies.sampled_from(sorted(counts)).flatmap(faults_of)
-        if counts
-        else strategies.nothing()
-    )
+    one = strategies.sampled_from(sorted(counts)).flatmap(faults_of)
+    return strategies.lists(one, max_size=most)
 
 
 def _limited(most: int, faults: Sequence[Fault]) -> list[Fault]:

@@ -106,8 +106,13 @@ def test_a_race_is_found_and_can_be_repeated(tmp_path: Path) -> None:
     seen = re.findall("seen: .*", explored)
     assert len(seen) == len(RACES)
     assert re.findall("seen: .*", _compose_test(tmp_path).stdout) == seen
-    seeds = SCENARIO.replace("explore: BOUNDS\n", "")  # only the seed varies
-    paths[0].write_text(seeds)
+    # Where nothing can be varied but the seed.
+    (tmp_path / "race.yaml").write_text(
+        "system: race\nnodes: {node: {on_activate: {log: started}}}\n"
+    )
+    bounds = "{jitter_ms: 5, drop: 1, reorder: 1}"
+    scenario = SCENARIO.replace("BOUNDS", bounds).partition("expect:")[0]
+    paths[0].write_text(scenario)
     done = _compose_test(tmp_path, "--explore", "3", str(paths[0]))
     assert re.fullmatch("passed .*, 3 variations\n", done.stdout)
     assert {path.name for path in tmp_path.iterdir()} == {"composer.yaml", "race.yaml", "scenarios"}
