@@ -88,7 +88,7 @@ def test_a_class_of_each_kind(tmp_path: Path) -> None:
         system.transition("counter", "activate")
         system.set_parameter("talker", "word", "changed")
         system.kill("sleeper")
-        system.advance(1.0)
+        system.advance(1.005)
         assert nodes["counter"].count == count + 100
         assert system.states["sleeper"] == "unconfigured"
     assert system.outcome is not None
