@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from itertools import count
 from math import inf
 from types import FrameType
 from typing import Any
@@ -158,7 +159,8 @@ class Instance(UserCode):
         self.transition_thread: threading.Thread | None = None
         self._contexts: dict[object, NodeContext] = {}
         self._own_groups: dict[CallbackGroup, OwnGroup] = {}
-        self._timer_names: dict[str, int] = {}
+        #: The names of the timers that exist now: counters are kept by name.
+        self.timer_names: set[str] = set()
 
     @property
     def contexts(self) -> tuple[NodeContext, ...]:
@@ -194,8 +196,10 @@ class Instance(UserCode):
     def timer_name(self, callback: object) -> str:
         """Return a name for a timer that has no other one: that of its callback."""
         name = "rate" if callback is None else name_of(callback).rpartition(".")[2]
-        number = self._timer_names[name] = self._timer_names.get(name, 0) + 1
-        return name if number == 1 else f"{name}_{number}"
+        names = (name if number == 1 else f"{name}_{number}" for number in count(1))
+        free = next(name for name in names if name not in self.timer_names)
+        self.timer_names.add(free)
+        return free
 
     def begin(self, entity: object, port: RunningPort, *, always_on: bool = False) -> None:
         """Add the port of an entity, and activate it if the node is active."""

@@ -93,6 +93,8 @@ def test_a_class_of_each_kind(tmp_path: Path) -> None:
         assert system.states["sleeper"] == "unconfigured"
     assert system.outcome is not None
     assert all(node.errors == 0 for node in system.outcome.nodes)
+    timers = [item for item in system.outcome.callbacks if item.kind == "timer"]
+    assert [item.name for item in timers if item.node == "/sleeper"] == ["on_timer", "rate"]
 
 
 def test_the_same_run_whatever_the_hash_seed(tmp_path: Path) -> None:

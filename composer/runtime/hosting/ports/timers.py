@@ -104,6 +104,7 @@ class HostedTimerPort(TimerPort):
         self.follow()
         if self._is_rate:
             self._tick()
+        self._instance.timer_names.discard(self._statistics.name)
         Node.destroy_timer(self._instance.node, self._timer)
 
     def follow(self) -> None:
