@@ -55,7 +55,8 @@ def flood(node: Node, topic: str, count: str, depth: str) -> object:
     """
     publisher = node.create_publisher(Int64, topic, int(depth))
     until = time.monotonic() + PATIENCE_S
-    while publisher.get_subscription_count() == 0 and time.monotonic() < until:
+    while publisher.get_subscription_count() == 0:
+        assert time.monotonic() < until, "no subscription"
         time.sleep(0.01)
     for number in range(int(count)):
         publisher.publish(Int64(data=number))
