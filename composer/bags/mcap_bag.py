@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.reader import SeekingReader
 from mcap.records import Attachment as AttachmentRecord
-from mcap.records import Channel, Chunk, Message, Schema, Statistics
+from mcap.records import Channel, Chunk, ChunkIndex, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary as McapSummary
 from mcap.writer import MCAP0_MAGIC
@@ -32,7 +32,13 @@ from composer.base.regular_files import open_regular
 
 #: A longer record is taken for damage.
 _LONGEST_RECORD_BYTES = 2**30
+#: A few kilobytes of zstd can stand for gigabytes. Writers make chunks of one to four megabytes.
+_LARGEST_CHUNK_BYTES = 2**28
 _COMPRESSIONS = ("", "zstd", "lz4")
+
+
+class _TooLargeChunk(Exception):
+    """A chunk that would take much memory; the text says how much."""
 
 
 @dataclass(slots=True)
@@ -94,9 +100,9 @@ def _open_mcap(path: Path) -> _McapFile:
         try:
             found = SeekingReader(stream, record_size_limit=_LONGEST_RECORD_BYTES).get_summary()
             if found is not None and found.statistics is not None:
-                _check_compressions(item.compression for item in found.chunk_indexes)
+                _check_chunks(found.chunk_indexes)
                 return _McapFile(path, _summary(found, found.statistics))
-        except UnsupportedCompressionError:
+        except (UnsupportedCompressionError, _TooLargeChunk):
             raise
         except Exception:  # whatever the library raises for the wrong bytes
             problem = "its end is missing or damaged"
@@ -104,11 +110,17 @@ def _open_mcap(path: Path) -> _McapFile:
         return _McapFile(path, _scanned_summary(stream), has_index=False, problem=problem)
 
 
-def _check_compressions(names: Iterable[str]) -> None:
-    """Raise UnsupportedCompressionError; the library takes other chunks for uncompressed ones."""
-    for name in names:
-        if name not in _COMPRESSIONS:
-            raise UnsupportedCompressionError(name)
+def _check_chunks(chunks: Iterable[Chunk | ChunkIndex]) -> None:
+    """Raise UnsupportedCompressionError, or _TooLargeChunk.
+
+    The library takes chunks with an unknown compression for uncompressed ones.
+    """
+    for chunk in chunks:
+        if chunk.compression not in _COMPRESSIONS:
+            raise UnsupportedCompressionError(chunk.compression)
+        if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
+            size, most = chunk.uncompressed_size >> 20, _LARGEST_CHUNK_BYTES >> 20
+            raise _TooLargeChunk(f"it has a chunk of {size:,} MB, more than {most} MB")
 
 
 def _summary(found: McapSummary, statistics: Statistics) -> Summary:
@@ -159,9 +171,9 @@ def _batches(stream: BinaryIO) -> Iterator[list[Any]]:
                 return
             batch = [record]
             if isinstance(record, Chunk):
-                _check_compressions([record.compression])
+                _check_chunks([record])
                 batch = breakup_chunk(record, validate_crc=True)
-        except UnsupportedCompressionError:
+        except (UnsupportedCompressionError, _TooLargeChunk):
             raise
         except Exception:  # whatever the library raises for the wrong bytes
             return
