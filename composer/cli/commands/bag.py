@@ -24,6 +24,7 @@ from composer.cli.support.bags import (
     bag_errors,
     opened,
     selection,
+    size_text,
     tolerances,
 )
 from composer.cli.support.errors import FAILED
@@ -58,7 +59,7 @@ def info(bag: BagPath, *, json: Json = False) -> None:
     start = f"{datetime.fromtimestamp(summary.start_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC"
     shown = [
         f"files:     {', '.join(map(str, found.files))}",
-        f"size:      {size / 1e6:.1f} MB",
+        f"size:      {size_text(size)}",
         f"start:     {start if count else '-'}",
         f"duration:  {summary.duration_s:.3f} s",
         f"messages:  {count}",
@@ -167,4 +168,4 @@ def _write(
 
         bags: list[Bag] = [opened(path) for path in paths]
         writer = write_bag(bags, chosen, folder, split_limits(*split))
-    write(f"{writer.count} messages, {writer.size_bytes / 1e6:.1f} MB: {folder}")
+    write(f"{writer.count} messages, {size_text(writer.size_bytes)}: {folder}")

@@ -15,6 +15,7 @@ from composer.cli.support.bags import (
     Topics,
     bag_errors,
     show_progress,
+    size_text,
 )
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
@@ -210,6 +211,6 @@ def _receive(
 
 def _facts(writer: BagWriter, recorder: Recorder) -> str:
     return (
-        f"{writer.count} messages, {writer.size_bytes / 1e6:.1f} MB,"
+        f"{writer.count} messages, {size_text(writer.size_bytes)},"
         f" {recorder.dropped} dropped: {writer.folder}"
     )

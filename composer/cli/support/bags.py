@@ -147,6 +147,11 @@ def tolerances(value: float, time_s: float | None, ignored: list[str] | None) ->
     return Tolerances(value, inf if time_s is None else time_s, tuple(ignored or ()))
 
 
+def size_text(size_bytes: int) -> str:
+    """Return a size in kB or MB."""
+    return f"{size_bytes / 1e3:.1f} kB" if size_bytes < 1e6 else f"{size_bytes / 1e6:.1f} MB"
+
+
 def show_progress(text: str) -> None:
     """Replace the last line of a terminal."""
     if sys.stderr.isatty():
