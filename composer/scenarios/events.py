@@ -12,7 +12,7 @@ from composer.model.scenario import Condition, EventKind
 from composer.runtime.ros.messages import to_plain
 from composer.runtime.supervision.events import Event, StateChanged
 from composer.testing.failures import LogLine, Received, short
-from composer.testing.observation import Answer
+from composer.testing.system_run import Answer
 
 Entry: TypeAlias = "Received | Answer | LogLine | Event"
 

@@ -34,8 +34,8 @@ from composer.runtime.ros.messages import MessageError, convert_message, to_plai
 from composer.scenarios.events import Entry, Matcher, time_of
 from composer.scenarios.expectations import Failure, Record, check, described
 from composer.testing.failures import LogLine, Received, TestFailure, short
-from composer.testing.goal import Goal
-from composer.testing.observation import Answer
+from composer.testing.goals import Goal
+from composer.testing.system_run import Answer
 from composer.testing.system_test import SystemTest
 
 #: Times may differ in the last digits: they are sums.

@@ -23,9 +23,9 @@ from composer.runtime.node.behavior_loader import (
 from composer.runtime.ports import PortSet, RunningPort
 from composer.runtime.ports.timer import TimerPort
 from composer.testing.behavior_context import TestContext
-from composer.testing.behavior_goals import ActionServerPort
 from composer.testing.behavior_ports import ClientPort, PublisherPort, ServicePort, SubscriptionPort
 from composer.testing.failures import TestFailure
+from composer.testing.goals import ActionServerPort
 from composer.testing.message_classes import MessageClasses
 
 

@@ -15,7 +15,7 @@ from composer.runtime.executors.exceptions import describe, is_closing, shown
 from composer.runtime.executors.futures import Cancelled, Future, wrap_future
 from composer.runtime.ports import RunningPort
 from composer.testing.behavior_context import TestContext
-from composer.testing.behavior_goals import ActionServerPort, Outcome, ServedGoal
+from composer.testing.goals import ActionServerPort, Outcome, ServedGoal
 
 T = TypeVar("T")
 

@@ -30,7 +30,6 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.testing.behavior_context import TestContext, VirtualLoop
-from composer.testing.behavior_goals import ActionServerPort, ServedGoal
 from composer.testing.behavior_node import TestNode
 from composer.testing.behavior_ports import ServicePort
 from composer.testing.declarations import ParameterSet, load_node_type
@@ -43,7 +42,7 @@ from composer.testing.failures import (
     unknown,
     unmet,
 )
-from composer.testing.goal import Goal
+from composer.testing.goals import ActionServerPort, Goal, ServedGoal
 from composer.testing.message_classes import MessageClasses
 
 T = TypeVar("T")

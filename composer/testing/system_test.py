@@ -44,9 +44,8 @@ from composer.testing import faults
 from composer.testing.bag_messages import messages_of
 from composer.testing.failures import LogLine, Received, TestFailure, short, unknown, unmet
 from composer.testing.faults import Fault, Faults
-from composer.testing.goal import Goal
-from composer.testing.observation import Answer, Observation
-from composer.testing.system_run import SystemRun, load_system
+from composer.testing.goals import Goal
+from composer.testing.system_run import Answer, Observation, SystemRun, load_system
 from composer.testing.tester import TESTER, Tester, port_to, with_tester
 
 _PARAMETER_WITHIN_S = 5.0

@@ -1,9 +1,9 @@
-"""Action servers in a test: the behavior's own, and those that the test provides for it."""
+"""Goals in a test: those that it sends, and the action servers of a behavior and of its test."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from typing import Any
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallCancelled, GoalRejected
@@ -15,6 +15,8 @@ from composer.testing.behavior_context import TestContext
 
 #: How long handlers may take to end their goals once the node leaves *active*, as in the runtime.
 _CANCEL_LIMIT_S = 1.0
+#: Waits for a future, at most for a time; the text says for what.
+WaitFor: TypeAlias = Callable[[Future[Any], float, str], Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,3 +208,40 @@ class ActionServerPort(RunningPort):
             goal.status = status
         result = self.action_type.Result() if result is None else result
         goal.outcome.set_result(Outcome(goal.status, result))
+
+
+class Goal:
+    """A goal that a test has sent."""
+
+    def __init__(
+        self, wait_for: WaitFor, action: str, sent: Future[Any], feedback: Sequence[Any]
+    ) -> None:
+        self._wait_for = wait_for
+        self._action = action
+        self._sent = sent
+        self._outcome: Future[Any] | None = None
+        #: The feedback so far.
+        self.feedback = feedback
+
+    @property
+    def is_accepted(self) -> bool | None:
+        """Whether the server has accepted the goal; None as long as it has not answered."""
+        if not self._sent.done():
+            return None
+        return self._sent.exception() is None
+
+    def result(self, timeout_s: float = 60.0) -> Any:
+        """Wait for the result; it has ``status`` and ``result``.
+
+        Raises TestFailure after ``timeout_s``, and what the call raises, such as GoalRejected.
+        """
+        if self._outcome is None:
+            sent = self._wait_for(self._sent, timeout_s, f"an answer of {self._action}")
+            self._outcome = sent.result()
+        return self._wait_for(self._outcome, timeout_s, f"the result of {self._action}")
+
+    def cancel(self, timeout_s: float = 5.0) -> bool:
+        """Request to cancel the goal; return whether the server accepts that."""
+        sent = self._wait_for(self._sent, timeout_s, f"an answer of {self._action}")
+        what = f"{self._action} to cancel the goal"
+        return bool(self._wait_for(sent.cancel(), timeout_s, what))
