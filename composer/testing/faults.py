@@ -7,8 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import field
 from functools import partial
-from math import inf
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, Protocol, TypedDict, TypeVar, cast
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, Port
@@ -25,17 +24,28 @@ BeforeHandler = Callable[[str], None]
 R = TypeVar("R")
 
 
+class Limits(TypedDict, total=False):
+    """What a fault of a topic or a timer acts on, by default on all messages or calls.
+
+    The next ``count`` after ``skip`` others, for at most ``for_s`` seconds.
+    """
+
+    skip: int
+    count: float
+    for_s: float
+
+
 @dataclass(slots=True)
 class Fault:
-    """A fault of a topic or a timer, until ``until_s`` (monotonic).
+    """A fault of a topic, for each of its subscriptions, or of a timer; see :class:`Limits`.
 
-    It acts on ``count`` messages for each subscription, or calls, after the next ``skip``.
+    It ends at ``until_s`` (monotonic).
     """
 
     disturb: Disturb
-    skip: int = 0
-    count: float = inf
-    until_s: float = inf
+    skip: int
+    count: float
+    until_s: float
     #: How many messages had come before, by subscription.
     before: Counter[object] = field(default_factory=Counter)
 

@@ -20,7 +20,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, Unpack
 
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -43,7 +43,7 @@ from composer.runtime.supervision.events import Event, Outcome
 from composer.testing import faults
 from composer.testing.bag_messages import messages_of
 from composer.testing.failures import LogLine, Received, TestFailure, short, unknown, unmet
-from composer.testing.faults import Fault, Faults
+from composer.testing.faults import Fault, Faults, Limits
 from composer.testing.goals import Goal
 from composer.testing.system_run import Answer, Observation, SystemRun, load_system
 from composer.testing.tester import TESTER, Tester, port_to, with_tester
@@ -330,70 +330,48 @@ class SystemTest:
 
     # --- faults
 
-    # Each acts on the next ``count`` messages after ``skip`` others, for ``for_s`` at most.
-
-    def drop(self, topic: str, count: float = inf, for_s: float = inf, *, skip: int = 0) -> None:
+    def drop(self, topic: str, **limits: Unpack[Limits]) -> None:
         """Lose messages on a topic."""
-        self._disturb(topic, "drop", Fault(faults.drop, skip, count, for_s))
+        self._disturb(topic, "drop", faults.drop, limits)
 
-    def delay(
-        self, topic: str, delay_s: float, count: float = inf, for_s: float = inf, *, skip: int = 0
-    ) -> None:
+    def delay(self, topic: str, delay_s: float, **limits: Unpack[Limits]) -> None:
         """Deliver messages on a topic late."""
         disturb = faults.delayed(delay_s, self._run.host.nodes[TESTER].loop.call_later)
-        self._disturb(topic, f"delay by {delay_s:g} s", Fault(disturb, skip, count, for_s))
+        self._disturb(topic, f"delay by {delay_s:g} s", disturb, limits)
 
-    def duplicate(
-        self, topic: str, count: float = inf, for_s: float = inf, *, skip: int = 0
-    ) -> None:
+    def duplicate(self, topic: str, **limits: Unpack[Limits]) -> None:
         """Deliver messages on a topic twice."""
-        self._disturb(topic, "duplicate", Fault(faults.duplicate, skip, count, for_s))
+        self._disturb(topic, "duplicate", faults.duplicate, limits)
 
-    def reorder(self, topic: str, count: float = inf, for_s: float = inf, *, skip: int = 0) -> None:
+    def reorder(self, topic: str, **limits: Unpack[Limits]) -> None:
         """Swap each two messages on a topic."""
-        self._disturb(topic, "reorder", Fault(faults.reordered(), skip, count, for_s))
+        self._disturb(topic, "reorder", faults.reordered(), limits)
 
     def corrupt(
-        self,
-        topic: str,
-        change: Callable[[Any], object],
-        count: float = inf,
-        for_s: float = inf,
-        *,
-        skip: int = 0,
+        self, topic: str, change: Callable[[Any], object], **limits: Unpack[Limits]
     ) -> None:
         """Deliver what ``change`` makes of a copy of each message on a topic."""
-        self._disturb(topic, "corrupt", Fault(faults.corrupted(change), skip, count, for_s))
+        self._disturb(topic, "corrupt", faults.corrupted(change), limits)
 
-    def delay_timer(
-        self,
-        node: str,
-        timer: str,
-        delay_s: float,
-        count: float = inf,
-        for_s: float = inf,
-        *,
-        skip: int = 0,
-    ) -> None:
+    def delay_timer(self, node: str, timer: str, delay_s: float, **limits: Unpack[Limits]) -> None:
         """Let calls of a timer come late."""
         found = self._node(node)
         timers = [item.name.value for item in found.model.timers]
         if timer not in timers:
             raise unknown(f"{node} has no timer '{timer}'", timer, timers)
-        fault = Fault(faults.delayed(delay_s, found.loop.call_later), skip, count, for_s)
+        disturb = faults.delayed(delay_s, found.loop.call_later)
         name = faults.timer_name(found.full_name, timer)
-        self._add_fault(name, f"delay by {delay_s:g} s: timer {node}.{timer}", fault)
+        self._add_fault(name, f"delay by {delay_s:g} s: timer {node}.{timer}", disturb, limits)
 
     @property
     def disturbable(self) -> Mapping[str, int]:
         """How many messages and calls faults could have acted on, by topic and ``node.timer``."""
         numbers = self._faults.seen
-        found = {name: number for name, number in numbers.items() if name.startswith("/")}
+        found = {name: number for name, number in numbers.items() if "." not in name}  # topics
         for node in self._system.nodes:
             for timer in node.timers:
-                number = found.pop(faults.timer_name(node.full_name, timer.name.value), 0)
-                if node.name.value != TESTER and number:
-                    found[f"{node.name}.{timer.name}"] = number
+                name = faults.timer_name(node.full_name, timer.name.value)
+                found[f"{node.name}.{timer.name}"] = numbers.get(name, 0)
         return found
 
     def end_faults(self, topic: str) -> None:
@@ -454,14 +432,15 @@ class SystemTest:
     def _port(self, kind: PortKind, full_name: str) -> str:
         return port_to(self._run.host.nodes[TESTER].model, kind, full_name)
 
-    def _disturb(self, topic: str, what: str, fault: Fault) -> None:
+    def _disturb(self, topic: str, what: str, disturb: faults.Disturb, limits: Limits) -> None:
         self._port(PortKind.PUBLISHER, topic)  # there is a subscription
-        self._add_fault(topic, f"{what}: {topic}", fault)
+        self._add_fault(topic, f"{what}: {topic}", disturb, limits)
 
-    def _add_fault(self, name: str, text: str, fault: Fault) -> None:
+    def _add_fault(self, name: str, text: str, disturb: faults.Disturb, limits: Limits) -> None:
         self._observation.on_action(text)
-        fault.until_s += self._run.clock.monotonic()
-        self._faults.add(name, fault)
+        until_s = self._run.clock.monotonic() + limits.get("for_s", inf)
+        skip, count = limits.get("skip", 0), limits.get("count", inf)
+        self._faults.add(name, Fault(disturb, skip, count, until_s))
 
     def _before_handler(
         self, node: str, handler: str | None, act: Callable[[], None], what: str
