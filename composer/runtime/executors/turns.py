@@ -72,7 +72,7 @@ class TurnTaking(BaseLoop):
         self._checked: list[bool] | None = None  # the call that had the turn at the last check
         self._handing_over = threading.Lock()
         self._turns: queue.SimpleQueue[Turn | None] = queue.SimpleQueue()  # for idle threads
-        self._idle: set[threading.Thread] = set()
+        self._idle: list[None] = []  # an item for each idle thread: any of them takes a turn
         self._threads: list[threading.Thread] = []
         self._add_thread(self._turn)
 
@@ -310,7 +310,7 @@ class TurnTaking(BaseLoop):
                     self._free_slots(1)
                 if self._has_turn():
                     return self._turn
-                self._idle.add(threading.current_thread())
+                self._idle.append(None)
                 return self.clock.get(self._turns)
             except BaseException as error:  # an interrupt of a callback that has just returned
                 self.report(f"executor '{self._name}'", error)
