@@ -20,6 +20,7 @@ from benchmarks import (
     page,
     pipeline,
     plot,
+    recording,
     several_processes,
     soak,
     start_up,
@@ -56,6 +57,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[..., list[Row]]]] = {
         "the page of the dashboard with a hundred nodes, in a headless Chromium",
         page.measure,
     ),
+    "recording": ("cost of recording, and speed of a replay", recording.measure),
     "soak": ("memory usage under a long load", soak.measure),
     "tracing": ("cost of recording callback timings", systems.tracing),
 }

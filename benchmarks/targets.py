@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from benchmarks import dashboard, large_systems, live_commands, page, several_processes
+from benchmarks import dashboard, large_systems, live_commands, page, recording, several_processes
 from benchmarks.figures import Row, aligned, ratios, spread
 from benchmarks.rounds import EVENTS, SINGLE, UNTRACED
 
@@ -41,6 +41,9 @@ TARGETS = (
     Target(dashboard.IDLE, "CPU ms/s", dashboard.WITHOUT, 1.02),
     Target(dashboard.WATCHED, "CPU ms/s", dashboard.WITHOUT, 1.3),
     Target(dashboard.STALLED, "p99 us", dashboard.UNWATCHED, 1.05),
+    Target(recording.PUBLISHING, _CPU, recording.SUBSCRIBER, 0.3),
+    Target(recording.PUBLISHING, "p99 us", recording.WITHOUT, 1.05),
+    Target(recording.REPLAY, "s", recording.MINUTE, 1.0),
     Target(several_processes.COMPUTING, "ms/result", several_processes.ONE_PROCESS, 1 / 1.7),
     Target(several_processes.LATENCY, "us/message", SINGLE, 0.8),
     Target(page.FIRST_VIEW, "wall ms", page.ONE_SECOND, 1.0),

@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 from composer_interfaces.action import Navigate
+from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 
 from benchmarks.programs.payloads import make
@@ -115,3 +116,14 @@ class Worker(Relay):
     def on_go(self, goal: Any) -> Navigate.Result:
         """Succeed immediately."""
         return Navigate.Result()
+
+
+class DurationSource(Behavior):
+    """Publishes odometry, and keeps how long each call has taken, in microseconds."""
+
+    durations_us: list[float] = []  # noqa: RUF012 - of the one instance
+
+    def on_tick(self) -> None:
+        begin_ns = time.perf_counter_ns()
+        self.publishers["odometry"].publish(Odometry())
+        self.durations_us.append((time.perf_counter_ns() - begin_ns) / 1000)
