@@ -168,6 +168,8 @@ class Recorder:
         with self._serializing:
             sources = tuple(self._sources.values())
             messages = [item for source in sources for item in source.taken()]
+            if self.problem is not None:
+                return
             messages.sort(key=itemgetter(0, 1))
             for at_ns, _, content, source in messages:
                 try:

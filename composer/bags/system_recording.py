@@ -79,6 +79,7 @@ class SystemRecording:
         self._bag = bag
         self._say = say
         self._interfaces = Interfaces.installed()
+        self._profiles: dict[str, dict[QosProfile, None]] = {}  # of all publishers of a topic
         self._faults: list[str] = []
         self._ring: Ring | None = None
         self._writer: BagWriter | None = None
@@ -120,8 +121,10 @@ class SystemRecording:
         """Return what receives the messages of a topic; None if it is not recorded."""
         if not self._settings.includes(topic):
             return None
+        profiles = self._profiles.setdefault(topic, {})
+        profiles[profile] = None
         definition = full_definition(type_name, self._interfaces)
-        return self._recorder.source(BagTopic(topic, type_name, (profile,), definition))
+        return self._recorder.source(BagTopic(topic, type_name, tuple(profiles), definition))
 
     def save(self, done: Callable[[bool, str], None]) -> None:
         """Write the last seconds; ``done`` receives whether that succeeded, and the folder or why.
