@@ -5,20 +5,12 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from nav_msgs.msg import Odometry
-from rclpy.serialization import serialize_message
-
 from benchmarks.figures import Row
 from benchmarks.processes import ROOT, run_program, wall_time_s
-from composer.bags.bag import NANOSECONDS, BagMessage, BagTopic
-from composer.bags.writer import BagWriter
 
 PUBLISHING, SUBSCRIBER, WITHOUT = "recording, 1000 Hz", "a subscriber that records", "without"
 REPLAY = "replay into pipeline.yaml, an hour at 100 Hz"
 MINUTE = "a minute"
-_TOPIC = BagTopic("/sensor_data", "nav_msgs/msg/Odometry")
-_PERIOD_NS = 10_000_000
-_MESSAGES = 360_000
 _TIMEOUT_S = 300.0
 
 
@@ -45,14 +37,8 @@ def measure(*, long: bool) -> list[Row]:
 
 def _replay() -> Row:
     with tempfile.TemporaryDirectory() as folder:
-        bag = Path(folder) / "hour"
-        writer = BagWriter(bag)
-        writer.add_topic(_TOPIC)
-        data = bytes(serialize_message(Odometry()))
-        for number in range(_MESSAGES):
-            at_ns = NANOSECONDS + number * _PERIOD_NS
-            writer.write(BagMessage(_TOPIC.name, at_ns, at_ns, data))
-        writer.close()
-        words = ("replay", str(bag), "pipeline", "--replace", "sensor_simulator")
+        bag = str(Path(folder) / "hour")
+        run_program("hour_bag", bag, timeout_s=_TIMEOUT_S)
+        words = ("replay", bag, "pipeline", "--replace", "sensor_simulator")
         took_s = wall_time_s("-m", "composer", *words, folder=ROOT)
     return Row(REPLAY, "s", MINUTE, (took_s,), (60.0,))
