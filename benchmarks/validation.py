@@ -1,7 +1,7 @@
 """Scaling of ``compose validate`` with the size of a system.
 
-Two generated systems, one ten times as large as the other, have nodes of a single type with three
-publishers and three subscriptions each. They are validated alternately in new processes. Linear
+Two generated systems, one ten times as large as the other, have nodes of a single type with two
+publishers and two subscriptions each. They are validated alternately in new processes. Linear
 scaling means a ratio of ten, or slightly more because of cache misses.
 """
 
@@ -14,7 +14,7 @@ from benchmarks.figures import Row
 from benchmarks.processes import wall_time_s
 
 SIZES = (200, 2000)
-PORTS_PER_NODE = 3
+PORTS_PER_NODE = 2
 
 NODE_TYPE = """\
 node: worker
@@ -23,20 +23,18 @@ parameters:
 publishers:
   out_0: {type: std_msgs/msg/Float64, qos: sensor_data}
   out_1: {type: std_msgs/msg/Float64, qos: sensor_data}
-  out_2: {type: std_msgs/msg/Float64, qos: sensor_data}
 subscriptions:
   in_0: {type: std_msgs/msg/Float64, qos: sensor_data, log: "{message.data * parameters.gain}"}
   in_1: {type: std_msgs/msg/Float64, qos: sensor_data, log: "{message.data * parameters.gain}"}
-  in_2: {type: std_msgs/msg/Float64, qos: sensor_data, log: "{message.data * parameters.gain}"}
 timers:
   tick:
     period_ms: 100
-    publish: {out_0: {data: "{count * parameters.gain}"}, out_1: {}, out_2: {}}
+    publish: {out_0: {data: "{count * parameters.gain}"}, out_1: {}}
 """
 
 
 def system(nodes: int) -> str:
-    """Return a system file with ``nodes`` nodes and three times as many connections."""
+    """Return a system file with ``nodes`` nodes and twice as many connections."""
     lines = ["system: large", "nodes:"]
     for number in range(nodes):
         waits = f", lifecycle: {{depends_on: [n{number - 1}]}}" if number else ""

@@ -58,7 +58,7 @@ class Source:
     ) -> None:
         """Receive the messages of a topic.
 
-        ``number()`` counts those of all sources: in virtual time, many have the same time.
+        ``number()`` counts the messages of all sources: in virtual time, many have the same time.
         ``on_full()`` may make room, and returns whether it has.
         """
         self.topic = topic

@@ -1,7 +1,7 @@
 """Looks for variations with which a scenario fails: seeds, late, lost and swapped messages.
 
 hypothesis chooses the variations, and shrinks one that fails. A variation consists of steps that
-precede those of the scenario, so that it can be written into the file. Each run is a process.
+precede the steps of the scenario, so that it can be written into the file. Each run is a process.
 """
 
 from __future__ import annotations

@@ -185,7 +185,7 @@ NODE_TYPE = "node: big\npublishers:\n" + "".join(f"  p{n}: {{{STRING}}}\n" for n
 PARAMETERS = ", ".join(f"a{number}: 1" for number in range(5_001))
 LOG = f"log: '{{{' + '.join(['1'] * 30)} + ${{i}}}}'"
 TOO_MANY_VALUES = (
-    "with this node, the nodes declare more than 250,000 values, counting expressions by "
+    "with this node, the nodes declare more than 400,000 values, counting expressions by "
     "their length"
 )
 

@@ -37,8 +37,8 @@ MAX_INCLUDES = 5_000
 #: Keys, values, maps and lists in all files that a system includes, again for each include.
 MAX_INCLUDED_VALUES = 200_000
 
-#: Keys and values that the nodes of a system declare, those of a node type for each of its nodes.
-MAX_DECLARED_VALUES = 250_000
+#: Keys and values that the nodes of a system declare; each node counts its node type again.
+MAX_DECLARED_VALUES = 400_000
 
 #: Node names that the patterns of a system stand for.
 MAX_MATCHES = 50_000

@@ -91,7 +91,7 @@ class SystemContext:
 
 @dataclass(slots=True)
 class DeclaredValues:
-    """The number of keys and values that nodes declare, those of a node type for each node."""
+    """The number of keys and values that nodes declare; each node counts its node type again."""
 
     count: int = 0
 

@@ -65,7 +65,7 @@ class ServerInProcess(Generic[S]):
         self._port = port
         self._find = find
         self._is_isolated = context.loop.clock.is_isolated
-        #: Returns the number of a request that stays in the process: those of rcl are positive.
+        #: Returns the number of a request that stays in the process. Numbers of rcl are positive.
         self.next_number: Callable[[], int] = count(-1, -1).__next__
 
     def for_request(self) -> S | None:
