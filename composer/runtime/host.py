@@ -79,8 +79,6 @@ from composer.runtime.supervision.virtual_time import (
 )
 
 _KEY_BYTES = 32
-#: The watchdog comes after the timer of a shutdown that hangs.
-_WATCHDOG_MARGIN_S = 1.0
 
 
 class Host:
@@ -167,14 +165,10 @@ class Host:
         if isinstance(self._clock, VirtualClock):
             parts = (self._clock, self._node_set, lambda: queue.stopping)
             watched = watched_time(*parts, self._warn, self._fail)
-        watchdog: AbstractContextManager[None] = nullcontext()
-        if ends_process and isinstance(queue.wakeup, WakeupSocket):
-            limit_s = self._options.grace_s + _WATCHDOG_MARGIN_S
-            watchdog = signal_watchdog(queue.wakeup.read_fd, limit_s)
         lock: AbstractContextManager[None] = nullcontext()
         if not is_isolated:  # otherwise the same system may run at the same time
             lock = hold_instance_lock(namespace, variables, self._report_key)
-        with lock, watchdog, signals, servers, watched:
+        with lock, signals, servers, watched:
             self._limits.limit_start()
             try:
                 with self._segment():
@@ -239,7 +233,8 @@ class Host:
     def _run(self, manager: ManagerNode) -> None:
         try:
             if self._create(manager.process_context):
-                self._bring_up_and_supervise()
+                with self._watchdog():
+                    self._bring_up_and_supervise()
         finally:
             self._limits.limit_end()
             self._end.tear_down(is_created=self._is_created)
@@ -247,6 +242,16 @@ class Host:
             manager.retire(linger=bool(self._shutdown_commands))
             if not self._end.leave_graph():
                 manager.destroy()
+
+    def _watchdog(self) -> AbstractContextManager[None]:
+        """Return the block in which the main thread reads signals from its socket at once.
+
+        What comes before and after has time limits of its own, and reads them late.
+        """
+        wakeup = self._main_queue.wakeup
+        if not self._options.ends_process or not isinstance(wakeup, WakeupSocket):
+            return nullcontext()
+        return signal_watchdog(wakeup.read_fd, self._options.grace_s)
 
     def _longest_bring_up_s(self) -> float:
         """Return how long it may take, one step after the other, and the same for a roll-back.
