@@ -168,7 +168,8 @@ def test_few_ended_goals_are_kept(
         handles = [navigator.send(float(number)) for number in range(10)]
         outcomes = [navigator.result(handle) for handle in handles]
         wait_until(lambda: statuses, "a list of goals")
-    assert max(len(item.status_list) for item in statuses) <= 3
+    # On several threads, the next goal may be accepted before the last one has left the list.
+    assert max(len(item.status_list) for item in statuses) <= 5
     assert [result.message for _, result in outcomes[-3:]] == ["7.0", "8.0", "9.0"]
     assert {status for status, _ in outcomes[:4]} == {GoalStatus.STATUS_UNKNOWN}
 
