@@ -140,7 +140,7 @@ _KIND_OF_KEY = {
 
 
 def check_discovery_setting(context: Context) -> Iterator[Diagnostic]:
-    """Check that the keys of discovery are those of its kind."""
+    """Check that each key of discovery belongs to its kind."""
     discovery = context.system.discovery
     if discovery is None:
         return

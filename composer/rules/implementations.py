@@ -70,7 +70,7 @@ _SUFFIXES = frozenset({".yaml", ".yml"})
 
 
 def check_node_type_name(context: Context) -> Iterator[Diagnostic]:
-    """Compare the names of a node type, and of those of nodes, with the names of their files."""
+    """Compare the name of a node type, or the types of nodes, with the names of their files."""
     system = context.system
     if system.node_type:
         yield from _compare_with_file(system.name)

@@ -124,7 +124,7 @@ class ObservedProcess:
 class Snapshot:
     """The nodes of the graph. Endpoints for tools are left out.
 
-    ``processes`` are those of running systems, if they were asked for.
+    ``processes`` are the processes of running systems, if a caller has asked for them.
     """
 
     nodes: tuple[ObservedNode, ...]

@@ -1,4 +1,4 @@
-"""What a recorder receives of ports: messages, calls of services, and goals of actions.
+"""What a recorder receives of nodes: messages, calls of services, goals, and transitions.
 
 Calls and goals have the form of ROS 2's service introspection: a message on
 ``<service>/_service_event`` for each request and each response.
@@ -14,6 +14,7 @@ from typing import Any
 from action_msgs.msg import GoalInfo
 from action_msgs.srv import CancelGoal
 from builtin_interfaces.msg import Time
+from lifecycle_msgs.msg import TransitionDescription, TransitionEvent
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
 from service_msgs.msg import ServiceEventInfo
 from unique_identifier_msgs.msg import UUID
@@ -29,7 +30,7 @@ from composer.runtime.intra_process.topic import CopyingTarget
 
 _SERVER = ServiceEventInfo.REQUEST_RECEIVED, ServiceEventInfo.RESPONSE_SENT
 _CLIENT = ServiceEventInfo.REQUEST_SENT, ServiceEventInfo.RESPONSE_RECEIVED
-#: rmw's profile of services.
+#: rmw's profile of services, and rcl's of transition events.
 _PROFILE = QosProfile(depth=10)
 _NANOSECONDS = 1_000_000_000
 
@@ -43,6 +44,23 @@ def tap_of(
     """Return what records messages of a port; None if they are not recorded."""
     tap = None if recorder is None else recorder.tap(topic, type_name, profile)
     return CopyingTarget(tap) if tap is not None and port.isolation is Isolation.COPY else tap
+
+
+def transition_tap(
+    recorder: Recorder | None, node: str, clock: Clock
+) -> Callable[[TransitionDescription], None] | None:
+    """Return what records steps of the lifecycle of a node; None if they are not recorded."""
+    topic, type_name = f"{node}/transition_event", "lifecycle_msgs/msg/TransitionEvent"
+    target = None if recorder is None else recorder.tap(topic, type_name, _PROFILE)
+    if target is None:
+        return None
+
+    def put(step: TransitionDescription) -> None:
+        event = TransitionEvent(timestamp=clock.time_ns(), transition=step.transition)
+        event.start_state, event.goal_state = step.start_state, step.goal_state
+        target.put(event)
+
+    return put
 
 
 class CallTap:

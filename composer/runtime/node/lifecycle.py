@@ -13,7 +13,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
-from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
+from lifecycle_msgs.msg import State, Transition, TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -24,7 +24,6 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from composer.behavior import TransitionFailed
 from composer.model.lifecycle import TRANSITIONS
-from composer.model.qos import QosProfile
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.exceptions import (
     describe,
@@ -36,7 +35,7 @@ from composer.runtime.executors.exceptions import (
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.tasks import within
-from composer.runtime.host_options import Tap
+from composer.runtime.intra_process.taps import transition_tap
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
@@ -92,11 +91,9 @@ class Lifecycle:
         self._last_state = ""
         self._repeats = RepeatLimit(loop.clock)
         self._pending_reply: list[Reply] = []  # of the change_state request for it, if any
-        self._tap: Tap | None = None
-        if context.router.recorder is not None:
-            topic = f"{node.get_fully_qualified_name()}/transition_event"
-            type_name = "lifecycle_msgs/msg/TransitionEvent"
-            self._tap = context.router.recorder.tap(topic, type_name, QosProfile(depth=10))
+        self._tap = transition_tap(
+            context.router.recorder, node.get_fully_qualified_name(), loop.clock
+        )
         with node.handle:
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
         self._services: list[Service] = []
@@ -235,11 +232,7 @@ class Lifecycle:
                 for item in entries
                 if transition in (item.transition.id, item.transition.label)
             )
-            event = TransitionEvent(
-                timestamp=self._loop.clock.time_ns(), transition=step.transition
-            )
-            event.start_state, event.goal_state = step.start_state, step.goal_state
-            self._tap.put(event)
+            self._tap(step)
         if isinstance(transition, int):
             self._machine.trigger_transition_by_id(transition, True)
         else:

@@ -173,7 +173,7 @@ def hosted_future(instance: Instance, error: BaseException) -> HostedFuture:
 
 
 def fail(future: RclpyFuture, error: BaseException) -> None:
-    """Fail a future. rclpy prints exceptions that are never retrieved; this one need not be."""
+    """Fail a future. rclpy prints exceptions that are never retrieved, but not this one."""
     future.set_exception(error)
     future.exception()
 
