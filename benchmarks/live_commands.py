@@ -34,10 +34,10 @@ COMMANDS = (
     "lifecycle set planner activate",
     "lifecycle set arm configure",
     "lifecycle set arm cleanup",
-    "pause pipeline",
-    "resume pipeline",
-    "reset pipeline",
-    "up pipeline",
+    "lifecycle pause pipeline",
+    "lifecycle resume pipeline",
+    "lifecycle reset pipeline",
+    "lifecycle startup pipeline",
 )
 
 

@@ -6,9 +6,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from benchmarks import targets
+from benchmarks import live_commands, targets
 from benchmarks.figures import Row, Spread, as_json, percentile, ratios, spread, table
 from benchmarks.plot import chart
+from tests.cli.compose import compose
 
 
 def row(
@@ -89,6 +90,11 @@ def test_the_chart_has_a_bar_per_ratio_and_none_for_failures() -> None:
     bars = svg.findall("{*}rect")[1:]  # the first is the background
     assert len(bars) == 2
     assert "chain, N=3, us, baseline rclpy: 0.2" in [item.text for item in svg.iter()]
+
+
+@pytest.mark.parametrize("words", live_commands.COMMANDS)
+def test_measured_commands_exist(words: str) -> None:
+    assert compose(*words.split(), "--help").code == 0
 
 
 def test_targets_are_compared_with_measurements() -> None:
