@@ -6,8 +6,10 @@ import argparse
 import json
 import os
 import platform
+import sys
 import sysconfig
 import time
+import traceback
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -83,10 +85,16 @@ def _run(names: list[str], *, long: bool) -> None:
     load_before = os.getloadavg()[0]
     began_s = time.monotonic()
     rows: list[Row] = []
+    failed: list[str] = []
     for name in names:
         purpose, measure = BENCHMARKS[name]
         print(f"==> {name}: {purpose}", flush=True)
-        measured = measure(long=long)
+        try:
+            measured = measure(long=long)
+        except Exception:  # the others are still worth their time
+            print(traceback.format_exc(), flush=True)
+            failed.append(name)
+            continue
         print(table(measured), end="\n\n", flush=True)  # in case the run is interrupted
         rows += measured
     if reached := targets.table(rows):
@@ -98,6 +106,8 @@ def _run(names: list[str], *, long: bool) -> None:
     chart = path.with_suffix(".svg")
     chart.write_text(plot.chart(rows), encoding="utf-8")
     print(f"Results: {path}, chart of the ratios: {chart}")
+    if failed:
+        sys.exit(f"Failed: {', '.join(failed)}")
 
 
 def _write(rows: list[Row], load_before: float, *, long: bool) -> Path:

@@ -32,7 +32,7 @@ WATCHED = "pipeline.yaml, graph in one browser"
 STALLED = "timer callback, image client that reads nothing"
 WITHOUT = "the same without a dashboard"
 UNWATCHED = "the same without a client"
-_URL = re.compile(rb"http://([\d.]+:(\d+))/\?token=([\w-]+)")
+_URL = re.compile(rb"http://([\d.]+:\d+)/\?token=([\w-]+)")
 _TIMEOUT_S = 30.0
 _IDLE_SLICE_S, _IDLE_PAIRS = 2.0, (30, 100)
 #: What the system needs alone differs by a factor of up to two between slices; see README.md.
@@ -211,15 +211,15 @@ def running_dashboard(
 
 
 def _connected(address: re.Match[bytes]) -> connect:
-    """Return the connection of a browser, for a ``with`` block."""
-    host, port, token = (part.decode() for part in address.groups())
+    """Return a connection with the token, for a ``with`` block."""
+    host, token = (part.decode() for part in address.groups())
     # An extra, which the targets do without.
     from websockets.sync.client import connect  # noqa: PLC0415 - not everywhere
 
     return connect(
         f"ws://{host}/ws",
         origin=f"http://{host}",
-        additional_headers={"Cookie": f"compose_dashboard_{port}={token}"},
+        additional_headers={"Authorization": f"Bearer {token}"},
         compression=None,
         max_size=None,
         close_timeout=0.1,  # of a client that reads nothing
