@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.declared import Declared, required
 from composer.dashboard.feeds import Feed
-from composer.dashboard.observing.reports import ReportPairs
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
 from composer.runtime.metrics.figures import CountedRate
@@ -121,7 +120,6 @@ class LiveFeed(Feed):
     follows_reports = True
 
     def __init__(self, _: Values, __: Declared | None) -> None:
-        self._pairs = ReportPairs()
         self._measured: set[str] = set()
         self._rates: dict[str, CountedRate] = {}  # by the keys of edges
         #: What the topics to measure depend on.
@@ -147,16 +145,14 @@ class LiveFeed(Feed):
         edges: dict[str, Any] = {}
         reported: set[str] = set()
         for report in reports.values():
-            reported |= {topic for node in report.nodes for topic in (*node.sent, *node.received)}
-        for pair in self._pairs.update(reports).values():
-            known = {} if pair.before is None else {node.node: node for node in pair.before.nodes}
-            for node in pair.now.nodes:
-                edges |= self._edges(node, known.get(node.node), pair.now.at_s)
+            for node in report.nodes:
+                reported.update(node.sent, node.received)
+                edges |= self._edges(node, report.at_s)
         self._rates = {key: rate for key, rate in self._rates.items() if key in edges}
         topics = self._measure(reported)
         yield Update(to_json({"nodes": nodes, "edges": edges, "topics": topics}))
 
-    def _edges(self, node: NodeReport, before: NodeReport | None, now_s: float) -> dict[str, Any]:
+    def _edges(self, node: NodeReport, now_s: float) -> dict[str, Any]:
         """Return the rates of the topics of a node by the keys of their edges."""
         found: dict[str, Any] = {}
         for kind, counts in (("publisher", node.sent), ("subscription", node.received)):
@@ -166,9 +162,7 @@ class LiveFeed(Feed):
                 rate.read(count, now_s)
                 edge: dict[str, Any] = {"rate_hz": rate.current_hz(now_s)}
                 if kind == "subscription":
-                    total = node.dropped.get(topic, 0)
-                    known = total if before is None else before.dropped.get(topic, 0)
-                    edge |= {"dropped": max(0, total - known), "dropped_total": total}
+                    edge["dropped_total"] = node.dropped.get(topic, 0)
                 found[key] = edge
         return found
 

@@ -1,14 +1,13 @@
-"""The reports of running systems, and pairs of them from which rates follow."""
+"""The reports of running systems."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from composer.base.fast_dataclass import dataclass
 from composer.client.session import Deadline
 from composer.client.systems.local_queries import local_report
 from composer.client.systems.managers import Systems
@@ -22,8 +21,6 @@ _SYSTEMS_PERIOD_S = 3.0
 #: Managers report every second.
 _SILENT_S = 5.0
 _FIRST_WITHIN_S = 1.0
-#: Managers report every second, and at each change: those are too close for a rate.
-_APART_S = 0.5
 
 
 class SystemReports:
@@ -105,34 +102,3 @@ class SystemReports:
         if self._systems is not None:
             self._systems.close()
             self._systems = None
-
-
-@dataclass(frozen=True, slots=True)
-class ReportPair:
-    """Two reports of a system; ``before`` is None for the first one."""
-
-    before: SystemReport | None
-    now: SystemReport
-
-
-class ReportPairs:
-    """The last two reports of each system that are far enough apart."""
-
-    def __init__(self) -> None:
-        self._pairs: dict[str, ReportPair] = {}
-
-    def update(self, reports: Mapping[str, SystemReport | None]) -> dict[str, ReportPair]:
-        """Add the current reports; return the pair of each system that has reported."""
-        pairs: dict[str, ReportPair] = {}
-        for name, report in reports.items():
-            if report is None:
-                continue
-            known = self._pairs.get(name)
-            if known is None or known.now.pid != report.pid:
-                pairs[name] = ReportPair(None, report)
-                continue
-            passed_s = report.at_s - known.now.at_s
-            is_new = passed_s >= _APART_S or passed_s < 0.0
-            pairs[name] = ReportPair(known.now, report) if is_new else known
-        self._pairs = pairs
-        return pairs
