@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_full_topic_name import validate_full_topic_name
@@ -11,13 +11,8 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from composer.base.diagnostics import nearest
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.model.names import is_hidden, topic_name_problem
-from composer.runtime.protocol.requests import (
-    ActionInfo,
-    NameAndTypes,
-    NodeInfo,
-    visible_names,
-)
-from composer.runtime.ros_graph.node_endpoints import action_info, node_info
+from composer.runtime.protocol.requests import NameAndTypes, visible_names
+from composer.runtime.ros_graph.node_endpoints import details
 
 T = TypeVar("T")
 
@@ -40,16 +35,14 @@ class GraphNames:
             return ()  # they belong to this session
         return found if hidden else visible_names(found)
 
-    def node(self, name: str, *, hidden: bool = False) -> NodeInfo:
-        """Return the endpoints of a node. Raises NotFoundError."""
-        full_name = self.find_node(name)
-        return self._settled(lambda: node_info(self._graph, full_name, hidden=hidden))
+    def details(self, kind: str, name: str) -> dict[str, Any]:
+        """Return a node, topic or action with its endpoints, as plain data.
 
-    def action(self, name: str) -> ActionInfo:
-        """Return the servers and clients of an action. Raises NotFoundError."""
-        types = self.types("action", name)
-        absolute = full_name("action", name)
-        return self._settled(lambda: action_info(self._graph, absolute, types))
+        Raises NotFoundError.
+        """
+        types = () if kind == "node" else self.types(kind, name)
+        found = self.find_node(name) if kind == "node" else full_name(kind, name)
+        return self._settled(lambda: details(self._graph, kind, found, types))
 
     def find_node(self, name: str) -> str:
         """Return the full name of the node that ``name`` refers to. Raises NotFoundError."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from typing import Any, Self, TypeVar
 
 from rclpy.context import Context
@@ -35,7 +35,6 @@ from composer.runtime.ros_graph.graph import (
 )
 
 T = TypeVar("T")
-H = TypeVar("H", bound=Hashable)
 
 _SPIN_S = 0.01
 #: How long to wait for the first other node, which may be on another computer.
@@ -186,7 +185,7 @@ class Session:
                 return found
             self.spin_once(deadline)
 
-    def wait_until_settled(self, poll: Callable[[], H], deadline: Deadline) -> H:
+    def wait_until_settled(self, poll: Callable[[], T], deadline: Deadline) -> T:
         """Return the result of ``poll`` once discovery is complete, or at the deadline."""
         last_change = _LastChange()
         while True:
@@ -195,7 +194,7 @@ class Session:
                 return found
             self.spin_once(deadline)
 
-    def search(self, poll: Callable[[], H | None], deadline: Deadline) -> H | None:
+    def search(self, poll: Callable[[], T | None], deadline: Deadline) -> T | None:
         """Return the first result of ``poll`` that is not None.
 
         Returns None once discovery is complete, or at the deadline.
@@ -230,10 +229,10 @@ class _LastChange:
     """When a polled value last changed."""
 
     def __init__(self) -> None:
-        self._value: Hashable = None
+        self._value: object = None
         self._at_s = time.monotonic()
 
-    def at_s(self, value: Hashable) -> float:
+    def at_s(self, value: object) -> float:
         """Return when the value last changed (seconds, time.monotonic), given its current value."""
         if value != self._value:
             self._value, self._at_s = value, time.monotonic()

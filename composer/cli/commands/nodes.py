@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
@@ -63,28 +62,21 @@ def add_list(app: typer.Typer, kind: str) -> None:
     app.command("list", help=f"List {kind}s.", epilog=epilog)(list_names)
 
 
-def described(kind: str, name: str, timeout: float, *, hidden: bool = False) -> dict[str, Any]:
+def described(kind: str, name: str, timeout: float) -> dict[str, Any]:
     """Return the endpoints of a node, topic or action, for JSON.
 
     A running system on this computer answers at once; without one, join the ROS graph.
     """
     require_ros(f"compose {kind}")
-    from composer.client.systems.local_queries import local_action, local_node, local_topic
+    from composer.client.systems.local_queries import local_details
 
-    if kind == "node":
-        local = local_node(name, timeout, hidden=hidden)
-    else:
-        local = (local_topic if kind == "topic" else local_action)(name, timeout)
+    local = local_details(kind, name, timeout)
     if local is not None:
         return local
     with ros_session(f"compose {kind}", timeout) as (session, deadline):
         from composer.client.graph_names import GraphNames
-        from composer.client.messages.topics import Topics
 
-        if kind == "topic":
-            return Topics(session, deadline).info(name).plain()
-        names = GraphNames(session, deadline)
-        return asdict(names.action(name) if kind == "action" else names.node(name, hidden=hidden))
+        return GraphNames(session, deadline).details(kind, name)
 
 
 node_app = command_group("List and inspect running nodes.")
@@ -113,7 +105,11 @@ def node_info(
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Print the topics, services and actions of a node."""
-    node = described("node", name, timeout, hidden=hidden)
+    from composer.model.names import is_hidden
+
+    node = described("node", name, timeout)
+    for _, key in _NODE_SECTIONS if not hidden else ():
+        node[key] = [item for item in node[key] if not is_hidden(item[0])]
     if json:
         write(as_json(node, indent=2))
         return

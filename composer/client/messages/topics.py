@@ -24,7 +24,6 @@ from composer.client.shared_session import SampledTopic
 from composer.model.qos import Durability, QosProfile, strictest_compatible
 from composer.runtime.metrics.figures import MessageRate
 from composer.runtime.ros.qos_profiles import rclpy_profile
-from composer.runtime.ros_graph.endpoints import TopicInfo
 
 _SUBSCRIPTION_DEPTH = 1000
 _ACKNOWLEDGED_WITHIN_S = 1
@@ -63,16 +62,7 @@ class Topics:
 
     def __init__(self, session: Session, deadline: Deadline) -> None:
         self._session = session
-        self._deadline = deadline
         self._names = GraphNames(session, deadline)
-
-    def info(self, name: str) -> TopicInfo:
-        """Return the publishers and subscriptions of a topic. Raises NotFoundError."""
-        types = self._names.types("topic", name)
-        absolute = full_name("topic", name)
-        return self._session.wait_until_settled(
-            lambda: self._session.graph.topic(absolute, types), self._deadline
-        )
 
     def type_of(self, name: str) -> str:
         """Return the type of a topic. Raises NotFoundError; RosError if there is more than one."""

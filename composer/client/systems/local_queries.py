@@ -8,7 +8,7 @@ here as well.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from composer.base.characters import visible
@@ -21,23 +21,20 @@ from composer.runtime.process.query_socket import ask
 from composer.runtime.protocol.codec import decode
 from composer.runtime.protocol.reports import SystemReport, split_signature
 from composer.runtime.protocol.requests import (
-    ActionQuery,
+    DetailsAnswer,
+    DetailsQuery,
     EndpointsAnswer,
     EndpointsQuery,
     GraphAnswer,
     GraphQuery,
     GraphView,
     NameAndTypes,
-    NodeInfo,
-    NodeQuery,
     NodesAnswer,
     NodesQuery,
     ParameterDescription,
     ParametersAnswer,
     ParametersQuery,
     StatusQuery,
-    TopicAnswer,
-    TopicQuery,
     visible_names,
 )
 
@@ -145,30 +142,14 @@ def local_endpoints() -> tuple[Mapping[str, tuple[ObservedEndpoint, ...]], list[
     return None if answer is None else (answer.endpoints, list(answer.nodes))
 
 
-def local_node(name: str, timeout_s: float, *, hidden: bool) -> dict[str, Any] | None:
-    """Return the endpoints of a node, by the names of the fields of NodeInfo."""
-    full_name = _find(name, timeout_s)
-    if full_name is None:
-        return None
-    found: NodeInfo | None = _ask_any(NodeQuery(full_name), timeout_s)
+def local_details(kind: str, name: str, timeout_s: float) -> dict[str, Any] | None:
+    """Return a node, topic or action that :meth:`GraphNames.details` would return."""
+    full_name = name if name.startswith("/") else f"/{name}"
+    found = _find(name, timeout_s) if kind == "node" else full_name
     if found is None:
         return None
-    return {
-        key: value if hidden or isinstance(value, str) else visible_names(value)
-        for key, value in asdict(found).items()
-    }
-
-
-def local_topic(name: str, timeout_s: float) -> dict[str, Any] | None:
-    """Return the endpoints of a topic, as :meth:`TopicInfo.plain` does."""
-    answer: TopicAnswer | None = _ask_any(TopicQuery(_absolute(name)), timeout_s)
-    return None if answer is None else dict(answer.topic)
-
-
-def local_action(name: str, timeout_s: float) -> dict[str, Any] | None:
-    """Return the nodes with servers and clients of an action, by the names of ActionInfo."""
-    found = _ask_any(ActionQuery(_absolute(name)), timeout_s)
-    return None if found is None else asdict(found)
+    answer: DetailsAnswer | None = _ask_any(DetailsQuery(kind, found), timeout_s)
+    return None if answer is None else dict(answer.details)
 
 
 def local_parameters(name: str, timeout_s: float) -> LocalParameters | None:
@@ -248,10 +229,6 @@ def local_state(name: str, timeout_s: float) -> str | None:
     reports = (_ask_report(system, timeout_s) for system in local_systems())
     nodes = (node for report in reports if report is not None for node in report.nodes)
     return next((node.state for node in nodes if node.node == full_name), None)
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith("/") else f"/{name}"
 
 
 def _ask_any(query: Any, timeout_s: float, response_s: float = RESPONSE_S) -> Any:

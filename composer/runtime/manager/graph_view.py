@@ -18,28 +18,24 @@ from composer.runtime.process.query_socket import Answer
 from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import (
     KINDS,
-    ActionInfo,
-    ActionQuery,
+    DetailsAnswer,
+    DetailsQuery,
     EndpointsAnswer,
     EndpointsQuery,
     GraphAnswer,
     GraphQuery,
     GraphView,
-    NodeInfo,
-    NodeQuery,
     NodesAnswer,
     NodesQuery,
     ParameterDescription,
     ParametersAnswer,
     ParametersQuery,
     StatusQuery,
-    TopicAnswer,
-    TopicQuery,
 )
 from composer.runtime.ros.parameter_values import plain_value
 from composer.runtime.ros_graph.changes import PolledGraphChanges
 from composer.runtime.ros_graph.graph import SETTLE_S, RosGraph
-from composer.runtime.ros_graph.node_endpoints import action_info, endpoints, node_info, node_names
+from composer.runtime.ros_graph.node_endpoints import details, endpoints, node_names
 
 #: How long to wait for a process that has just started; commands wait longer than that.
 _COMPLETE_WITHIN_S = 0.4
@@ -118,25 +114,18 @@ class GraphObserver:
                 return None
             COMPUTER.sleep(_POLL_S)
 
-    def node(self, name: str) -> NodeInfo:
-        """Return the endpoints of a node, including hidden ones."""
-        return node_info(RosGraph(self._node), name, hidden=True)
+    def details(self, kind: str, name: str) -> DetailsAnswer | None:
+        """Return a node, topic or action; None if there is no such one, or as for `view`.
 
-    def topic(self, name: str) -> TopicAnswer | None:
-        """Return the endpoints of a topic; None as for `view`, or if there is no such topic."""
-        types = self._types("topic", name)
+        `nodes` has just returned the node that is asked for, so the view need not be complete.
+        """
+        types: tuple[str, ...] | None = ()
+        if kind != "node":
+            view = self.view()
+            types = None if view is None else dict(view.names[kind]).get(name)
         if types is None:
             return None
-        return TopicAnswer(RosGraph(self._node).topic(name, types).plain())
-
-    def action(self, name: str) -> ActionInfo | None:
-        """Return the nodes of an action; None as for `view`, or if there is no such action."""
-        types = self._types("action", name)
-        return None if types is None else action_info(RosGraph(self._node), name, types)
-
-    def _types(self, kind: str, name: str) -> tuple[str, ...] | None:
-        view = self.view()
-        return None if view is None else dict(view.names[kind]).get(name)
+        return DetailsAnswer(details(RosGraph(self._node), kind, name, types))
 
     def endpoints(self) -> EndpointsAnswer | None:
         """Return the endpoints of all nodes, and the names of all nodes; None as for `nodes`.
@@ -203,9 +192,7 @@ class ManagerQueries:
         return {
             GraphQuery: lambda _: self._graph.view(),
             NodesQuery: lambda _: self._graph.nodes(),
-            NodeQuery: lambda query: self._graph.node(query.name),
-            TopicQuery: lambda query: self._graph.topic(query.name),
-            ActionQuery: lambda query: self._graph.action(query.name),
+            DetailsQuery: lambda query: self._graph.details(query.kind, query.name),
             EndpointsQuery: lambda _: self._graph.endpoints(),
             StatusQuery: self._status,
             ParametersQuery: self._node_parameters,

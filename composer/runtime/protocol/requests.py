@@ -72,57 +72,19 @@ class NodesQuery:
 
 
 @dataclass(frozen=True, slots=True)
-class NodeInfo:
-    """The endpoints of a node, by name."""
+class DetailsAnswer:
+    """A node, topic or action with its endpoints, as ``ros_graph/node_endpoints.py`` has them."""
 
-    name: str
-    subscriptions: tuple[NameAndTypes, ...]
-    publishers: tuple[NameAndTypes, ...]
-    services: tuple[NameAndTypes, ...]
-    clients: tuple[NameAndTypes, ...]
-    action_servers: tuple[NameAndTypes, ...]
-    action_clients: tuple[NameAndTypes, ...]
+    details: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class NodeQuery:
-    """Asks for the endpoints of a node, by its full name."""
+class DetailsQuery:
+    """Asks for the endpoints of a node, topic or action (``kind``), by its full name."""
 
+    kind: str
     name: str
-    Answer: ClassVar = NodeInfo
-
-
-@dataclass(frozen=True, slots=True)
-class TopicAnswer:
-    """A topic and its endpoints, as plain data for JSON."""
-
-    topic: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class TopicQuery:
-    """Asks for the endpoints of a topic, by its full name."""
-
-    name: str
-    Answer: ClassVar = TopicAnswer
-
-
-@dataclass(frozen=True, slots=True)
-class ActionInfo:
-    """The nodes with a server or client of an action."""
-
-    name: str
-    types: tuple[str, ...]
-    servers: tuple[str, ...]
-    clients: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ActionQuery:
-    """Asks for the nodes of an action, by its full name."""
-
-    name: str
-    Answer: ClassVar = ActionInfo
+    Answer: ClassVar = DetailsAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +140,7 @@ class ParametersQuery:
 
 
 QUERIES = (
-    *(GraphQuery, NodesQuery, NodeQuery, TopicQuery, ActionQuery),
+    *(GraphQuery, NodesQuery, DetailsQuery),
     *(EndpointsQuery, StatusQuery, ParametersQuery),
 )
 

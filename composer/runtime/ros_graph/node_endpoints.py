@@ -2,48 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import TypeAlias
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeAlias
 
 from composer.model import PortKind
 from composer.model.names import is_hidden, join_node_name, split_node_name
 from composer.plan.drift import ObservedEndpoint
-from composer.runtime.protocol.requests import (
-    ActionInfo,
-    NameAndTypes,
-    NodeInfo,
-    visible_names,
-)
-from composer.runtime.ros_graph.graph import RosGraph
+from composer.runtime.protocol.requests import NameAndTypes
+from composer.runtime.ros_graph.graph import NodeName, RosGraph
+
+#: The endpoints of a node, by the keys under which they are listed.
+_QUERIES: Mapping[str, Callable[[RosGraph, NodeName], list[NameAndTypes]]] = {
+    "subscriptions": RosGraph.subscriptions_of,
+    "publishers": RosGraph.publishers_of,
+    "services": RosGraph.services_of,
+    "clients": RosGraph.clients_of,
+    "action_servers": RosGraph.action_servers_of,
+    "action_clients": RosGraph.action_clients_of,
+}
 
 
-def node_info(graph: RosGraph, full_name: str, *, hidden: bool) -> NodeInfo:
-    """Return the endpoints of a node; those of ROS itself only if ``hidden``."""
-    namespace, name = split_node_name(full_name)
-    queries = (
-        graph.subscriptions_of,
-        graph.publishers_of,
-        graph.services_of,
-        graph.clients_of,
-        graph.action_servers_of,
-        graph.action_clients_of,
-    )
-    return NodeInfo(full_name, *(_sorted(query((name, namespace)), hidden) for query in queries))
+def details(graph: RosGraph, kind: str, name: str, types: tuple[str, ...]) -> dict[str, Any]:
+    """Return a node, topic or action, by its full name, with its endpoints, as plain data.
 
-
-def _sorted(found: Iterable[NameAndTypes], hidden: bool) -> tuple[NameAndTypes, ...]:
-    return tuple(sorted(found if hidden else visible_names(found)))
-
-
-def action_info(graph: RosGraph, name: str, types: tuple[str, ...]) -> ActionInfo:
-    """Return the nodes of an action, by its full name, that are discovered now."""
+    The endpoints of a node have their types, and hidden ones are included.
+    """
+    if kind == "topic":
+        return graph.topic(name, types).plain()
+    if kind == "node":
+        namespace, base_name = split_node_name(name)
+        where = (base_name, namespace)
+        return {"name": name} | {
+            key: sorted(query(graph, where)) for key, query in _QUERIES.items()
+        }
     servers, clients = [], []
     for node, _ in graph.names("node"):
         namespace, base_name = split_node_name(node)
         where = (base_name, namespace)
         servers += [node for found, _ in graph.action_servers_of(where) if found == name]
         clients += [node for found, _ in graph.action_clients_of(where) if found == name]
-    return ActionInfo(name, types, tuple(servers), tuple(clients))
+    return {"name": name, "types": list(types), "servers": servers, "clients": clients}
 
 
 #: The order of endpoints of a node.

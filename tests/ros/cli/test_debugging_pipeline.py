@@ -17,13 +17,11 @@ from std_msgs.msg import String
 from composer.client.graph_names import GraphNames
 from composer.client.session import Deadline, Session
 from composer.client.systems.local_queries import (
-    local_action,
+    local_details,
     local_names,
-    local_node,
     local_parameters,
     local_report,
     local_reports,
-    local_topic,
 )
 from composer.runtime.protocol.requests import KINDS
 from tests.ros.support.commands import (
@@ -115,9 +113,8 @@ def test_each_query_is_answered_without_the_graph(
     timed = wait_until(lambda: local_report("pipeline", PATIENCE_S, callbacks=True), "the report")
     planner = wait_until(lambda: local_parameters("planner", PATIENCE_S), "the parameters")
     assert planner.values(["max_velocity"]) == {"max_velocity": 1.0}
-    wait_until(lambda: local_node("planner", PATIENCE_S, hidden=False), "the endpoints of a node")
-    wait_until(lambda: local_topic("sensor_data", PATIENCE_S), "the endpoints of a topic")
-    wait_until(lambda: local_action("navigate", PATIENCE_S), "the nodes of an action")
+    for kind, name in (("node", "planner"), ("topic", "sensor_data"), ("action", "navigate")):
+        wait_until(lambda kind=kind, name=name: local_details(kind, name, PATIENCE_S), name)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # as if the system ran elsewhere
     (system,) = json.loads(listed(('"callbacks"',), "ps", "--json"))["systems"]
     expected = {item["name"] for node in system["nodes"] for item in node["callbacks"]}

@@ -16,12 +16,12 @@ from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 from composer.runtime.protocol.requests import (
     QUERIES,
+    DetailsAnswer,
+    DetailsQuery,
     EndpointsAnswer,
     EndpointsQuery,
     GraphAnswer,
     GraphQuery,
-    NodeInfo,
-    NodeQuery,
     NodesAnswer,
     NodesQuery,
     ParameterDescription,
@@ -33,8 +33,7 @@ from composer.runtime.protocol.requests import (
 LIMIT_S = 60.0
 VIEW = {"node": (("/a", ()),), "topic": (), "service": (), "action": ()}
 SPEED = ParameterDescription("p", "double", "", "", False, None, None, None)
-HIDDEN = ("/_ask", ("x/srv/Ask",))
-NODE = NodeInfo("/a", (), (), (HIDDEN, ("/ask", ("x/srv/Ask",))), (), (), ())
+NODE = {"name": "/a", "services": [["/ask", ["x/srv/Ask"]]]}
 REPORT = SystemReport("robot", "running", (NodeReport("/a", "active", state="active"),), "vm", "7")
 
 
@@ -47,7 +46,8 @@ def answers(
     for limit in ("RESPONSE_S", "_ENDPOINTS_S"):  # what takes longer is not an answer
         monkeypatch.setattr(local_queries, limit, LIMIT_S)
     found: dict[Any, Any] = dict.fromkeys(QUERIES)
-    found |= {GraphQuery: GraphAnswer(VIEW), NodesQuery: NodesAnswer(("/a",)), NodeQuery: NODE}
+    found |= {GraphQuery: GraphAnswer(VIEW), NodesQuery: NodesAnswer(("/a",))}
+    found |= {DetailsQuery: DetailsAnswer(NODE)}
     found |= {ParametersQuery: ParametersAnswer({}), StatusQuery: REPORT}
     with hold_instance_lock("/robot"):
         queries = {kind: lambda _, kind=kind: found[kind] for kind in found}
@@ -59,9 +59,8 @@ def answers(
 def all_answers() -> list[Any]:
     return [
         local_queries.local_names("node", LIMIT_S),
-        local_queries.local_node("a", LIMIT_S, hidden=True),
-        local_queries.local_topic("a", LIMIT_S),
-        local_queries.local_action("a", LIMIT_S),
+        local_queries.local_details("node", "a", LIMIT_S),
+        local_queries.local_details("topic", "a", LIMIT_S),
         local_queries.local_parameters("a", LIMIT_S),
         local_queries.local_report("robot", LIMIT_S),
         local_queries.local_reports(LIMIT_S),
@@ -73,14 +72,11 @@ def all_answers() -> list[Any]:
 def test_a_system_that_is_not_certain_is_left_to_the_graph(answers: dict[Any, Any]) -> None:
     assert local_queries.local_state("a", LIMIT_S) == "active"
     answers.update(dict.fromkeys(answers))
-    assert all_answers() == [None] * 9
+    assert all_answers() == [None] * 8
 
 
-def test_hidden_names_are_left_out(answers: dict[Any, Any]) -> None:
-    for hidden, services in ((True, NODE.services), (False, (("/ask", ("x/srv/Ask",)),))):
-        found = local_queries.local_node("a", LIMIT_S, hidden=hidden)
-        assert found is not None
-        assert found["services"] == services
+def test_details_are_those_that_were_sent(answers: dict[Any, Any]) -> None:
+    assert local_queries.local_details("node", "a", LIMIT_S) == NODE
 
 
 def test_a_name_of_two_nodes_is_left_to_the_graph(answers: dict[Any, Any]) -> None:
