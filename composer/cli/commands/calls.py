@@ -20,7 +20,7 @@ from composer.cli.support.options import (
     Timeout,
     command_group,
     examples,
-    finite,
+    quantity,
     yaml_or_stdin,
 )
 from composer.cli.support.ros import ros_session
@@ -55,13 +55,12 @@ def call(
     stdin: Stdin = False,
     rate: Annotated[
         float | None,
-        typer.Option(
+        quantity(
+            "HZ",
             "--rate",
             "-r",
-            min=0.001,
-            callback=finite,
-            metavar="HZ",
             help="Repeat the call until Ctrl-C, this often per second.",
+            min=0.001,
         ),
     ] = None,
     json: Json = False,
@@ -119,11 +118,9 @@ def send_goal(
     json: Json = False,
     result_timeout: Annotated[
         float | None,
-        typer.Option(
+        quantity(
+            "SECONDS",
             "--result-timeout",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
             help="Cancel the goal if it has not ended by then.",
             show_default="no limit",
         ),

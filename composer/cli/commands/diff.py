@@ -19,7 +19,7 @@ from composer.cli.support.options import (
     Settings,
     Timeout,
     examples,
-    finite,
+    quantity,
 )
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import SystemName, runnable_system
@@ -69,12 +69,7 @@ def diff(
     ] = False,
     grace: Annotated[
         float,
-        typer.Option(
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
-            help="Ignore differences that last no longer than this.",
-        ),
+        quantity("SECONDS", "--grace", help="Ignore differences that last no longer than this."),
     ] = _GRACE_S,
     timeout: Timeout = _TIMEOUT_S,
 ) -> None:

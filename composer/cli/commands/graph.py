@@ -12,7 +12,7 @@ import typer
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.name_values import complete_system_or_argument, split_arguments
 from composer.cli.support.new_files import write_file
-from composer.cli.support.options import Timeout, examples, finite
+from composer.cli.support.options import Timeout, examples, quantity
 from composer.cli.support.system_arguments import load_system, system_file
 from composer.cli.support.terminal import say, write_bytes
 from composer.graph.diagram import FORMATS_BY_SUFFIX, Format, View
@@ -79,10 +79,9 @@ def graph(
     ] = False,
     measure: Annotated[
         float,
-        typer.Option(
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
+        quantity(
+            "SECONDS",
+            "--measure",
             help="With --live: time to measure message rates. 0 disables it.",
         ),
     ] = _MEASURE_S,

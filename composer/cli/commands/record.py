@@ -18,7 +18,7 @@ from composer.cli.support.bags import (
     size_text,
 )
 from composer.cli.support.errors import CommandError, UsageError
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, finite
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, quantity
 from composer.cli.support.ros import ros_session
 from composer.cli.support.system_arguments import AnyRunningSystem, running_system_name
 from composer.cli.support.terminal import say, write
@@ -74,14 +74,7 @@ def record(
     ] = None,
     run_for: Annotated[
         float | None,
-        typer.Option(
-            "--for",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
-            help="Stop after this time.",
-            show_default="until Ctrl-C",
-        ),
+        quantity("SECONDS", "--for", help="Stop after this time.", show_default="until Ctrl-C"),
     ] = None,
     now: Annotated[
         bool,

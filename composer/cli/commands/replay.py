@@ -25,7 +25,7 @@ from composer.cli.support.bags import (
 )
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.name_values import Arguments
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Settings, Timeout, examples, finite
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Settings, Timeout, examples, quantity
 from composer.cli.support.ros import require_interfaces, require_modules, require_ros, ros_session
 from composer.cli.support.system_arguments import complete_system, runnable_system
 from composer.cli.support.terminal import Keys, lines, say, write
@@ -62,14 +62,7 @@ def replay(
     duration: Duration = None,
     rate: Annotated[
         float,
-        typer.Option(
-            "--rate",
-            "-r",
-            min=0.001,
-            callback=finite,
-            metavar="FACTOR",
-            help="Speed of the replay.",
-        ),
+        quantity("FACTOR", "--rate", "-r", help="Speed of the replay.", min=0.001),
     ] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", "-l", help="Start again at the end.")] = False,
     clock: Annotated[

@@ -26,8 +26,8 @@ from composer.cli.support.options import (
     Settings,
     UseSimTime,
     examples,
-    finite,
     given_options,
+    quantity,
 )
 from composer.cli.support.process import require_dashboard
 from composer.cli.support.ros import (
@@ -88,13 +88,7 @@ def run(
     ] = False,
     run_for: Annotated[
         float | None,
-        typer.Option(
-            "--for",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
-            help="Shut down this long after the end of the bring-up.",
-        ),
+        quantity("SECONDS", "--for", help="Shut down this long after the end of the bring-up."),
     ] = None,
     time: Annotated[
         Time,
@@ -105,11 +99,11 @@ def run(
     ] = Time.REAL,
     speed: Annotated[
         float | None,
-        typer.Option(
-            metavar="FACTOR",
-            min=0.001,
-            callback=finite,
+        quantity(
+            "FACTOR",
+            "--speed",
             help="Let virtual time pass this many times as fast as real time.",
+            min=0.001,
             show_default="no limit",
         ),
     ] = None,
@@ -177,11 +171,9 @@ def run(
     ] = False,
     timeout: Annotated[
         float | None,
-        typer.Option(
+        quantity(
+            "SECONDS",
             "--timeout",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
             help="Maximum time for the bring-up; then the system is shut down.",
             show_default="no limit; 60 with --wait",
         ),
@@ -203,13 +195,7 @@ def run(
     ] = False,
     grace: Annotated[
         float,
-        typer.Option(
-            "--grace",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
-            help="Maximum time for shutdown.",
-        ),
+        quantity("SECONDS", "--grace", help="Maximum time for shutdown."),
     ] = 10.0,
 ) -> None:
     """Run a system.

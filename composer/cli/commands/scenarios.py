@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import FAILED, CommandError, UsageError
-from composer.cli.support.options import examples, finite
+from composer.cli.support.options import examples, quantity
 from composer.cli.support.ros import require_interfaces, require_modules, require_ros
 from composer.cli.support.system_arguments import nearest_path, path_exists
 from composer.cli.support.terminal import say, use_color, write, write_raw
@@ -107,13 +107,7 @@ def test(
     ] = False,
     timeout: Annotated[
         float,
-        typer.Option(
-            "--timeout",
-            metavar="SECONDS",
-            min=0.0,
-            callback=finite,
-            help="Maximum time of the computer for a run.",
-        ),
+        quantity("SECONDS", "--timeout", help="Maximum time of the computer for a run."),
     ] = 120.0,
 ) -> None:
     """Run scenarios, which say what systems must do.

@@ -25,7 +25,7 @@ from composer.cli.support.options import (
     Timeout,
     command_group,
     examples,
-    finite,
+    quantity,
     yaml_or_stdin,
 )
 from composer.cli.support.ros import ros_session
@@ -107,9 +107,7 @@ def pub(
     stdin: Stdin = False,
     rate: Annotated[
         float,
-        typer.Option(
-            "--rate", "-r", min=0.001, callback=finite, metavar="HZ", help="Messages per second."
-        ),
+        quantity("HZ", "--rate", "-r", help="Messages per second.", min=0.001),
     ] = 1.0,
     once: Annotated[
         bool, typer.Option("--once", "-1", help="Publish one message and exit.")

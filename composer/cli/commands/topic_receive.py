@@ -11,7 +11,7 @@ import typer
 
 from composer.cli.support.completion import complete_topic
 from composer.cli.support.errors import UsageError
-from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, finite
+from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, quantity
 from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import as_json, as_yaml, say, truncated, write
 from composer.model.qos import PRESETS, Durability, QosProfile, Reliability
@@ -55,11 +55,9 @@ QosDurability = Annotated[
 #: One option for both limits. Without it, only the discovery of the topic is limited.
 ReceiveTimeout = Annotated[
     float | None,
-    typer.Option(
+    quantity(
+        "SECONDS",
         "--timeout",
-        metavar="SECONDS",
-        min=0.0,
-        callback=finite,
         help="Maximum time to wait for the topic, and then for each message.",
         show_default=f"{DEFAULT_TIMEOUT_S} for the topic, no limit for messages",
     ),

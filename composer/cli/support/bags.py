@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from composer.cli.support.errors import CommandError
-from composer.cli.support.options import finite
+from composer.cli.support.options import quantity
 from composer.cli.support.terminal import say
 
 if TYPE_CHECKING:
@@ -34,19 +34,12 @@ Topics = Annotated[
 ]
 Start = Annotated[
     float,
-    typer.Option(
-        "--start", metavar="SECONDS", min=0.0, callback=finite, help="Skip this much of the bag."
-    ),
+    quantity("SECONDS", "--start", help="Skip this much of the bag."),
 ]
 Duration = Annotated[
     float | None,
-    typer.Option(
-        "--duration",
-        metavar="SECONDS",
-        min=0.0,
-        callback=finite,
-        help="Use only this much of the bag.",
-        show_default="to its end",
+    quantity(
+        "SECONDS", "--duration", help="Use only this much of the bag.", show_default="to its end"
     ),
 ]
 Output = Annotated[
@@ -54,43 +47,23 @@ Output = Annotated[
 ]
 SplitMb = Annotated[
     float | None,
-    typer.Option(
-        "--split-mb",
-        metavar="MB",
-        min=1.0,
-        callback=finite,
-        help="Begin a new file before one is larger.",
-    ),
+    quantity("MB", "--split-mb", help="Begin a new file before one is larger.", min=1.0),
 ]
 SplitS = Annotated[
     float | None,
-    typer.Option(
-        "--split-s",
-        metavar="SECONDS",
-        min=1.0,
-        callback=finite,
-        help="Begin a new file before one is longer.",
-    ),
+    quantity("SECONDS", "--split-s", help="Begin a new file before one is longer.", min=1.0),
 ]
 
 
 Tolerance = Annotated[
     float,
-    typer.Option(
-        "--tolerance",
-        min=0.0,
-        metavar="NUMBER",
-        callback=finite,
-        help="Allowed difference of numbers.",
-    ),
+    quantity("NUMBER", "--tolerance", help="Allowed difference of numbers."),
 ]
 TimeTolerance = Annotated[
     float | None,
-    typer.Option(
+    quantity(
+        "SECONDS",
         "--time-tolerance",
-        min=0.0,
-        metavar="SECONDS",
-        callback=finite,
         help="Allowed difference of the times of messages.",
         show_default="only their order counts",
     ),

@@ -17,7 +17,20 @@ from composer.cli.support.errors import UsageError
 _LARGEST = 1e9
 
 
-def finite(value: float | None) -> float | None:
+def quantity(
+    unit: str,
+    *names: str,
+    help: str,  # noqa: A002 - as in typer
+    min: float = 0.0,  # noqa: A002
+    show_default: bool | str = True,
+) -> Any:
+    """Return an option for a number with a unit, such as SECONDS; all of them have limits."""
+    return typer.Option(
+        *names, metavar=unit, min=min, callback=_finite, help=help, show_default=show_default
+    )
+
+
+def _finite(value: float | None) -> float | None:
     """Return the value of an option; reject infinity, NaN and what no clock can represent."""
     if value is not None and not value <= _LARGEST:
         raise typer.BadParameter(f"{value:g} is not in the range x<={_LARGEST:g}.")
@@ -54,13 +67,7 @@ ShowTypes = Annotated[bool, typer.Option("--show-types", "-t", help="Print the t
 #: The time limit of a command for everything that it waits for.
 Timeout = Annotated[
     float,
-    typer.Option(
-        "--timeout",
-        metavar="SECONDS",
-        min=0.0,
-        callback=finite,
-        help="Maximum time to wait for nodes and responses.",
-    ),
+    quantity("SECONDS", "--timeout", help="Maximum time to wait for nodes and responses."),
 ]
 DEFAULT_TIMEOUT_S = 5.0
 #: As long as a transition may take by default, with a margin.
