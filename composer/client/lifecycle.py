@@ -90,23 +90,21 @@ class LifecycleClient:
 
     def state(self, node: str) -> str:
         """Return the label of the node's state. Raises NoResponseError."""
-        response = self._call(node, GetState, "get_state", GetState.Request())
+        response = self._call(node, GetState, GetState.Request())
         return str(response.current_state.label)
 
     def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
         """Return the label of each node's state, None for nodes that did not respond in time."""
-        services = {f"{node}/get_state": node for node in nodes}
-        requests = dict.fromkeys(services, GetState.Request())
+        requests = dict.fromkeys(nodes, GetState.Request())
         responses = self._services.call_all(GetState, requests, self._deadline)
         return {
-            node: None if responses[name] is None else str(responses[name].current_state.label)
-            for name, node in services.items()
+            node: None if response is None else str(response.current_state.label)
+            for node, response in responses.items()
         }
 
     def transitions(self, node: str) -> tuple[Transition, ...]:
         """Return the transitions that are available now. Raises NoResponseError."""
-        request = GetAvailableTransitions.Request()
-        response = self._call(node, GetAvailableTransitions, "get_available_transitions", request)
+        response = self._call(node, GetAvailableTransitions, GetAvailableTransitions.Request())
         return tuple(
             Transition(item.transition.id, item.transition.label, item.goal_state.label)
             for item in response.available_transitions
@@ -127,7 +125,7 @@ class LifecycleClient:
         # The label makes the request fail cleanly if the state has changed in the meantime.
         message = TransitionMessage(id=transition.id, label=label)
         request = ChangeState.Request(transition=message)
-        response = self._call(node, ChangeState, "change_state", request, once=True)
+        response = self._call(node, ChangeState, request, once=True)
         after = self.state(node)
         if not response.success:
             raise TransitionError(
@@ -179,15 +177,15 @@ class LifecycleClient:
 
     def known(self) -> tuple[str, ...]:
         """Return the full names of the lifecycle nodes discovered so far."""
-        return tuple(sorted(self._services.nodes("get_state", GetState, self._deadline)))
+        return tuple(sorted(self._services.nodes(GetState, self._deadline)))
 
     def close(self) -> None:
         """Destroy clients and subscriptions; the end of the session does so too."""
         self._services.close()
 
-    def _call(self, node: str, kind: Any, name: str, request: Any, *, once: bool = False) -> Any:
+    def _call(self, node: str, kind: Any, request: Any, *, once: bool = False) -> Any:
         try:
-            return self._services.call(kind, f"{node}/{name}", request, self._deadline, once=once)
+            return self._services.call(kind, node, request, self._deadline, once=once)
         except NoResponseError as error:
             raise NoResponseError(
                 f"{node} did not respond within {self._deadline.timeout_s:g} s",

@@ -47,7 +47,9 @@ class ParameterClient:
         self.node = GraphNames(session, deadline).find_node(node)
         self._services = NodeServices(session)
         # Its manager may have the services: wait until that, or the node itself, is discovered.
-        session.search(self._has_services, deadline)
+        session.search(
+            lambda: self._services.has(self.node, ListParameters, deadline) or None, deadline
+        )
 
     def close(self) -> None:
         """Destroy clients and subscriptions; the end of the session does so too."""
@@ -55,7 +57,7 @@ class ParameterClient:
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all parameters, sorted. Raises NoResponseError."""
-        response = self._call(ListParameters, "list_parameters", ListParameters.Request())
+        response = self._call(ListParameters, ListParameters.Request())
         return tuple(sorted(response.result.names))
 
     def values(self, names: Iterable[str]) -> dict[str, Any]:
@@ -63,7 +65,7 @@ class ParameterClient:
         requested = list(names)
         self._check_known(requested)
         request = GetParameters.Request(names=requested)
-        response = self._call(GetParameters, "get_parameters", request)
+        response = self._call(GetParameters, request)
         return {
             name: plain_value(value) for name, value in self._by_name(requested, response.values)
         }
@@ -73,7 +75,7 @@ class ParameterClient:
         requested = list(names)
         self._check_known(requested)
         request = DescribeParameters.Request(names=requested)
-        response = self._call(DescribeParameters, "describe_parameters", request)
+        response = self._call(DescribeParameters, request)
         return tuple(
             description(name, found)
             for name, found in self._by_name(requested, response.descriptors)
@@ -88,7 +90,7 @@ class ParameterClient:
         types = {item.name: item.type for item in self.describe(values)}
         messages = [_message(name, value, types[name]) for name, value in values.items()]
         request = SetParameters.Request(parameters=messages)
-        response = self._call(SetParameters, "set_parameters", request, once=True)
+        response = self._call(SetParameters, request, once=True)
         rejected = [
             f"{name}: {result.reason or 'no reason given'}"
             for name, result in self._by_name(list(values), response.results)
@@ -130,15 +132,9 @@ class ParameterClient:
                     f"{self.node} has no parameter '{name}'", suggestion(name, known)
                 )
 
-    def _has_services(self) -> bool | None:
-        name = f"{self.node}/list_parameters"
-        return self._services.is_offered(name, self._deadline) or None
-
-    def _call(self, kind: Any, name: str, request: Any, *, once: bool = False) -> Any:
+    def _call(self, kind: Any, request: Any, *, once: bool = False) -> Any:
         try:
-            return self._services.call(
-                kind, f"{self.node}/{name}", request, self._deadline, once=once
-            )
+            return self._services.call(kind, self.node, request, self._deadline, once=once)
         except NoResponseError as error:
             raise NoResponseError(
                 f"{self.node} did not respond within {self._deadline.timeout_s:g} s",
@@ -152,14 +148,14 @@ def names_by_node(
     """Return the parameter names of all nodes, None for nodes that did not respond in time."""
     with NodeServices(session) as services:
         found = session.wait_until_settled(
-            lambda: frozenset(services.nodes("list_parameters", ListParameters, deadline)), deadline
+            lambda: services.nodes(ListParameters, deadline), deadline
         )
         nodes = sorted(node for node in found if hidden or not is_hidden(node))
-        requests = {f"{node}/list_parameters": ListParameters.Request() for node in nodes}
+        requests = dict.fromkeys(nodes, ListParameters.Request())
         responses = services.call_all(ListParameters, requests, deadline)
     return {
         node: None if response is None else sorted(response.result.names)
-        for node, response in zip(nodes, responses.values(), strict=True)
+        for node, response in responses.items()
     }
 
 
@@ -202,23 +198,16 @@ def parameter_settings(
     """
     limit = Deadline(min(_RESPONSE_S, deadline.left_s))
     with NodeServices(session) as services:
-        known = services.nodes("describe_parameters", DescribeParameters, limit)
+        known = services.nodes(DescribeParameters, limit)
         requests = {
-            f"{node}/describe_parameters": (node, list(parameters))
+            node: DescribeParameters.Request(names=list(parameters))
             for node, parameters in names.items()
             if node in known
         }
-        responses = services.call_all(
-            DescribeParameters,
-            {
-                service: DescribeParameters.Request(names=listed)
-                for service, (_, listed) in requests.items()
-            },
-            limit,
-        )
+        responses = services.call_all(DescribeParameters, requests, limit)
     found: dict[str, dict[str, dict[str, Plain]]] = {}
-    for service, (node, listed) in requests.items():
-        response = responses[service]
+    for node, response in responses.items():
+        listed = requests[node].names
         if response is not None and len(response.descriptors) == len(listed):
             descriptions = map(description, listed, response.descriptors)
             found[node] = {item.name: _settings_of(item) for item in descriptions}

@@ -45,17 +45,12 @@ class ServiceCaller:
             self._session.node.destroy_client(client)
         self._clients.clear()
 
-    def call_all(
-        self, service: Any, requests: Mapping[str, Any], deadline: Deadline
-    ) -> dict[str, Any]:
+    def call_each(self, calls: Mapping[str, tuple[Any, Any]], deadline: Deadline) -> dict[str, Any]:
         """Return the response of each service, None for those that did not respond in time.
 
-        A request without a response is sent again every second.
+        ``calls`` has the class of each service and the request, which is sent again every second
+        until there is a response.
         """
-        return self.call_each({name: (service, item) for name, item in requests.items()}, deadline)
-
-    def call_each(self, calls: Mapping[str, tuple[Any, Any]], deadline: Deadline) -> dict[str, Any]:
-        """Return the same as :meth:`call_all`, with the class of each service and its request."""
         return self._call(calls, deadline, _RETRY_AFTER_S)
 
     def call_once(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
@@ -116,7 +111,7 @@ def call_all_with_retries(
 ) -> dict[str, Any]:
     """Send a read request to services of one type; None for those that did not respond in time."""
     with closing(ServiceCaller(session)) as caller:
-        return caller.call_all(service, dict.fromkeys(names, request), deadline)
+        return caller.call_each(dict.fromkeys(names, (service, request)), deadline)
 
 
 def call_once(session: Session, service: Any, name: str, request: Any, deadline: Deadline) -> Any:

@@ -22,7 +22,7 @@ from composer.runtime.ros_graph.node_endpoints import endpoints, node_names, vis
 
 #: How long to wait for the responses of nodes; later ones count as unknown.
 _RESPONSE_S = 2.0
-_LIST_COMPONENTS = "/_container/list_nodes"
+_CONTAINER, _LIST_NODES = "/_container", "/list_nodes"
 
 
 class GraphObserver:
@@ -73,7 +73,7 @@ class GraphObserver:
         return measure_rates(self._session, topics, min(measure_s, deadline.left_s))
 
     def _states(self, nodes: Collection[str], deadline: Deadline) -> dict[str, str | None]:
-        responses = self._responses(nodes, "get_state", GetState, deadline)
+        responses = self._responses(nodes, GetState, deadline)
         return {
             node: None if response is None else str(response.current_state.label)
             for node, response in responses.items()
@@ -84,20 +84,22 @@ class GraphObserver:
 
         Without composition_interfaces, containers cannot be asked.
         """
-        services = [
-            name for name, _ in self._session.graph.services() if name.endswith(_LIST_COMPONENTS)
+        servers = [
+            name.removesuffix(_LIST_NODES)
+            for name, _ in self._session.graph.services()
+            if name.endswith(_CONTAINER + _LIST_NODES)
         ]
-        if not services:
+        if not servers:
             return {}
         try:
             kind = interface_class(f"{COMPOSITION}/srv/ListNodes")
         except MessageError:
             return {}
-        requests = {service: kind.Request() for service in services}
+        requests = dict.fromkeys(servers, kind.Request())
         responses = self._services.call_all(kind, requests, self._response_deadline(deadline))
         return {
-            str(name): service.removesuffix(_LIST_COMPONENTS)
-            for service, response in responses.items()
+            str(name): server.removesuffix(_CONTAINER)
+            for server, response in responses.items()
             if response is not None
             for name in response.full_node_names
         }
@@ -106,36 +108,27 @@ class GraphObserver:
         self, nodes: Collection[str], deadline: Deadline
     ) -> dict[str, dict[str, Plain] | None]:
         """Return the parameters of the nodes that have any, None without a response."""
-        responses = self._responses(nodes, "list_parameters", ListParameters, deadline)
-        names = {
-            f"{node}/get_parameters": sorted(response.result.names)
+        responses = self._responses(nodes, ListParameters, deadline)
+        requests = {
+            node: GetParameters.Request(names=sorted(response.result.names))
             for node, response in responses.items()
             if response is not None
         }
-        values = self._services.call_all(
-            GetParameters,
-            {service: GetParameters.Request(names=listed) for service, listed in names.items()},
-            self._response_deadline(deadline),
-        )
+        limit = self._response_deadline(deadline)
+        values = self._services.call_all(GetParameters, requests, limit)
         found: dict[str, dict[str, Plain] | None] = dict.fromkeys(responses)
-        for service, listed in names.items():
-            response = values[service]
-            if response is not None and len(response.values) == len(listed):
-                found[service.rpartition("/")[0]] = dict(
-                    zip(listed, map(plain_value, response.values), strict=True)
-                )
+        for node, response in values.items():
+            names = requests[node].names
+            if response is not None and len(response.values) == len(names):
+                found[node] = dict(zip(names, map(plain_value, response.values), strict=True))
         return found
 
-    def _responses(
-        self, nodes: Collection[str], service: str, kind: Any, deadline: Deadline
-    ) -> dict[str, Any]:
+    def _responses(self, nodes: Collection[str], kind: Any, deadline: Deadline) -> dict[str, Any]:
         """Return the response to an empty request of each node that has a service."""
-        limit = self._response_deadline(deadline)
-        offering = self._services.nodes(service, kind, limit)
+        offering = self._services.nodes(kind, self._response_deadline(deadline))
         asked = [node for node in nodes if node in offering and not is_hidden(node)]
-        requests = {f"{node}/{service}": kind.Request() for node in asked}
-        responses = self._services.call_all(kind, requests, self._response_deadline(deadline))
-        return dict(zip(asked, responses.values(), strict=True))
+        requests = dict.fromkeys(asked, kind.Request())
+        return self._services.call_all(kind, requests, self._response_deadline(deadline))
 
     def _response_deadline(self, deadline: Deadline) -> Deadline:
         return Deadline(min(_RESPONSE_S, deadline.left_s))

@@ -7,7 +7,8 @@ them are sent to the manager, those to many nodes of a system as one: see
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Self
 
@@ -33,7 +34,10 @@ _SERVICES = {
 
 
 class NodeServices:
-    """Calls services of nodes. Clients and subscriptions are kept until :meth:`close`."""
+    """Calls services of nodes. Clients and subscriptions are kept until :meth:`close`.
+
+    The class of a service, such as ``GetState``, says its name: ``<node>/get_state``.
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -52,19 +56,19 @@ class NodeServices:
         self._caller.close()
         self._systems.close()
 
-    def is_offered(self, name: str, deadline: Deadline) -> bool:
-        """Return whether a service has been discovered, by its full name."""
-        if any(name == known for known, _ in self._session.graph.services()):
-            return True
-        self._wait_for_reports(deadline)
-        return bool(self._systems_by_service([name]))
+    def has(self, node: str, kind: Any, deadline: Deadline) -> bool:
+        """Return whether a node has a service, discovered so far."""
+        name = f"{node}/{_name(kind)}"
+        is_own = any(name == known for known, _ in self._session.graph.services())
+        return is_own or node in self.nodes(kind, deadline)
 
-    def nodes(self, service: str, kind: Any, deadline: Deadline) -> set[str]:
-        """Return the nodes with a service, discovered so far: its last name and its class.
+    def nodes(self, kind: Any, deadline: Deadline) -> set[str]:
+        """Return the nodes with a service, discovered so far.
 
         The first report of each manager is waited for.
         """
         self._wait_for_reports(deadline)
+        service = _name(kind)
         type_name = f"{kind.__module__.partition('.')[0]}/srv/{kind.__name__}"
         own = {
             name.removesuffix(f"/{service}")
@@ -74,44 +78,46 @@ class NodeServices:
         return own | {node for node, _ in self._left(service)}
 
     def call(
-        self, kind: Any, name: str, request: Any, deadline: Deadline, *, once: bool = False
+        self, kind: Any, node: str, request: Any, deadline: Deadline, *, once: bool = False
     ) -> Any:
-        """Return the response of a service. Raises NoResponseError.
+        """Return the response of a service of a node. Raises NoResponseError.
 
         A request that changes nothing is sent again every second, others are sent ``once``.
         """
-        system = self._systems_by_service([name]).get(name)
+        name = f"{node}/{_name(kind)}"
+        system = self._systems_of_nodes(kind).get(node)
         if not once:
-            response = self.call_all(kind, {name: request}, deadline)[name]
+            response = self.call_all(kind, {node: request}, deadline)[node]
         elif system is None:
             response = self._caller.call_once(kind, name, request, deadline)
         else:
             document, service = _document({name: request}), _service(system)
             message = request_message(document)
             answer = self._caller.call_once(RequestService, service, message, deadline)
-            response = dict(_responses(kind, document, answer)).get(name)
+            response = dict(_responses(kind, document, answer)).get(node)
         return required({name: response}, deadline)
 
     def call_all(
         self, kind: Any, requests: Mapping[str, Any], deadline: Deadline
     ) -> dict[str, Any]:
-        """Return the response of each service, None for those that did not respond in time.
+        """Return the response of each node, None for those that did not respond in time.
 
-        A request without a response is sent again every second.
+        ``requests`` are by node. A request without a response is sent again every second.
         """
-        systems = self._systems_by_service(requests)
-        calls = {name: (kind, request) for name, request in requests.items() if name not in systems}
-        documents = {
-            _service(system): _document(
-                {name: requests[name] for name in requests if systems.get(name) == system}
-            )
-            for system in set(systems.values())
-        }
+        systems = self._systems_of_nodes(kind)
+        calls: dict[str, tuple[Any, Any]] = {}
+        for_managers: dict[str, dict[str, Any]] = {}
+        for node, request in requests.items():
+            name = f"{node}/{_name(kind)}"
+            if node in systems:
+                for_managers.setdefault(_service(systems[node]), {})[name] = request
+            else:
+                calls[name] = (kind, request)
+        documents = {service: _document(items) for service, items in for_managers.items()}
         for service, document in documents.items():
             calls[service] = (RequestService, request_message(document))
         answers = self._caller.call_each(calls, deadline)
-        found: dict[str, Any] = dict.fromkeys(requests)
-        found |= {name: answers[name] for name in requests if name not in systems}
+        found = {node: answers.get(f"{node}/{_name(kind)}") for node in requests}
         for service, document in documents.items():
             if answers[service] is not None:
                 found |= _responses(kind, document, answers[service])
@@ -143,14 +149,14 @@ class NodeServices:
         for _, node, name in sorted(found, reverse=True):
             yield node, name
 
-    def _systems_by_service(self, services: Collection[str]) -> dict[str, str]:
-        """Return the systems whose managers have services, for those that nodes leave to them."""
-        left = {
-            f"{node}/{last}": system
-            for last in {service.rpartition("/")[2] for service in services}
-            for node, system in self._left(last)
-        }
-        return {service: left[service] for service in services if service in left}
+    def _systems_of_nodes(self, kind: Any) -> dict[str, str]:
+        """Return the systems whose managers have a service of nodes, by these nodes."""
+        return dict(self._left(_name(kind)))
+
+
+def _name(kind: Any) -> str:
+    """Return ``get_state`` for the class ``GetState``."""
+    return re.sub(r"\B(?=[A-Z])", "_", kind.__name__).lower()
 
 
 def _service(system: str) -> str:
@@ -162,10 +168,11 @@ def _document(requests: Mapping[str, Any]) -> CallNodes:
 
 
 def _responses(kind: Any, document: CallNodes, answer: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the responses of class ``kind`` to the calls of a request, by service."""
+    """Yield the responses of class ``kind`` to the calls of a request, by node."""
     with suppress(ProtocolError):
         responses = read_answer(answer, document).responses
         for call, plain in zip(document.calls, responses, strict=False):
             with suppress(MessageError):
                 if plain is not None:
-                    yield call.service, convert_message(plain, kind.Response, call.service)
+                    node = call.service.rpartition("/")[0]
+                    yield node, convert_message(plain, kind.Response, call.service)
