@@ -10,7 +10,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from composer.base.diagnostics import nearest
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.model.names import is_hidden, topic_name_problem
+from composer.model.names import is_hidden, is_selected, topic_name_problem
 from composer.runtime.protocol.requests import NameAndTypes, visible_names
 from composer.runtime.ros_graph.node_endpoints import details
 
@@ -157,12 +157,8 @@ def not_found_error(kind: str, name: str, known: Iterable[str]) -> NotFoundError
 
 
 def _matches(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the node with that full name, else those whose names end with it."""
-    if name in known:
-        return (name,)
-    if name.startswith("/"):
-        return ()
-    return tuple(node for node in known if node.endswith(f"/{name}"))
+    """Return the node with that full name, else those whose last parts it is."""
+    return (name,) if name in known else tuple(node for node in known if is_selected(node, name))
 
 
 def _hint(kind: str, name: str, known: list[str]) -> str:

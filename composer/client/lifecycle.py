@@ -7,9 +7,7 @@ of an rclpy lifecycle node.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from fnmatch import fnmatchcase
 from typing import Any
 
 from lifecycle_msgs.msg import Transition as TransitionMessage
@@ -21,8 +19,7 @@ from composer.client.graph_names import check_all_respond, find_node, not_found_
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.systems.node_services import NodeServices
 from composer.model.lifecycle import PRIMARY_STATES, next_transition
-
-_PATTERN = re.compile(r"[*?\[]")
+from composer.model.names import is_pattern, is_selected
 
 
 class TransitionError(RosError):
@@ -71,18 +68,17 @@ class LifecycleClient:
     def select(self, targets: Iterable[str]) -> tuple[str, ...]:
         """Return the full names of the nodes that match the targets, each once, in order.
 
-        A target is a name as for :meth:`find`, or a pattern: ``/planning/*``, ``*_driver``. A
-        pattern without a slash is matched with the last parts of the names. Raises NotFoundError,
+        A target is a name as for :meth:`find`, or a pattern. Raises NotFoundError,
         NoResponseError.
         """
         selected: dict[str, None] = {}
         for target in targets:
-            if not _PATTERN.search(target):
+            if not is_pattern(target):
                 selected[self.find(target)] = None
                 continue
             known = self.nodes()
             check_all_respond(self._session)
-            matches = [name for name in known if _matches(name, target)]
+            matches = [name for name in known if is_selected(name, target)]
             if not matches:
                 raise not_found_error("lifecycle node matching", target, known)
             selected.update(dict.fromkeys(matches))
@@ -191,10 +187,6 @@ class LifecycleClient:
                 f"{node} did not respond within {self._deadline.timeout_s:g} s",
                 f"{error}; its process may be busy or gone. Use --timeout to wait longer",
             ) from error
-
-
-def _matches(node: str, pattern: str) -> bool:
-    return fnmatchcase(node if "/" in pattern else node.rpartition("/")[2], pattern)
 
 
 def _hint(state: str, available: tuple[Transition, ...]) -> str:

@@ -12,6 +12,7 @@ only a ``/`` after ``~``.
 from __future__ import annotations
 
 import re
+from fnmatch import fnmatchcase
 
 #: rmw's limits in characters: the 255 of DDS minus the prefixes that ROS adds.
 MAXIMUM_NODE_NAME_LENGTH = 255
@@ -134,6 +135,22 @@ def matches_wildcard(pattern: str, part: str) -> bool:
             return False
         rest = rest[found + len(piece) :]
     return part.endswith(last)
+
+
+def is_selected(full_name: str, target: str) -> bool:
+    """Return whether a user who types ``target`` means the node or system with a full name.
+
+    A target is a full name, the last part or parts of one, or a pattern of either: ``/planning/*``,
+    ``*_driver``.
+    """
+    if "/" not in target:
+        return fnmatchcase(full_name.rpartition("/")[2], target)
+    return fnmatchcase(full_name, target if target.startswith("/") else f"*/{target}")
+
+
+def is_pattern(target: str) -> bool:
+    """Return whether a target may stand for several names."""
+    return any(character in target for character in "*?[")
 
 
 def _empty_problem(name: str) -> str | None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from fnmatch import fnmatchcase
 
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
-from composer.model.names import parameter_name_problem, split_node_name, topic_name_problem
+from composer.model.names import (
+    is_selected,
+    parameter_name_problem,
+    split_node_name,
+    topic_name_problem,
+)
 from composer.model.qos import PRESETS, QosProfile
 from composer.model.resolve.parameters import rclpy_type
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
@@ -65,8 +69,7 @@ def describe_graph(
 def _is_selected(node: ObservedNode, selected: tuple[str, ...]) -> bool:
     if node.is_hidden or is_manager(node.full_name, node.endpoints):
         return False
-    patterns = [text if text.startswith("/") else f"*/{text}" for text in selected]
-    return not patterns or any(fnmatchcase(node.full_name, pattern) for pattern in patterns)
+    return not selected or any(is_selected(node.full_name, target) for target in selected)
 
 
 def _channels(nodes: Iterable[ObservedNode]) -> dict[tuple[ChannelKind, str], set[bool]]:

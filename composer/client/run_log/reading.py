@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
-from fnmatch import fnmatchcase
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -22,7 +21,7 @@ from composer.base.characters import escape_line
 from composer.base.fast_dataclass import dataclass
 from composer.base.regular_files import NotRegularError, open_regular
 from composer.client.run_log.runs import Run, find_parts, find_runs, log_files
-from composer.model.names import PROGRAM_LOGGER
+from composer.model.names import PROGRAM_LOGGER, is_selected
 
 _MICROSECOND_NS = 1000
 _SECOND_NS = 1_000_000_000
@@ -110,8 +109,7 @@ class Selection:
 
 def is_of_node(record: Record, name: str) -> bool:
     """Return whether a record is about a node, or of a child of its logger."""
-    name = name if name.startswith("/") else f"*/{name}"
-    return fnmatchcase(record.node, name) or fnmatchcase(record.node, f"{name}/*")
+    return is_selected(record.node, name) or is_selected(record.node, f"{name}/*")
 
 
 def parse_since(text: str, now: datetime) -> int | None:

@@ -14,6 +14,7 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.regular_files import open_regular, read_regular, write_whole
+from composer.model.names import is_selected
 
 MAX_FILE_BYTES = 10 * 1024 * 1024
 MAX_FILES = 5
@@ -211,9 +212,9 @@ def find_runs(logs: Path, system: str | None = None) -> list[Run]:
     parts: list[Run] = []
     for name, folder in _systems(logs):
         found = _runs_in(folder, name)
-        if system is not None and _has_name(name, system):
+        if system is not None and is_selected(name, system):
             runs += found
-        elif system is None or _has_name(name.rpartition("/")[0], system):
+        elif system is None or is_selected(name.rpartition("/")[0], system):
             parts += [run for run in found if run.is_of_part]
             runs += [run for run in found if system is None and not run.is_of_part]
     whole = {run.system for run in runs}
@@ -242,10 +243,6 @@ def _systems(logs: Path) -> list[tuple[str, Path]]:
         names = [("/" + folder.name.replace(".", "/"), folder) for folder in folders]
         return [(name, folder) for name, folder in names if _SYSTEM.fullmatch(folder.name)]
     return []
-
-
-def _has_name(full_name: str, name: str) -> bool:
-    return full_name == name or full_name.endswith(f"/{name}")
 
 
 def _runs_in(folder: Path, system: str) -> list[Run]:

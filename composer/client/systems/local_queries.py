@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from composer.base.characters import visible
 from composer.base.fast_dataclass import dataclass
-from composer.model.names import is_hidden
+from composer.model.names import is_hidden, is_selected
 from composer.plan.drift import ObservedEndpoint
 from composer.runtime.metrics.figures import merged_chains
 from composer.runtime.process.instance_lock import local_systems
@@ -177,7 +177,7 @@ def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParamet
 
 def local_report(name: str, timeout_s: float, *, callbacks: bool = False) -> SystemReport | None:
     """Return the report of a running system, by its full name or the last part."""
-    systems = [system for system in local_systems() if f"/{system}".endswith(f"/{name}")]
+    systems = [system for system in local_systems() if is_selected(system, name)]
     if len(systems) != 1:
         return None
     report = _ask_report(systems[0], timeout_s, callbacks=callbacks)
@@ -259,9 +259,7 @@ def _find(name: str, timeout_s: float) -> str | None:
     """Return the full name of the only node that ``name`` refers to."""
     answer: NodesAnswer | None = _ask_any(NodesQuery(), timeout_s)
     nodes = () if answer is None else answer.nodes
-    if name in nodes:
-        return name if nodes.count(name) == 1 else None
-    matches = [] if name.startswith("/") else [node for node in nodes if node.endswith(f"/{name}")]
+    matches = [node for node in nodes if is_selected(node, name)]
     return matches[0] if len(matches) == 1 else None
 
 

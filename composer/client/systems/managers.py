@@ -19,6 +19,7 @@ from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.requests import call_once
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.local_queries import parse_state, with_processes
+from composer.model.names import is_selected
 from composer.runtime.process.instance_lock import is_held, local_systems
 from composer.runtime.protocol.codec import OtherVersionError, ProtocolError, decode
 from composer.runtime.protocol.reports import SystemReport, TimingReport
@@ -101,11 +102,11 @@ class Systems:
 
     def find(self, name: str) -> str:
         """Return the full name of a running system. Raises NotFoundError."""
-        found = _matches(name, local_systems())
+        found = [system for system in local_systems() if is_selected(system, name)]
         if not found:
             discovered = self._session.wait_until_settled(self.discover, self._deadline)
             known = sorted({*local_systems(), *discovered})
-            found = _matches(name, known)
+            found = [system for system in known if is_selected(system, name)]
         if not found:
             error = not_found_error("running system", name, known)
             none = "no system is running: start one with 'compose run'"
@@ -118,12 +119,11 @@ class Systems:
 
     def only(self) -> str:
         """Return the full name of the only running system. Raises NotFoundError."""
-        known = sorted(local_systems()) or self._session.wait_until_settled(
-            self.discover, self._deadline
-        )
+        names: Iterable[str] = local_systems()
+        names = names or self._session.wait_until_settled(self.discover, self._deadline)
+        known = without_members(names)
         if not known:
             raise NotFoundError("no system is running", "start one with 'compose run'")
-        known = without_members(known)
         if len(known) > 1:
             raise NotFoundError(
                 "more than one system is running", f"specify one of: {', '.join(known)}"
@@ -353,8 +353,3 @@ def without_members(systems: Iterable[str]) -> list[str]:
     """Return the systems without those that are processes of another one in the list."""
     names = sorted(systems)
     return [name for name in names if name.rpartition("/")[0] not in names]
-
-
-def _matches(name: str, systems: Iterable[str]) -> list[str]:
-    """Return the systems with that full name or last part."""
-    return [system for system in systems if system == name or system.endswith(f"/{name}")]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field
-from fnmatch import fnmatchcase
 
 from composer.base.fast_dataclass import dataclass
 from composer.client.graph_names import NotFoundError, not_found_error
@@ -12,6 +11,7 @@ from composer.client.lifecycle import LifecycleClient
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.local_queries import with_callbacks_of_processes
 from composer.client.systems.managers import DISCOVERY_S, Systems, without_members
+from composer.model.names import is_pattern, is_selected
 from composer.plan.drift import ObservedProcess
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.codec import OtherVersionError
@@ -121,9 +121,7 @@ def find_managed_nodes(
 
 
 def _matches(target: str, known: Iterable[str], silent: list[str]) -> list[str]:
-    is_pattern = any(character in target for character in "*?[")
-    pattern = target if target.startswith("/") else f"*/{target}"
-    found = [node for node in known if fnmatchcase(node, pattern)]
+    found = [node for node in known if is_selected(node, target)]
     if not found and silent:
         raise NoResponseError(
             f"{silent[0]} does not respond, so its nodes are not known",
@@ -131,7 +129,7 @@ def _matches(target: str, known: Iterable[str], silent: list[str]) -> list[str]:
         )
     if not found:
         raise not_found_error("node of a running system", target, known)
-    if len(found) > 1 and not is_pattern:
+    if len(found) > 1 and not is_pattern(target):
         raise NotFoundError(
             f"'{target}' matches more than one node", f"use a full name: {', '.join(found)}"
         )

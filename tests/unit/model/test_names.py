@@ -7,6 +7,7 @@ import pytest
 from composer.model.names import (
     expand_name,
     is_hidden,
+    is_selected,
     join,
     namespace_problem,
     node_name_problem,
@@ -132,3 +133,22 @@ def test_joining(namespace: str, relative: str, joined: str) -> None:
 )
 def test_hidden(name: str, hidden: bool) -> None:
     assert is_hidden(name) is hidden
+
+
+@pytest.mark.parametrize(
+    ("target", "selected"),
+    [
+        ("/arm/left_driver", ["/arm/left_driver"]),
+        ("left_driver", ["/arm/left_driver", "/leg/left_driver"]),
+        ("arm/left_driver", ["/arm/left_driver"]),
+        ("driver", []),
+        ("*_driver", ["/arm/left_driver", "/leg/left_driver"]),
+        ("arm*", ["/arm/armed"]),  # the last part of a name, not its namespace
+        ("/arm/*", ["/arm/left_driver", "/arm/armed"]),
+        ("arm/*", ["/arm/left_driver", "/arm/armed"]),
+        ("/left_driver", []),
+    ],
+)
+def test_what_users_select(target: str, selected: list[str]) -> None:
+    names = ["/arm/left_driver", "/arm/armed", "/leg/left_driver"]
+    assert [name for name in names if is_selected(name, target)] == selected
