@@ -13,6 +13,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from composer.bags.bag import CDR, NANOSECONDS, BagError, BagMessage, BagTopic
 from composer.base.fast_dataclass import dataclass
+from composer.client.graph_names import InvalidNameError, full_name
 from composer.client.messages.topics import wait_until_acknowledged
 from composer.client.messages.values import InvalidValueError, class_of
 from composer.client.session import Deadline, Session
@@ -23,6 +24,8 @@ from composer.runtime.ros.qos_profiles import rclpy_profile
 _CLOCK_PERIOD_S = 0.01
 #: How often a replay sees whether it is paused while it waits.
 _PAUSE_PERIOD_S = 0.1
+#: Seconds have 32 bits in messages.
+_LATEST_S = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +62,11 @@ class GraphReplay:
         problems: list[BagError] = []
         for topic in topics:
             try:
+                name = _name(options.names.get(topic.name, topic.name))
                 kind = _message_class(topic)
             except BagError as error:
                 problems.append(error)
                 continue
-            name = options.names.get(topic.name, topic.name)
             profile = rclpy_profile(offered(topic.qos))
             self._publishers[topic.name] = session.node.create_publisher(kind, name, profile)
         if problems and not self._publishers:
@@ -125,7 +128,16 @@ class GraphReplay:
 
     def _publish_time(self, at_ns: int) -> None:
         seconds, nanoseconds = divmod(at_ns, NANOSECONDS)
+        if seconds > _LATEST_S:
+            raise BagError("a message is from after 2038, which /clock cannot show")
         self._clock.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
+
+
+def _name(topic: str) -> str:
+    try:
+        return full_name("topic", topic)
+    except InvalidNameError as error:
+        raise BagError(str(error)) from error
 
 
 def _message_class(topic: BagTopic) -> Any:

@@ -22,6 +22,8 @@ _PER_MILLISECOND = 1_000_000
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
 #: As long as the profiles of a thousand publishers.
 _LONGEST = 500_000
+#: rmw takes more, and then the middleware has no memory.
+_DEEPEST = 1_000_000
 #: Longer durations are one of several values that mean no limit.
 _NO_LIMIT_S = 1_000_000_000
 _NUMBERS: Mapping[str, Mapping[int, StrEnum]] = {
@@ -71,7 +73,7 @@ def from_plain(values: Mapping[str, Any]) -> QosProfile:
     depth = values.get("depth")
     return QosProfile(
         history=_policy(values, "history", default.history),
-        depth=depth if isinstance(depth, int) and depth > 0 else default.depth,
+        depth=depth if isinstance(depth, int) and 0 < depth <= _DEEPEST else default.depth,
         reliability=_policy(values, "reliability", default.reliability),
         durability=_policy(values, "durability", default.durability),
         deadline_ms=_milliseconds(values.get("deadline")),
@@ -103,6 +105,6 @@ def _milliseconds(duration: object) -> float | None:
     seconds, nanoseconds = duration.get("sec"), duration.get("nsec")
     if not isinstance(seconds, int) or not isinstance(nanoseconds, int):
         return None
-    if seconds >= _NO_LIMIT_S:
+    if not 0 <= seconds < _NO_LIMIT_S or not 0 <= nanoseconds < NANOSECONDS:
         return None
     return (seconds * NANOSECONDS + nanoseconds) / _PER_MILLISECOND or None

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import zstandard
 from rosbags.rosbag2 import Reader
 
 from composer.bags import qos_yaml
@@ -21,18 +22,23 @@ from composer.bags.bag import (
     joined,
     reading,
 )
+from composer.base.regular_files import read_regular
 
 #: In metadata.yaml: that each message is compressed, of which the databases know nothing.
 _COMPRESSED_MESSAGES = re.compile(
-    r"^\s*compression_mode: *[\"']?message", re.IGNORECASE | re.MULTILINE
+    rb"^[ \t]*compression_mode: *[\"']?message", re.IGNORECASE | re.MULTILINE
 )
+_LARGEST_METADATA_BYTES = 2**24
+#: A few kilobytes of zstd can stand for gigabytes.
+_LARGEST_MESSAGE_BYTES = 2**28
 
 
 class SqliteBag:
     """A bag of sqlite3 databases, read by the library ``rosbags``.
 
     Each file is read on its own: for a folder, the library leaves out the messages of each topic
-    whose QoS profiles or definition metadata.yaml writes in another way than the database.
+    whose QoS profiles or definition metadata.yaml writes in another way than the database, and
+    parses metadata.yaml for minutes.
     """
 
     warnings = ()
@@ -40,7 +46,8 @@ class SqliteBag:
     def __init__(self, path: Path, files: tuple[Path, ...]) -> None:
         """Raise BagError if the bag cannot be read."""
         self.files = [str(file) for file in files]
-        parts = [(_summary(file), file) for file in _parts(path, files)]
+        self._is_compressed = _has_compressed_messages(path / "metadata.yaml")
+        parts = [(_summary(file), file) for file in files]
         parts.sort(key=lambda part: part[0].start_ns)
         self._parts = [file for _, file in parts]
         self.summary = joined(summary for summary, _ in parts)
@@ -55,20 +62,27 @@ class SqliteBag:
                 chosen = [item for item in reader.connections if item.topic in topics]
                 found = reader.messages(chosen, start_ns, end_ns) if chosen else ()
                 for item, at_ns, data in found:
-                    yield BagMessage(item.topic, at_ns, at_ns, bytes(data))
+                    content = _decompressed(data) if self._is_compressed else bytes(data)
+                    yield BagMessage(item.topic, at_ns, at_ns, content)
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield nothing: such bags have none."""
         return iter(())
 
 
-def _parts(path: Path, files: tuple[Path, ...]) -> tuple[Path, ...]:
-    metadata = path / "metadata.yaml"
-    if metadata.is_file():
-        with reading(metadata):
-            if _COMPRESSED_MESSAGES.search(metadata.read_text(encoding="utf-8", errors="replace")):
-                return (path,)
-    return files
+def _has_compressed_messages(metadata: Path) -> bool:
+    if not metadata.is_file():
+        return False
+    with reading(metadata):
+        content = read_regular(metadata, _LARGEST_METADATA_BYTES)
+    return _COMPRESSED_MESSAGES.search(content) is not None
+
+
+def _decompressed(message: bytes) -> bytes:
+    size = zstandard.frame_content_size(message)
+    if not 0 <= size <= _LARGEST_MESSAGE_BYTES:
+        raise ValueError("a compressed message is too large, or does not say how large it is")
+    return zstandard.ZstdDecompressor().decompress(message)
 
 
 @contextmanager

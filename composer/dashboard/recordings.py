@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-import signal
+import re
 import subprocess
 import sys
 import threading
@@ -16,7 +16,7 @@ from tempfile import TemporaryFile
 from typing import IO, Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.protocol.messages import RequestError
+from composer.dashboard.protocol.messages import BadRequestError, RequestError
 from composer.rules.replays import Recorded, read_metadata
 
 FOLDER = Path("bags")
@@ -24,6 +24,9 @@ _MOST_BAGS = 500
 _MOST_OUTPUT = 2000  # characters of a command
 #: To complete a bag.
 _ENDS_WITHIN_S = 10.0
+#: The full name of a topic, with '*' for any text. As arguments of a command, names have no null
+#: bytes and are not long.
+_PATTERN = re.compile(r"[\w/*]{1,255}", re.ASCII)
 
 
 @dataclass(slots=True)
@@ -67,6 +70,9 @@ class Recordings:
         """Record topics, or all, in a new bag; return its name. Raises RequestError."""
         from composer.bags.system_recording import new_folder
 
+        for topic in topics:
+            if not _PATTERN.fullmatch(topic):
+                raise BadRequestError(f"'{topic:.80}' is not the name of a topic, or a pattern")
         path = new_folder(self._folder, "recording")
         patterns = [word for topic in topics for word in ("--topics", topic)]
         return self._start("record", path.name, ["record", "-o", str(path), *patterns])
@@ -84,14 +90,13 @@ class Recordings:
             command = self._running.pop(verb, None)
         if command is None:
             raise RequestError("not_found", f"no {verb} is running")
-        _end(command.process)
-        return command.text().rpartition("\n")[2]
+        _end([command.process])
+        return command.text().rpartition("\n")[2] or f"the {verb} had not begun"
 
     def close(self) -> None:
         """End what is running."""
         with self._lock:
-            for command in self._running.values():
-                _end(command.process)
+            _end([command.process for command in self._running.values()])
             self._running.clear()
 
     def _start(self, verb: str, bag: str, words: list[str]) -> str:
@@ -101,10 +106,14 @@ class Recordings:
                 raise RequestError("busy", f"a {verb} is running: '{self._running[verb].bag}'")
             self._problems.pop(verb, None)
             child = [sys.executable, "-P", "-m", "composer.launch.child", str(os.getpid())]
-            output = TemporaryFile()  # noqa: SIM115 - closed with the command
-            process = subprocess.Popen(  # noqa: S603
-                [*child, *words], stdin=subprocess.DEVNULL, stdout=output, stderr=output
-            )
+            try:
+                output = TemporaryFile()  # noqa: SIM115 - closed with the command
+                process = subprocess.Popen(  # noqa: S603
+                    [*child, *words], stdin=subprocess.DEVNULL, stdout=output, stderr=output
+                )
+            except OSError as error:  # as of a full disk
+                reason = error.strerror or str(error)
+                raise RequestError("failed", f"cannot start 'compose {verb}': {reason}") from error
             self._running[verb] = _Command(bag, process, output, time.monotonic())
         return bag
 
@@ -125,7 +134,7 @@ class Recordings:
             ]
         except OSError:
             return []
-        folders.sort(key=lambda item: item.stat().st_mtime, reverse=True)
+        folders.sort(key=_changed_s, reverse=True)
         found = (self._facts(Path(item.path)) for item in folders[:_MOST_BAGS])
         return [facts for facts in found if facts is not None]
 
@@ -158,13 +167,27 @@ class Recordings:
         return cached[1]
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.send_signal(signal.SIGINT)
+def _changed_s(folder: os.DirEntry[str]) -> float:
     try:
-        process.wait(_ENDS_WITHIN_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+        return folder.stat(follow_symlinks=False).st_mtime
+    except OSError:  # it has just been deleted
+        return 0.0
+
+
+def _end(processes: list[subprocess.Popen[bytes]]) -> None:
+    """End commands by SIGTERM, after which they complete their bags; all within one limit.
+
+    SIGINT makes Python print a traceback while it starts.
+    """
+    for process in processes:
+        process.terminate()
+    end_s = time.monotonic() + _ENDS_WITHIN_S
+    for process in processes:
+        try:
+            process.wait(max(0.0, end_s - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 #: Those of this process, which is one dashboard.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -163,8 +162,6 @@ def _record(
     from composer.bags.recorder import Recorder
     from composer.runtime.clock.clock import COMPUTER
 
-    for number in (signal.SIGTERM, signal.SIGHUP):  # complete the bag
-        signal.signal(number, signal.default_int_handler)
     say(f"recording in {writer.folder}; press Ctrl-C to stop")
     recorder = Recorder(writer, COMPUTER)
     recording = GraphRecording(session, recorder, is_wanted, say)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,7 @@ import typer
 from composer.cli.support.errors import CommandError
 from composer.cli.support.options import quantity
 from composer.cli.support.terminal import say
+from composer.runtime.process.watchdog import STOP_SIGNALS
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
@@ -78,14 +80,24 @@ Ignore = Annotated[
 
 @contextmanager
 def bag_errors() -> Iterator[None]:
-    """Turn a BagError into a CommandError, also if a library of the extra is not installed."""
+    """Turn a BagError into a CommandError, also if a library of the extra is not installed.
+
+    Signals that end a service or a terminal do the same as Ctrl-C: a bag is completed, and
+    temporary files are deleted.
+    """
     from composer.bags.bag import BagError, require
 
+    signals = [item for item in STOP_SIGNALS if signal.getsignal(item) is signal.SIG_DFL]
+    for number in signals:
+        signal.signal(number, signal.default_int_handler)
     try:
         require("mcap")
         yield
     except BagError as error:
         raise CommandError(str(error), hint=error.hint) from error
+    finally:
+        for number in signals:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def opened(path: Path) -> Bag:

@@ -172,6 +172,22 @@ def test_mistakes(tmp_path: Path, options: tuple[str, ...], text: str) -> None:
     assert text in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("topic", "at_ns", "text"),
+    [
+        ("bad name!\x1b[31m", 1, "topic name '/bad name!\\x1b[31m' contains a space"),
+        ("/" + "x" * 3000, 1, "' has 3001 characters"),
+        ("/chat", 2**62, "from after 2038, which /clock cannot show"),
+    ],
+)
+def test_what_the_graph_cannot_have(tmp_path: Path, topic: str, at_ns: int, text: str) -> None:
+    writer = BagWriter(tmp_path / "bag")
+    writer.add_topic(BagTopic(topic, "std_msgs/msg/String"))
+    writer.write(BagMessage(topic, at_ns, at_ns, bytes(8)))
+    writer.close()
+    assert text in error("replay", tmp_path / "bag", "--clock")
+
+
 def test_a_type_that_is_not_installed_is_named(tmp_path: Path) -> None:
     bag = _chat(tmp_path, type_name="missing_msgs/msg/Chat")
     assert "interface 'missing_msgs/msg/Chat' is not installed" in error("replay", bag)

@@ -144,7 +144,12 @@ def test_qos_profiles_survive(profile: QosProfile) -> None:
 
 
 @pytest.mark.parametrize(
-    "damage", ["", "{", "3", "- 3", "[" * 5000, "- {history: 7, depth: x, deadline: 3}"]
+    "damage",
+    [
+        *("", "{", "3", "- 3", "[" * 5000, "- {history: 7, depth: x, deadline: 3}"),
+        *(f"- {{depth: {depth}}}" for depth in (-1, 2**32, 2**70)),
+        f"- {{deadline: {{sec: -5, nsec: 1}}, lifespan: {{sec: 1, nsec: {2**70}}}}}",
+    ],
 )
 def test_other_texts_have_no_qos_profiles(damage: str) -> None:
     assert set(qos_yaml.from_text(damage)) <= {QosProfile()}
@@ -212,6 +217,59 @@ def test_we_read_what_rosbag2_and_users_make_of_it(
     assert bag.summary.counts["/chat"] == 20
     assert list(bag.warnings) == []
     assert all(Path(path).exists() for path in bag.files)
+
+
+_ENDED = """
+import os, sys
+from pathlib import Path
+from composer.bags.reader import open_bag
+from composer.cli.support.bags import bag_errors
+with bag_errors():
+    bag = open_bag(Path(sys.argv[1]))
+    os.kill(os.getpid(), int(sys.argv[2]))
+    print("not ended")
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_a_signal_leaves_no_decompressed_file(tmp_path: Path, number: int) -> None:
+    write(tmp_path / "bag")
+    _compressed(tmp_path / "bag")
+    (tmp_path / "temporary").mkdir()
+    command = [sys.executable, "-c", _ENDED, str(tmp_path / "bag"), str(int(number))]
+    variables = {**os.environ, "TMPDIR": str(tmp_path / "temporary")}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=variables)
+    assert "KeyboardInterrupt" in done.stderr
+    assert done.stdout == ""
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def _compress_messages(bag: Path, add_size: bool) -> None:
+    """Compress messages as rosbag2 does in its mode ``message``."""
+    compressor = zstandard.ZstdCompressor(write_content_size=add_size)
+    [file] = bag.glob("*.db3")
+    with closing(sqlite3.connect(file)) as database:
+        for number, data in list(database.execute("select id, data from messages")):
+            values = (compressor.compress(data), number)
+            database.execute("update messages set data = ? where id = ?", values)
+        database.commit()
+    metadata = bag / "metadata.yaml"
+    content = metadata.read_text(encoding="utf-8")
+    content = content.replace("compression_mode: ''", "compression_mode: MESSAGE")
+    # The library would parse this for minutes.
+    metadata.write_text(f"{content}\nmore: {'[' * 300_000}", encoding="utf-8")
+
+
+def test_compressed_messages(tmp_path: Path) -> None:
+    for name, add_size in (("bag", True), ("no-size", False)):
+        options = {"version": 9, "storage_plugin": StoragePlugin.SQLITE3}
+        with RosbagsWriter(tmp_path / name, **options) as writer:
+            connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=STORE)
+            writer.write(connection, START_NS, text("a" * 1000))
+        _compress_messages(tmp_path / name, add_size)
+    assert [item.data for item in read(open_bag(tmp_path / "bag"))] == [text("a" * 1000)]
+    with pytest.raises(BagError, match="does not say how large it is"):
+        read(open_bag(tmp_path / "no-size"))
 
 
 def test_files_of_other_programs(tmp_path: Path) -> None:
