@@ -10,13 +10,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.errors import FAILED, CommandError, UsageError
+from composer.cli.support.errors import FAILED, CommandError, UsageError, require_extra
 from composer.cli.support.options import examples, quantity
 from composer.cli.support.ros import require_interfaces, require_modules, require_ros
 from composer.cli.support.system_arguments import nearest_path, path_exists
@@ -159,11 +158,7 @@ def _check_exploration(real_time: bool, repeat: int, bag_on_failure: bool) -> No
     if bag_on_failure:
         hint = "repeat what was found, then record it with --bag-on-failure"
         raise UsageError("--explore records no bags: leave out --bag-on-failure", hint=hint)
-    if find_spec("hypothesis") is None:
-        raise CommandError(
-            "--explore needs 'hypothesis', which is not installed in this Python",
-            hint='pip install "ros2-composer[explore]"',
-        )
+    require_extra("compose test --explore", "explore", "hypothesis")
 
 
 def _loaded(paths: Sequence[Path]) -> list[LoadResult]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 #: Exit codes; 0 is success and 3 an internal error.
 FAILED = 1
 USAGE = 2
@@ -37,3 +39,13 @@ class UsageError(CommandError):
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         super().__init__(message, hint=hint, exit_code=USAGE)
+
+
+def require_extra(command: str, extra: str, *packages: str) -> None:
+    """Raise CommandError if packages of an extra of ros2-composer are not installed."""
+    missing = [name for name in packages if find_spec(name) is None]
+    if missing:
+        raise CommandError(
+            f"'{command}' needs {', '.join(missing)}, which this Python does not have",
+            hint=f'pip install "ros2-composer[{extra}]"',
+        )

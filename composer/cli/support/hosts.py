@@ -6,13 +6,12 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from composer.cli.support.errors import CONFIG, FAILED, CommandError
+from composer.cli.support.errors import CONFIG, FAILED, CommandError, require_extra
 from composer.cli.support.system_arguments import runnable_system
 from composer.cli.support.terminal import lines, say, write
 
@@ -25,11 +24,7 @@ if TYPE_CHECKING:
 
 def require_hosts(command: str, *programs: str) -> None:
     """Raise CommandError if the package of the extra ``hosts``, or a program, is not installed."""
-    if find_spec("asyncssh") is None:
-        raise CommandError(
-            f"'{command}' needs asyncssh, which this Python does not have",
-            hint='pip install "ros2-composer[hosts]"',
-        )
+    require_extra(command, "hosts", "asyncssh")
     for program in programs:
         if shutil.which(program) is None:
             raise CommandError(f"'{command}' needs {program}, which is not installed")

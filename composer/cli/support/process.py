@@ -17,13 +17,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO, NoReturn
 
 from composer.cli.support.c_streams import crash_fd
-from composer.cli.support.errors import CommandError
+from composer.cli.support.errors import CommandError, require_extra
 from composer.cli.support.line_format import CONSOLE_FORMAT_VARIABLE, file_format
 from composer.cli.support.terminal import say
 
@@ -198,7 +197,6 @@ def _new_file(path: Path) -> BinaryIO:
 
 #: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
 _VARIABLE = "COMPOSE_DASHBOARD_FD"
-_NEEDED = ("starlette", "uvicorn", "websockets")
 _READY_WITHIN_S = 20.0
 #: The report that a system is up waits this long for the address.
 _ADDRESS_WITHIN_S = 5.0
@@ -208,12 +206,7 @@ _PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
 
 def require_dashboard(command: str) -> None:
     """Raise CommandError if the packages of the extra ``dashboard`` are not installed."""
-    missing = [name for name in _NEEDED if find_spec(name) is None]
-    if missing:
-        raise CommandError(
-            f"'{command}' needs {', '.join(missing)}, which this Python does not have",
-            hint='pip install "ros2-composer[dashboard]"',
-        )
+    require_extra(command, "dashboard", "starlette", "uvicorn", "websockets")
 
 
 def foxglove_line(url: str) -> str:

@@ -32,7 +32,7 @@ def test_the_extra_is_named_if_it_is_missing(
 ) -> None:
     find = importlib.util.find_spec
     monkeypatch.setattr(
-        "composer.cli.support.hosts.find_spec",
+        "composer.cli.support.errors.find_spec",
         lambda name: None if name == "asyncssh" else find(name),
     )
     done = compose("hosts", command, str(path))
