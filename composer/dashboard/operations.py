@@ -108,19 +108,7 @@ def drift(_: Values, dashboard: Dashboard) -> Prepared:
             )
         return {
             "system": declared.system.name.value,
-            "differences": [
-                {
-                    "kind": item.kind.value,
-                    "node": item.node,
-                    "subject": item.subject,
-                    "declared": item.declared,
-                    "live": item.live,
-                    "message": item.message,
-                    "hint": item.hint,
-                    "declared_at": None if item.span is None else str(item.span),
-                }
-                for item in found
-            ],
+            "differences": [item.plain() for item in found],
         }
 
     return run, _CHANGE_S

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -150,7 +150,7 @@ def _watched(
 
 def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
     if json:
-        found = [_as_data(drift) for drift in drifts]
+        found = [drift.plain() for drift in drifts]
         data = {"system": system.name.value, "clean": not drifts, "drift": found}
         write(as_json(data, indent=2))
     elif drifts:
@@ -161,7 +161,7 @@ def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
 
 def _event(what: str, drift: Drift, *, json: bool) -> str:
     if json:
-        return as_json({"event": what, **_as_data(drift)})
+        return as_json({"event": what, **drift.plain()})
     return lines(
         f"{what}: {line}" if number == 0 else line for number, line in enumerate(_lines(drift))
     )
@@ -173,16 +173,3 @@ def _lines(drift: Drift) -> Iterator[str]:
         yield f"  {drift.hint}"
     if drift.span is not None:
         yield f"  declared at {drift.span}"
-
-
-def _as_data(drift: Drift) -> dict[str, Any]:
-    return {
-        "kind": drift.kind.value,
-        "node": drift.node,
-        "subject": drift.subject or None,
-        "declared": drift.declared or None,
-        "live": drift.live or None,
-        "message": drift.message,
-        "hint": drift.hint or None,
-        "declared_at": None if drift.span is None else str(drift.span),
-    }

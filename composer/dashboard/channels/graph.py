@@ -26,6 +26,11 @@ _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
 _MANAGER = "manager"
+#: What is shown of the report of a node.
+_SHOWN = (
+    *("state", "desired", "since_s", "errors", "restarts", "held_down", "condition"),
+    *("last_error", "pid", "host"),
+)
 #: While the graph changes.
 _SOON_S = 0.1
 
@@ -141,7 +146,8 @@ class LiveFeed(Feed):
         states = self.ros.states().items()
         nodes: dict[str, Any] = {name: {"state": state} for name, state in states}
         for system in of_whole_systems(reports).values():
-            nodes |= {node.node: _state(node) for node in system.nodes}
+            for node in system.nodes:
+                nodes[node.node] = {key: getattr(node, key) for key in _SHOWN}
         edges: dict[str, Any] = {}
         reported: set[str] = set()
         for report in reports.values():
@@ -200,18 +206,3 @@ def _unreported(topology: Topology, systems: set[str], reported: set[str]) -> It
             end.is_for_tools or node in managers for node, end in ends
         ):
             yield topic
-
-
-def _state(node: NodeReport) -> dict[str, Any]:
-    return {
-        "state": node.state,
-        "desired": node.desired,
-        "since_s": node.since_s,
-        "errors": node.errors,
-        "restarts": node.restarts,
-        "held_down": node.held_down,
-        "condition": node.condition,
-        "last_error": node.last_error,
-        "pid": node.pid,
-        "host": node.host,
-    }

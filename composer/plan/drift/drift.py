@@ -184,6 +184,19 @@ class Drift:
         """The identity of the difference, independent of its value."""
         return (self.kind, self.node, self.subject)
 
+    def plain(self) -> dict[str, str | None]:
+        """Return the difference as data for JSON, None for what it does not have."""
+        return {
+            "kind": self.kind.value,
+            "node": self.node,
+            "subject": self.subject or None,
+            "declared": self.declared or None,
+            "live": self.live or None,
+            "message": self.message,
+            "hint": self.hint or None,
+            "declared_at": None if self.span is None else str(self.span),
+        }
+
     @property
     def message(self) -> str:
         """The difference in one line, without the hint."""

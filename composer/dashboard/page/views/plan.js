@@ -46,7 +46,7 @@ export function createPlan(app) {
         { class: "record drift" },
         h("h4", {}, one.node ? h("a", { href: pathOf("nodes", one.node) }, one.node) : one.subject, " ", h("span", {}, one.kind)),
         h("p", {}, one.message),
-        facts([["declared", textOf(one.declared)], ["running", textOf(one.live)], ["declared at", one.declared_at], ["hint", one.hint]]),
+        facts([["declared", one.declared], ["running", one.live], ["declared at", one.declared_at], ["hint", one.hint]]),
       )),
     ));
   }
@@ -58,8 +58,4 @@ export function createPlan(app) {
   }
 
   return { element: content, show };
-}
-
-function textOf(value) {
-  return value === null || value === undefined || typeof value === "string" ? value : JSON.stringify(value);
 }
