@@ -14,7 +14,7 @@ from composer.cli.support.completion import complete_node
 from composer.cli.support.errors import FAILED, CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, command_group, examples
 from composer.cli.support.ros import require_ros, ros_session
-from composer.cli.support.terminal import as_json, columns, lines, say, say_none_found, write
+from composer.cli.support.terminal import as_json, lines, say, write, write_list
 from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
 
     local = local_states(timeout)
     if local is not None:
-        _write_states(local, json=json)
+        write_list("lifecycle node", _rows(local), local, json=json)
         return
     with ros_session("compose lifecycle", timeout) as (session, deadline):
         from composer.client.graph_names import check_all_respond
@@ -58,17 +58,12 @@ def nodes(timeout: Timeout = DEFAULT_TIMEOUT_S, json: Json = False) -> None:
 
         client = LifecycleClient(session, deadline)
         states = client.states(client.nodes())
-        _write_states(states, json=json)
+        write_list("lifecycle node", _rows(states), states, json=json)
         check_all_respond(session)
-    if not states and not json:
-        say_none_found("lifecycle node")
 
 
-def _write_states(states: Mapping[str, str | None], *, json: bool) -> None:
-    if json:
-        write(as_json(states, indent=2))
-    elif states:
-        write(columns([(name, state or "(no response)") for name, state in states.items()]))
+def _rows(states: Mapping[str, str | None]) -> list[tuple[str, str]]:
+    return [(name, state or "(no response)") for name, state in states.items()]
 
 
 @lifecycle_app.command(
@@ -151,17 +146,18 @@ def set_state(
         bool,
         typer.Option(
             "--dependents",
-            help="Also deactivate the active nodes that depend on nodes that go down, before them, "
-            "and activate the inactive ones that depend on nodes that come up, after them.",
+            help="Move dependents as well: deactivate them before a node goes down, activate them "
+            "after a node has come up.",
         ),
     ] = False,
     timeout: Timeout = DEFAULT_TIMEOUT_S,
 ) -> None:
     """Change the lifecycle state of nodes.
 
-    Only the given nodes are moved: nodes that depend on them stay active, and are named. A
-    transition that is not available in the state of a node is not requested; the command continues
-    with the other nodes. To move all nodes of a system, use startup, pause, resume or reset.
+    The command moves only the given nodes. Active nodes that depend on them stay active; a note
+    names them. If a transition is not available in the state of a node, the command reports this
+    and continues with the other nodes. To move all nodes of a system, use startup, pause, resume
+    or reset.
 
     Exit code 1 if a transition is not available or fails.
     """

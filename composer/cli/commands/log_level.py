@@ -9,7 +9,7 @@ import typer
 from composer.cli.support.completion import complete_node
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.ros import ros_session
-from composer.cli.support.terminal import as_json, columns, say_none_found, write
+from composer.cli.support.terminal import write_list
 from composer.model import LogLevel
 
 EPILOG = examples(
@@ -54,9 +54,5 @@ def log_level(
             found = dict([levels.get(node)])
         else:
             found = {levels.set(node, level): level.value}
-    if json:
-        write(as_json(found, indent=2))
-    elif found:
-        write(columns([(name, text or "no response") for name, text in found.items()]))
-    else:
-        say_none_found("node")
+    rows = [(name, text or "(no response)") for name, text in found.items()]
+    write_list("node", rows, found, json=json)

@@ -17,7 +17,7 @@ from composer.cli.support.options import (
     examples,
 )
 from composer.cli.support.ros import graph_names, require_ros, ros_session
-from composer.cli.support.terminal import as_json, columns, lines, say_none_found, write
+from composer.cli.support.terminal import as_json, columns, lines, write, write_list
 
 NodeName = Annotated[
     str,
@@ -49,14 +49,9 @@ def add_list(app: typer.Typer, kind: str) -> None:
         timeout: Timeout = DEFAULT_TIMEOUT_S,
     ) -> None:
         named = graph_names(f"compose {kind}", kind, timeout, hidden=hidden)
-        if json:
-            data = [{"name": name, "types": list(each)} for name, each in named]
-            write(as_json(data, indent=2))
-        elif named:
-            rows = [(name, ", ".join(each)) if types else (name,) for name, each in named]
-            write(columns(rows))
-        else:
-            say_none_found(kind)
+        rows = [(name, ", ".join(each)) if types else (name,) for name, each in named]
+        data = [{"name": name, "types": each} for name, each in named]
+        write_list(kind, rows, data, json=json)
 
     epilog = examples(f"compose {kind} list", f"compose {kind} list --show-types")
     app.command("list", help=f"List {kind}s.", epilog=epilog)(list_names)
@@ -88,12 +83,7 @@ def list_nodes(
 ) -> None:
     """List nodes."""
     nodes = [name for name, _ in graph_names("compose node", "node", timeout, hidden=hidden)]
-    if json:
-        write(as_json(nodes, indent=2))
-    elif nodes:
-        write(lines(nodes))
-    else:
-        say_none_found("node")
+    write_list("node", [(name,) for name in nodes], nodes, json=json)
 
 
 @node_app.command("info", epilog=examples("compose node info planner"))

@@ -28,10 +28,10 @@ from composer.cli.support.terminal import (
     columns,
     lines,
     say,
-    say_none_found,
     say_raw,
     use_color,
     write,
+    write_list,
 )
 
 if TYPE_CHECKING:
@@ -101,11 +101,9 @@ def list_parameters(
 
 def _list_all(timeout: float, *, hidden: bool, json: bool) -> None:
     names_by_node = _all_names(timeout, hidden=hidden)
-    if json:
-        write(as_json(names_by_node, indent=2))
+    if json or not names_by_node:
+        write_list("node", (), names_by_node, json=json)
         return
-    if not names_by_node:
-        say_none_found("node")
     for node, names in names_by_node.items():
         if names is None:
             say(

@@ -257,6 +257,11 @@ def truncated(value: Any, max_length: int) -> Any:
     return value
 
 
-def say_none_found(kind: str) -> None:
-    """Explain an empty list on stderr."""
-    say(f"no {kind} found: check that the system is running and that ROS_DOMAIN_ID is the same")
+def write_list(kind: str, rows: Sequence[Sequence[str]], data: Any, *, json: bool) -> None:
+    """Print ``data`` as JSON, or ``rows`` as a table; explain an empty list on stderr."""
+    if json:
+        write(as_json(data, indent=2))
+    elif rows:
+        write(columns(rows))
+    else:
+        say(f"no {kind} found: check that the system is running and that ROS_DOMAIN_ID is the same")
