@@ -105,10 +105,7 @@ def merge(
     *,
     topics: Topics = None,
 ) -> None:
-    """Write the messages of several bags to a new one.
-
-    They are in the order of their times.
-    """
+    """Write the messages of several bags to a new one, in the order of their times."""
     _write(bags, selection(topics, 0.0, None), output, (None, None))
 
 

@@ -86,8 +86,9 @@ def dashboard(
 ) -> None:
     """Show and control running systems in the browser.
 
-    Prints the address of the page, and that for Foxglove and Lichtblick, with a token that is new
-    for each start. Press Ctrl-C to stop.
+    Prints the address of the page, and the address for Foxglove and Lichtblick. Both contain a
+    token that is new for each start. Press Ctrl-C to stop.
+
     The dashboard shows the whole ROS graph. With the file of a system, it also shows source lines,
     the plan, and the differences between the file and the running system.
 

@@ -55,8 +55,8 @@ def doctor(
     and the types and QoS policies of running nodes. Each problem is reported with a remedy. Without
     ROS, the ROS graph is not checked.
 
-    With a system, its 'discovery' is used and checked: addresses, interfaces, and whether nodes
-    discover each other through its server, which is started for that if necessary.
+    With a system, the command uses and checks its 'discovery': addresses, interfaces, and whether
+    nodes discover each other through the server. If necessary, it starts the server for this check.
 
     Exit code 1 if there are errors, or warnings with --strict.
     """

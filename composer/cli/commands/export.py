@@ -53,9 +53,9 @@ def export_launch(
 ) -> None:
     """Write a launch file that runs a system.
 
-    It has the arguments of the system as launch arguments, also those without a value, and others
-    for the namespace, simulated time and the log level. It ends with the system. To run a system
-    from a launch file of your own, use its action ComposeSystem.
+    The arguments of the system become launch arguments, also those without a value. Other launch
+    arguments set the namespace, simulated time and the log level. The launch ends with the system.
+    To run a system from a launch file of your own, use the action ComposeSystem.
     """
     from composer.bridges.export.launch_file import launch_file
 
@@ -84,9 +84,9 @@ def export_systemd(
 ) -> None:
     """Write the systemd units that run a system.
 
-    There is a service for each of its processes, in this Python environment, with the variables of
-    ROS that are set now. It runs as you. A process that fails is started again as the system
-    declares it. The services of several processes belong to a target.
+    Each process of the system becomes a service. The service runs as you, in this Python
+    environment, with the ROS variables that are set now. If a process fails, systemd starts it
+    again as the system declares. The services of several processes belong to a target.
     """
     from composer.bridges.export.systemd import Installation, units
     from composer.client.hosts.remote_command import python_words

@@ -134,8 +134,8 @@ def sync(
 
     Copies the folder of the project to the workspace of each host, with rsync over ssh, except for
     environments, builds, logs, .git, private keys, .env files, and what .gitignore or .dockerignore
-    exclude. Nothing outside the workspaces is changed. A folder with files that this command has
-    not copied is refused.
+    exclude. The command writes only to the workspaces, and refuses a folder with files that it has
+    not copied.
     """
     require_hosts("compose hosts sync", "rsync", "ssh")
     result, declared, _ = load_for_hosts(system, arguments)
@@ -198,14 +198,17 @@ def discovery_server(
     *,
     ready: Annotated[
         bool,
-        typer.Option("--ready", help="Only exit with 0 if the server runs here, with 1 if not."),
+        typer.Option(
+            "--ready", help="Start nothing; exit with 0 if the server runs here, with 1 if not."
+        ),
     ] = False,
 ) -> None:
     """Run the discovery server of a system.
 
-    'compose run' starts the server itself with 'start: true', and uses one that runs already. Run
-    it by this command if it shall not end with the system. It is the server of Fast DDS, started
-    again if it ends. Of several servers, those with addresses of this computer are run.
+    With 'start: true', 'compose run' starts the discovery server of Fast DDS, or uses a server that
+    already runs. This command runs the server on its own, so that it does not end with the system,
+    and restarts it if it ends. If the system has several servers, the command runs those with an
+    address of this computer.
     """
     discovery = _discovery(system, arguments)
     if ready:

@@ -82,7 +82,8 @@ def live(
     observes them, but does not start or move them. Replace 'external' by 'class' or 'executable' to
     start a node with the system.
 
-    The ROS graph does not show the depth of queues. It is that of the most similar QoS preset.
+    The ROS graph does not show the depth of queues: the file has the depth of the most similar QoS
+    preset.
     """
     with ros_session("compose import live", timeout) as (session, deadline):
         from composer.bridges.importing.live import describe_graph
@@ -130,8 +131,9 @@ def import_class(
 ) -> None:
     """Describe an rclpy node class as a node type.
 
-    The source is read, and no code of it runs: the topics, services, actions and parameters that it
-    creates with literal names are declared. What only running would show is listed.
+    The command reads the source and runs none of its code. It declares the topics, services,
+    actions and parameters that the class creates with literal names, and lists what only a running
+    node would show.
 
     The module is searched for in this folder, among the node types of the project, and on
     Python's module search path.
@@ -187,14 +189,14 @@ def import_launch(
 ) -> None:
     """Describe the nodes of a launch file as a system.
 
-    The file is evaluated with these arguments in a process of its own, like 'ros2 launch' does, but
-    nothing is started: nodes become executables with their names, namespaces, parameters,
-    remappings, environment and restarts. Launch arguments and conditions are kept where possible,
-    includes and groups are resolved. Components, processes that are not nodes, event handlers, and
-    options that systems do not have are listed and left out.
+    The file is evaluated with these arguments in a separate process, as 'ros2 launch' does, but
+    nothing is started. Nodes become executables, and composable nodes become components, with their
+    names, namespaces, parameters, remappings, environment and restarts. Launch arguments and
+    conditions are kept where possible; includes and groups are resolved. Processes that are not
+    nodes, event handlers, and options that systems do not have are listed and left out.
 
-    Parameters of nodes that the launch file does not name are for nodes inside the programs. With
-    --output, they are written to a parameter file next to the system.
+    A program may create nodes that the launch file does not name. With --output, their parameters
+    are written to a parameter file next to the system.
 
     Launch files do not show topics, services and actions: see 'compose import live'. The packages
     launch and launch_ros must be installed.

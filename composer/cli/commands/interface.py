@@ -128,8 +128,8 @@ def build(
     tf2_msgs, control_msgs and other packages of ROS that are not on PyPI are built by their names,
     from the definitions that come with the composer.
 
-    Building needs ROS 2 from PyPI. With a sourced ROS 2, and for packages with types of another one
-    that is not on PyPI, such as nav2_msgs, build the generated package with colcon.
+    Building needs ROS 2 from PyPI. Use --generate and colcon with a sourced ROS 2, and for a
+    package that uses types of another package that is not on PyPI, such as nav2_msgs.
     """
     from composer.project import Project
 

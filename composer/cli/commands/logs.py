@@ -80,17 +80,17 @@ def logs(
     list_runs: Annotated[bool, typer.Option("--list", help="List the runs instead.")] = False,
     json: Json = False,
 ) -> None:
-    """Print the log of a run, also after its end.
+    """Print the log of a running or finished system.
 
-    By default, this is the last run in the current ROS domain (ROS_DOMAIN_ID), or of all domains if
-    there is none. A heading on stderr names it.
+    By default, the command prints the last run in the current ROS domain (ROS_DOMAIN_ID); if there
+    is none, the last run in any domain. A heading on stderr names the run.
 
-    The log of a system includes its processes on this computer, whatever has started them, and
-    those on other computers that 'compose hosts run' has started here.
+    The log includes all processes of the system on this computer, and the processes on other
+    computers that 'compose hosts run' started from here.
 
-    The log has what 'compose run' prints about a system and its nodes, with the date and time.
-    'compose run' keeps it in the folder 'compose' of the ROS log folder (ROS_LOG_DIR, by default
-    ~/.ros/log): up to 50 MB of each run, and the last 20 runs of each system.
+    'compose run' writes what it prints, with the date and time, to the folder 'compose' of the ROS
+    log folder (ROS_LOG_DIR, by default ~/.ros/log). It keeps up to 50 MB of each run, and the last
+    20 runs of each system.
     """
     selection = _selection(nodes or [], since, level)
     runs = _runs(system)

@@ -18,8 +18,7 @@ from composer.cli.support.terminal import lines, say, write
 new_app = command_group(
     """Create a project, or files in it.
 
-    Systems, node types and interface packages that are created are valid and have a test. Existing
-    files are not replaced.
+    New files are valid, and systems and node types have a test. Existing files are not replaced.
     """
 )
 

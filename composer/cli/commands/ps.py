@@ -50,11 +50,10 @@ def ps(
     """List running systems and their nodes.
 
     For each node, the list has the state and its duration, the number of restarts and errors, the
-    message rates of the last seconds (- if they are not known), and the last error. Nodes of other
-    processes of a system are listed there, with the process. Lifecycle nodes that do not belong to
-    a system are listed with their states, and so are those of a system of another version of
-    ros2-composer. With --json, the output includes callback timings, which
-    'compose top' shows as a table.
+    message rates of the last seconds (- if they are not known), and the last error. A system is
+    listed with the nodes of all its processes. Other lifecycle nodes are listed with their states,
+    as are the nodes of a system that another version of ros2-composer runs. With --json, the output
+    includes callback timings, which 'compose top' shows as a table.
 
     With --ready, the exit code is 1 if a system is being started or shut down, or is paused, if a
     node has failed, or if no system runs. A process of a system, such as robot/perception, is ready

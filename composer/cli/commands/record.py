@@ -92,8 +92,8 @@ def record(
     Without --topics, --services and --actions, everything is recorded; with one of them, only what
     they select.
 
-    The 'recording' of a system, and 'compose run --record', record from inside of its process, at
-    less cost.
+    'compose run --record' and the key 'recording' of a system record inside the process of the
+    system, at less cost.
     """
     if now:
         others = (topics, services, actions, output, run_for, split_mb, split_s)

@@ -183,14 +183,15 @@ def run(
         typer.Option(
             "--process",
             metavar="NAME",
-            help="Run only this process of the system; 'compose run' without it moves its nodes.",
+            help="Run only this process of the system; 'compose run' without --process brings up "
+            "its nodes.",
         ),
     ] = None,
     await_processes: Annotated[
         bool,
         typer.Option(
             "--await-processes",
-            help="Start no other process of the system; wait for those that are started elsewhere.",
+            help="Start no other process of the system; wait until something else starts them.",
         ),
     ] = False,
     grace: Annotated[
@@ -201,10 +202,10 @@ def run(
     """Run a system.
 
     The system is validated first, and nothing is started if it has errors. All nodes run in this
-    process, except for executables and the nodes of other processes, which it starts. They are
-    brought up in dependency order and shut down in reverse order. If a node fails, its 'on_failure'
-    applies, during bring-up as well: the nodes that do not depend on it come up. Press Ctrl-C to
-    shut down.
+    process, except for executables and for nodes of other processes: 'compose run' starts both.
+    Nodes start in dependency order and shut down in reverse order. If a node fails, its
+    'on_failure' applies, during bring-up as well: nodes that do not depend on it start. Press
+    Ctrl-C to shut down.
 
     Exit code 1 if the bring-up fails or a required node is down at the end, 78 if the system has
     errors or lacks an interface package. Errors of handlers are reported in the summary; use

@@ -65,8 +65,8 @@ def stubs(
     Pylance, pyright and basedpyright read the folder 'typings' without a setting. For pyrefly, set
     'search-path', for ty 'environment.extra-paths', for mypy 'mypy_path' to it.
 
-    'compose validate' and 'compose run' update 'typings' once it exists. Files that this command
-    has not written are neither replaced nor removed.
+    'compose validate' and 'compose run' update 'typings' once it exists. They replace and remove
+    only files that one of these commands has written.
     """
     from composer.base.source import shown_path
     from composer.python_code.stubs.folder import TYPINGS, folder_changes

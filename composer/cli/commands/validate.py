@@ -108,7 +108,7 @@ def validate(
         str | None,
         typer.Option(
             metavar="RULE",
-            help="Explain a rule, or list those whose code begins like this; check nothing.",
+            help="Explain a rule, or list the rules with this code prefix; check no files.",
             autocompletion=complete_rule,
         ),
     ] = None,
@@ -116,8 +116,8 @@ def validate(
     """Check systems and node types.
 
     Nothing is started, and ROS is not needed. All combinations of arguments are checked. An
-    argument that is given as NAME=VALUE has only this value. Settings for a whole project can be
-    set in its composer.yaml: strict, select, ignore, severity, nodes and interfaces.
+    argument given as NAME=VALUE is checked with this value only. Settings of a project are in its
+    composer.yaml: strict, select, ignore, severity, nodes and interfaces.
 
     The formats json, sarif and github always have all diagnostics.
 
