@@ -26,12 +26,9 @@ from composer.plan.reconciliation import (
 )
 from composer.plan.steps import Plan, Step, TransitionName
 from composer.plan.transitions import (
-    STOPPED,
-    SystemGoals,
     bring_up,
     plan_transitions,
     start_causes,
     start_goals,
-    system_goals,
     tear_down,
 )

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field
 
-from composer.base.fast_dataclass import dataclass
 from composer.model import Dependency, Node, PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
 from composer.plan.steps import Phase, Plan, build_plan, downward, nodes_of, rank, upward
@@ -191,51 +189,3 @@ def _listing(names: tuple[str, ...]) -> str:
     if len(names) <= 2:
         return " and ".join(names)
     return f"{names[0]} and {len(names) - 1} others"
-
-
-STOPPED = "stopped"
-
-
-@dataclass(frozen=True, slots=True)
-class SystemGoals:
-    """The goals of all nodes: those of a start up to the state ``limit``, except ``others``.
-
-    ``others`` are goals by the full names of nodes. ``serial`` increases with each change, also
-    over several coordinating processes. ``activity`` is that of the system, for example "paused";
-    once the coordinating process has shut the system down in order, it is "stopped".
-    """
-
-    serial: int
-    activity: str
-    limit: PrimaryState = PrimaryState.ACTIVE
-    others: Mapping[str, PrimaryState] = field(default_factory=dict)
-
-    def states(self, system: System) -> Mapping[str, PrimaryState]:
-        """Return the goal of each node of the system, by its key."""
-        names = {node.name.value: node.full_name for node in system.nodes}
-        goals = start_goals(system, self.limit)
-        return {name: self.others.get(names[name], goal) for name, goal in goals.items()}
-
-
-def system_goals(
-    system: System, goals: Mapping[str, PrimaryState], activity: str, serial: int
-) -> SystemGoals:
-    """Return the goals of nodes, given by their keys, with as few ``others`` as possible."""
-    found = (_up_to(limit, system, goals, activity, serial) for limit in reversed(PrimaryState))
-    return min(found, key=lambda candidate: len(candidate.others))
-
-
-def _up_to(
-    limit: PrimaryState,
-    system: System,
-    goals: Mapping[str, PrimaryState],
-    activity: str,
-    serial: int,
-) -> SystemGoals:
-    usual = start_goals(system, limit)
-    others = {
-        node.full_name: goals[node.name.value]
-        for node in system.nodes
-        if goals.get(node.name.value, usual[node.name.value]) is not usual[node.name.value]
-    }
-    return SystemGoals(serial, activity, limit, others)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 from lifecycle_msgs.msg import State, Transition, TransitionDescription
@@ -19,7 +18,6 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
 from composer.base.fast_dataclass import dataclass
 from composer.model.lifecycle import FINALIZED, TRANSITIONS
-from composer.plan import SystemGoals
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.lives import REPORTS_WITHIN_S
@@ -31,13 +29,11 @@ from composer.runtime.node.managed_node import (
 )
 from composer.runtime.node.parameter_services import PARAMETER_SERVICES
 from composer.runtime.outside_nodes.remote_node import DONE_IN
-from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import (
     CREATE,
     AskReportKey,
     CallNodes,
     ChangeStates,
-    KeepGoals,
     NodeCall,
     NodeResponses,
     ReportKey,
@@ -114,9 +110,7 @@ class MemberCallbacks:
     None. ``report_number()`` returns the number of the last report of the states.
     ``publish_states()`` is called once nodes are shut down: the coordinating process waits for
     their last counters. ``expect_end()`` is called if the process ends after the steps of a
-    request. ``keep_goals(goals)`` receives those of the whole system. ``timings()`` returns the
-    timings of callbacks and chains. ``report_key`` answers processes that ask for it, unless it is
-    empty.
+    request. ``report_key`` answers processes that ask for it, unless it is empty.
     """
 
     nodes: Nodes
@@ -124,8 +118,6 @@ class MemberCallbacks:
     report_number: Callable[[], int]
     publish_states: Callable[[], None]
     expect_end: Callable[[], None]
-    keep_goals: Callable[[SystemGoals], None]
-    timings: Callable[[], TimingReport]
     report_key: str
 
 
@@ -156,17 +148,12 @@ class MemberService:
         self._reports = ReportTimes()
         self._repeats = RepeatLimit(loop.clock)
 
-    def completed(self, report: SystemReport) -> SystemReport:
-        """Return a report with what the coordinating process needs to know."""
-        sender, number = self._received.last
-        return replace(report, participant=self._participant, last_sender=sender, last_step=number)
-
     def on_report(self, number: int) -> None:
         """Receive that a report is the current one now."""
         self._reports.note(number, self._loop.clock.monotonic())
 
     def on_request(
-        self, request: ChangeStates | KeepGoals | AskReportKey, reply: Callable[[Any], None]
+        self, request: ChangeStates | AskReportKey, reply: Callable[[Any], None]
     ) -> None:
         """Answer a request, now or later."""
         if isinstance(request, AskReportKey):
@@ -175,11 +162,7 @@ class MemberService:
             return
         if request.participant and request.participant != self._participant:
             return  # for another process of the same name
-        if isinstance(request, KeepGoals):
-            if request.goals is not None:
-                self._callbacks.keep_goals(request.goals)
-            reply(self._callbacks.timings() if request.wants_timings else TimingReport())
-        elif self._reports.is_outdated(request.seen_report, self._loop.clock.monotonic()):
+        if self._reports.is_outdated(request.seen_report, self._loop.clock.monotonic()):
             self._log_late(request.steps)
         else:
             if request.are_last:
@@ -281,8 +264,6 @@ class ReceivedSteps(Generic[T]):
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[str, int, T]] = {}
-        #: The sender and the number of the last step that was received, as they are reported.
-        self.last = ("", 0)
 
     def find(self, sender: str, step: Step) -> T | None:
         """Return what runs a step that was received before; None if it is a new one."""
@@ -297,7 +278,6 @@ class ReceivedSteps(Generic[T]):
     def add(self, sender: str, step: Step, running: T) -> None:
         """Keep what runs a new step."""
         self._last[step.node] = sender, step.number, running
-        self.last = sender, step.number
 
     def of(self, nodes: Iterable[str]) -> list[T]:
         """Return what runs, or ran, the last steps of some nodes."""

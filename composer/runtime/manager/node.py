@@ -11,7 +11,6 @@ Its topics are described in :mod:`.publishing`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -37,12 +36,7 @@ from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.node_time.sim_time import SimTimeSource, publish_clock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.codec import ProtocolError
-from composer.runtime.protocol.reports import (
-    CallbackFigures,
-    ChainFigures,
-    SystemReport,
-    TimingReport,
-)
+from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.protocol.requests import (
     ALL_OR_NOTHING,
     IS_ACTIVE,
@@ -53,7 +47,6 @@ from composer.runtime.protocol.requests import (
     ChangeStates,
     Done,
     Instance,
-    KeepGoals,
     Restart,
     SaveRecording,
 )
@@ -74,7 +67,7 @@ COMMANDS = (
 )
 _RESTART = "restart"
 #: The requests of the coordinating process to the others.
-_OF_MEMBERS = (ChangeStates, KeepGoals, AskReportKey)
+_OF_MEMBERS = (ChangeStates, AskReportKey)
 _OF_COMMANDS = (Restart, SaveRecording, CallNodes)
 _PERIOD_S = 1.0
 _ENDS_WITHIN_S = 0.2
@@ -153,12 +146,6 @@ class ManagerNode:
         )
         self._clock = NodeTime(self._node, self._loop, simulated_time)
         self._node.set_parameters([Parameter(USE_SIM_TIME_NAME, value=use_sim_time)])
-        sources = ReportSources(
-            status, host.callbacks, host.chains, self._completed, self._on_report, report_key
-        )
-        self._reports = ReportPublisher(
-            self._node, self._loop, self.process_context.events, sources
-        )
         for command in COMMANDS:
             self._add_service(Trigger, command, partial(self._on_command, command))
         self._add_service(Trigger, IS_ACTIVE, self._on_is_active)
@@ -172,6 +159,13 @@ class ManagerNode:
             on_permanent=self._warn_of_instance,
         )
         own_participant = self._instances.participant
+        sources = ReportSources(
+            *(status, host.callbacks, host.chains),
+            *(self._on_report, report_key, own_participant.hex()),
+        )
+        self._reports = ReportPublisher(
+            self._node, self._loop, self.process_context.events, sources
+        )
         if report_key:
             is_child = status.without_nodes.is_child
             callbacks = MemberCallbacks(
@@ -179,9 +173,7 @@ class ManagerNode:
                 host.recreate,
                 lambda: self._reports.number,
                 self._reports.publish,
-                host.expect_end,
-                status.keep_goals,
-                self._called,
+                self._expect_end,
                 "" if is_child else report_key,  # the coordinating process has given it
             )
             self._member = MemberService(
@@ -286,8 +278,9 @@ class ManagerNode:
         self._graph.note_participants()
         self._reports.tick()
 
-    def _completed(self, report: SystemReport) -> SystemReport:
-        return report if self._member is None else self._member.completed(report)
+    def _expect_end(self) -> None:
+        self._reports.includes_timings = True
+        self._host.expect_end()
 
     def _on_report(self, number: int) -> None:
         if self._member is not None:
@@ -295,12 +288,6 @@ class ManagerNode:
 
     def _on_query_error(self, error: Exception) -> None:
         self._node.get_logger().error(f"cannot answer a query of a command: {error!r}")
-
-    def _called(self) -> TimingReport:
-        """Return the timings for a summary: of what was called, without histograms."""
-        timings = self._reports.timings()
-        called = (item for item in timings.callbacks if item.count or item.dropped)
-        return replace(timings, callbacks=tuple(replace(item, histogram="") for item in called))
 
     def _instance(self) -> Instance:
         status = self._status.without_nodes

@@ -176,17 +176,16 @@ _AT_ONCE = Duration()
 class ReportSources:
     """Where reports come from: ``callbacks()`` and ``chains()`` return timings.
 
-    ``completed(report)`` adds what the coordinating process of the system needs to know, and
     ``on_report(number)`` is called when a report is the current one. With ``key``, reports are
-    signed.
+    signed, and name the ``participant`` of the process.
     """
 
     status: Status
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     chains: Callable[[], tuple[ChainFigures, ...]]
-    completed: Callable[[SystemReport], SystemReport]
     on_report: Callable[[int], None]
     key: str
+    participant: str
 
 
 class ReportPublisher:
@@ -206,6 +205,8 @@ class ReportPublisher:
         self._published_s = 0.0  # monotonic
         #: The number of reports so far.
         self.number = 0
+        #: Whether reports have timings: the last ones, for the coordinating process.
+        self.includes_timings = False
         self._diagnostics = self._publisher(DiagnosticArray, _DIAGNOSTICS, 10, self.publish)
         self._state = self._publisher(String, f"~/{STATE_TOPIC}", STATE_QOS, self.publish)
         self._callbacks = self._publisher(
@@ -220,7 +221,17 @@ class ReportPublisher:
     def report(self) -> SystemReport:
         """Return the current report. Thread-safe."""
         status = self._sources.status.snapshot()
-        return self._sources.completed(replace(status, at_s=self._now_s, number=self.number))
+        participant = self._sources.participant if self._sources.key else ""
+        timings = self.timings() if self.includes_timings else TimingReport()
+        called = (item for item in timings.callbacks if item.count or item.dropped)
+        return replace(
+            status,
+            at_s=self._now_s,
+            number=self.number,
+            participant=participant,
+            callbacks=tuple(replace(item, histogram="") for item in called),
+            chains=timings.chains,
+        )
 
     def timings(self) -> TimingReport:
         """Return the current timings. Thread-safe."""

@@ -14,7 +14,6 @@ from composer.model import LogLevel, Process
 from composer.model.hosts import own_enclave
 from composer.runtime.children.child_processes import ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
-from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
 from composer.runtime.protocol.reports import NodeReport
@@ -50,9 +49,8 @@ class MemberContext:
     """What a process of the system needs from the one that coordinates it.
 
     ``namespace`` is that of the coordinating manager; ``command`` starts ``compose run`` with the
-    same system, and is empty if the process is only to be awaited. ``goals`` are those of the whole
-    system, which its processes keep. What nodes report within the context manager ``together`` is
-    handled together.
+    same system, and is empty if the process is only to be awaited. What nodes report within the
+    context manager ``together`` is handled together.
     """
 
     loop: Loop
@@ -60,7 +58,6 @@ class MemberContext:
     children: ChildProcesses
     namespace: str
     command: Sequence[str]
-    goals: KeptGoals
     write_log: Callable[[LogLevel, str, str], None]
     together: Callable[[], AbstractContextManager[None]] = nullcontext
 

@@ -1,65 +1,62 @@
-"""The goals of the system, as its other processes keep them for the next coordinating one.
+"""The goals of a system, kept in a file for the next coordinating process on this computer.
 
-It is apart from what needs ROS, so that it is tested without.
+They count only if other processes have kept nodes of the system, which they do not move by
+themselves: a paused system stays paused. The module needs no ROS.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping
-from dataclasses import replace
+from contextlib import suppress
+from pathlib import Path
 
+from composer.base.fast_dataclass import dataclass
+from composer.base.regular_files import write_whole
 from composer.model import PrimaryState, System
-from composer.plan import STOPPED, SystemGoals, system_goals
+from composer.runtime.protocol.codec import decode, encode
+
+
+@dataclass(frozen=True, slots=True)
+class SystemGoals:
+    """The goals of nodes by their full names. ``activity`` is that of the system: "paused"."""
+
+    activity: str
+    goals: Mapping[str, PrimaryState]
 
 
 class KeptGoals:
-    """The goals that processes have reported, then those that they are to keep. Thread-safe."""
+    """The file with the goals of one system. Without a folder for it, nothing is kept."""
 
-    def __init__(self, system: System) -> None:
-        self._system = system
-        self._lock = threading.Lock()
-        self._reported: SystemGoals | None = None
-        self._current: SystemGoals | None = None
-        self._last: tuple[Mapping[str, PrimaryState], str] | None = None
+    def __init__(self, system: System, path: Path | None) -> None:
+        self._path = path
+        self._names = {node.name.value: node.full_name for node in system.nodes}
+        self._last: SystemGoals | None = None
 
-    @property
-    def found(self) -> SystemGoals | None:
-        """The last goals of an earlier coordinating process that has not shut the system down."""
-        reported = self._reported
-        return None if reported is None or reported.activity == STOPPED else reported
+    def keep(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
+        """Keep goals by the keys of nodes, if they are new ones."""
+        new = SystemGoals(activity, {self._names[name]: goal for name, goal in goals.items()})
+        if self._path is not None and new != self._last:
+            self._last = new
+            with suppress(OSError):
+                write_whole(self._path, encode(new))
 
-    def change(self, goals: Mapping[str, PrimaryState], activity: str) -> SystemGoals | None:
-        """Set goals by the keys of nodes; return them for all processes if they are new ones."""
-        if self._last == (goals, activity):
+    def found(self) -> tuple[Mapping[str, PrimaryState], str] | None:
+        """Return the goals by the keys of nodes, and the activity; None if there are none."""
+        if self._path is None:
             return None
-        self._last = goals, activity
-        return self._replace(system_goals(self._system, goals, activity, serial=0))
+        try:
+            found = decode(self._path.read_text(encoding="utf-8"), SystemGoals)
+        except (OSError, ValueError):
+            return None
+        goals = {
+            name: found.goals[full_name]
+            for name, full_name in self._names.items()
+            if full_name in found.goals
+        }
+        return goals, found.activity
 
-    def stop(self) -> SystemGoals | None:
+    def forget(self) -> None:
         """Let the next coordinating process start the system as if it were the first one."""
-        return None if self._current is None else self._replace(SystemGoals(0, STOPPED))
-
-    def on_report(self, reported: SystemGoals | None) -> SystemGoals | None:
-        """Receive what a process keeps; return what it is to keep instead."""
-        with self._lock:
-            current = self._current
-            if current is None:
-                if reported is not None and _serial(reported) > _serial(self._reported):
-                    self._reported = reported
-                return None
-            if reported == current:
-                return None
-            if _serial(reported) >= current.serial:  # found too late to be used
-                self._current = current = replace(current, serial=_serial(reported) + 1)
-            return current
-
-    def _replace(self, goals: SystemGoals) -> SystemGoals:
-        with self._lock:
-            serial = max(_serial(self._reported), _serial(self._current)) + 1
-            self._current = replace(goals, serial=serial)
-            return self._current
-
-
-def _serial(goals: SystemGoals | None) -> int:
-    return -1 if goals is None else goals.serial
+        if self._path is not None:
+            with suppress(OSError):
+                self._path.unlink()

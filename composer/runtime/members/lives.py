@@ -120,6 +120,8 @@ class MemberLives:
         self._context = context
         self._on_failure = on_failure
         self.current: MemberLife | None = None  # from the start, or the first report, to the end
+        #: The last report of all lives.
+        self.last_report: SystemReport | None = None
         #: The figures of each node of the process.
         self.figures: dict[str, NodeFigures] = {}
         self.may_start = bool(context.command)
@@ -160,6 +162,7 @@ class MemberLives:
     def take(self, report: SystemReport, life: MemberLife) -> None:
         """Keep a report of a life as its last one."""
         life.last, life.reported_s = report, self._clock.monotonic()
+        self.last_report = report
         for node in report.nodes:
             if node.node in self.figures:
                 is_child = life.child is not None

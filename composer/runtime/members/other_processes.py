@@ -1,13 +1,11 @@
-"""The other processes of the system together, and what they keep for the next coordinating one."""
+"""The other processes of the system together, and the goals that are kept while there are any."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import partial
+from contextlib import AbstractContextManager, contextmanager
 
 from composer.model import PrimaryState, System
-from composer.plan import SystemGoals
 from composer.runtime.callbacks.log import Write
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.loop import Loop
@@ -16,9 +14,8 @@ from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.computer import is_this_computer
-from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
-
-_POLL_S = 0.01
+from composer.runtime.process.instance_lock import goals_path
+from composer.runtime.protocol.reports import SystemReport
 
 
 class OtherProcesses:
@@ -41,9 +38,8 @@ class OtherProcesses:
         self._command = command
         self._write_log = write_log
         self._together = together
-        self._goals = KeptGoals(system)
+        self._goals = KeptGoals(system, goals_path(namespace) if self._models else None)
         self._processes: dict[str, MemberProcess] = {}
-        self._loop: Loop  # set with the first process
 
     def process(
         self, name: str, loop: Loop, context: ProcessContext, children: ChildProcesses
@@ -53,7 +49,6 @@ class OtherProcesses:
             model = self._models[name]
             host = None if model.host is None else model.host.value
             is_local = host is None or is_this_computer(self._addresses[host])
-            self._loop = loop
             self._processes[name] = MemberProcess(
                 model,
                 MemberContext(
@@ -62,7 +57,6 @@ class OtherProcesses:
                     children=children,
                     namespace=self._namespace,
                     command=self._command if is_local else (),
-                    goals=self._goals,
                     write_log=self._write_log,
                     together=self._together,
                 ),
@@ -101,8 +95,6 @@ class OtherProcesses:
         for process in self._all:
             process.close()
 
-    # --- what is requested of the system
-
     @property
     def are_known(self) -> bool:
         """Whether all have reported that were not started here, and none of their nodes moves."""
@@ -114,43 +106,29 @@ class OtherProcesses:
         return any(process.is_running and not process.is_known for process in self._all)
 
     @property
-    def found_goals(self) -> SystemGoals | None:
-        """What an earlier coordinating process has left; None if the system is to be started."""
-        return self._goals.found
+    def last_reports(self) -> tuple[SystemReport, ...]:
+        """The last reports of the processes."""
+        return tuple(item for process in self._all if (item := process.last_report) is not None)
+
+    # --- the goals of the system
+
+    def found_goals(self) -> tuple[Mapping[str, PrimaryState], str] | None:
+        """Return what an earlier coordinating process has left, by the keys of nodes.
+
+        None if it has left no nodes inactive or active: then the system is to be started.
+        """
+        has_kept_nodes = any(process.has_kept_nodes for process in self._all)
+        return self._goals.found() if has_kept_nodes else None
 
     def keep_goals(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
-        """Let all keep the goals of the system, by the keys of its nodes."""
+        """Keep the goals of the system, by the keys of its nodes, and its activity."""
         if self._processes:
-            self._send(self._goals.change(goals, activity))
+            self._goals.keep(goals, activity)
 
-    def on_stop(self) -> None:
-        """Ask for timings; let the next coordinating process start the system as the first one."""
-        for process in self._all:
-            self._loop.call_soon(process.ask_for_timings)
-        self._send(self._goals.stop())
-
-    def wait_for_messages(self, end_s: float) -> None:
-        """Wait until the messages of :meth:`on_stop` are answered, or ``end_s`` (monotonic)."""
+    def forget_goals(self) -> None:
+        """Let the next coordinating process start the system as if it were the first one."""
         if self._processes:
-            with suppress(TimeoutError, RuntimeError):  # until the loop has prepared the messages
-                self._loop.run(lambda: None, max(0.0, end_s - self._loop.clock.monotonic()))
-        while any(process.requests.has_messages for process in self._all):
-            if self._loop.clock.monotonic() > end_s:
-                return
-            self._loop.clock.sleep(_POLL_S)
-
-    def callbacks(self) -> tuple[CallbackFigures, ...]:
-        """Return the timings of callbacks that the processes have sent."""
-        return tuple(item for process in self._all for item in process.timings.callbacks)
-
-    def chains(self) -> tuple[ChainFigures, ...]:
-        """Return the latencies of chains that the processes have sent."""
-        return tuple(item for process in self._all for item in process.timings.chains)
-
-    def _send(self, goals: SystemGoals | None) -> None:
-        if goals is not None:
-            for process in self._all:
-                self._loop.call_soon(partial(process.keep_goals, goals))
+            self._goals.forget()
 
     @property
     def _all(self) -> tuple[MemberProcess, ...]:

@@ -12,13 +12,11 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 
 from composer.model import LogLevel, Process
-from composer.model.lifecycle import FINALIZED, PRIMARY_STATES
+from composer.model.lifecycle import ACTIVE, FINALIZED, INACTIVE, PRIMARY_STATES
 from composer.model.names import PROGRAM_LOGGER
-from composer.plan import SystemGoals
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.output import attribute_line, process_loggers
 from composer.runtime.executors.exceptions import printable
@@ -38,7 +36,7 @@ from composer.runtime.members.lives import (
 )
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
-from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import NAME, REQUEST, StepResult
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
@@ -69,12 +67,9 @@ class MemberProcess:
             context.manager,
             context.loop,
             f"{self._name}/{NAME}/{REQUEST}",
-            on_timings=self._on_timings,
             on_report_key=self._on_report_key,
             on_problem=self._warn,
         )
-        #: The timings of its callbacks and chains, once it was asked for them.
-        self.timings = TimingReport()
         self._reports = MemberReports(self._name, context, self._on_report, self._warn)
 
     def add(self, member: Member) -> None:
@@ -115,19 +110,21 @@ class MemberProcess:
         """Whether it certainly runs: it reports, or holds the instance lock on this computer."""
         return self._lives.up is not None or is_held(self._name)
 
+    @property
+    def has_kept_nodes(self) -> bool:
+        """Whether it was not started here, and nodes of it are inactive or active."""
+        life = self._lives.up
+        states = {} if life is None or life.child is not None else life.states
+        return any(node.state in (INACTIVE, ACTIVE) for node in states.values())
+
     def leave(self) -> None:
         """Leave its nodes as they are, unless it was started here. Thread-safe."""
         self._belongs_to_another = True
 
-    def keep_goals(self, goals: SystemGoals) -> None:
-        """Let the process keep the goals of the system."""
-        if self._lives.up is not None and not self.is_left:
-            self.requests.keep(goals)
-
-    def ask_for_timings(self) -> None:
-        """Ask for the timings of callbacks and chains."""
-        if self._lives.up is not None:
-            self.requests.ask_for_timings()
+    @property
+    def last_report(self) -> SystemReport | None:
+        """Its last report. Once its end was requested, that includes timings."""
+        return self._lives.last_report
 
     def figures(self, node: str) -> NodeFigures:
         """Return the rates and counters of a node."""
@@ -287,8 +284,7 @@ class MemberProcess:
                 self._lives.lose(life, "is shutting down")
             return
         life.lost = ""
-        goals = self._context.goals.on_report(report.goals)
-        self.requests.on_report(report, goals)
+        self.requests.on_report(report)
         for node in report.nodes:
             member = self._members.get(node.node)
             if member is not None and report.number > life.answered.get(node.node, -1):
@@ -303,10 +299,6 @@ class MemberProcess:
         self.moved_s = self._clock.monotonic()
         if done.exception() is None and done.result().success:
             life.answered[node] = done.result().report
-
-    def _on_timings(self, timings: TimingReport) -> None:
-        called = (item for item in timings.callbacks if item.node in self._members)
-        self.timings = replace(timings, callbacks=tuple(called))
 
     def _on_report_key(self, key: str) -> None:
         self._reports.on_key(key)

@@ -208,6 +208,11 @@ def socket_path(name: str) -> Path | None:
     return private_path(_file_name(name, ".sock"))
 
 
+def goals_path(name: str) -> Path | None:
+    """Return the path of the file with the goals of a system; None as for a socket."""
+    return private_path(_file_name(name, ".goals"))
+
+
 def private_path(file_name: str) -> Path | None:
     """Return the path of a file in the folder of the lock files; None as for a socket."""
     try:

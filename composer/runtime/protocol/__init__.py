@@ -7,8 +7,8 @@ from and to                     carrier                     content
 ==============================  ==========================  =======================================
 command to manager, same host   Unix socket                 queries of ``requests``, and answers
 command to manager, any host    service ``request``         ``Restart``, and ``Done``
-coordinating process to others  service ``request``         ``ChangeStates`` and the other requests
-                                                            to a process, and answers
+coordinating process to others  service ``request``         ``ChangeStates``, ``AskReportKey``, and
+                                                            answers
 manager to all                  topic ``state``, latched    ``SystemReport``, signed if another
                                                             process moves the nodes
 manager to all                  topic ``callbacks``         ``TimingReport``

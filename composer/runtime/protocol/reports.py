@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 from composer.base.fast_dataclass import dataclass
-from composer.plan import STARTING, Condition, SystemGoals
+from composer.plan import STARTING, Condition
 
 _MAX_LISTED = 5
 _DIGEST = "sha256"
@@ -148,11 +148,10 @@ class SystemReport:
     ``name`` is the namespace of the manager. ``started_s`` is the start of the process in seconds
     since 1970, ``at_s`` the time of the report, in seconds since 1970 or of simulated time.
     ``number`` counts the reports of the process. ``is_child`` is whether the coordinating process
-    of the system has started this one, ``goals`` what is requested of the whole system, as far as
-    it knows. ``participant`` is the prefix of the ids of the endpoints of the process, in
-    hexadecimal digits; ``last_sender`` and ``last_step`` identify the last step that another
-    process has requested. ``callbacks`` and ``chains`` are included on request, with their time
-    ``callbacks_at_s``. Clients add those of other processes, with their times ``processes_at_s``.
+    of the system has started this one. ``participant`` is the prefix of the ids of the endpoints of
+    the process, in hexadecimal digits. ``callbacks`` and ``chains`` are included on request, with
+    their time ``callbacks_at_s``. Clients add those of other processes, with their times
+    ``processes_at_s``.
     """
 
     name: str
@@ -164,10 +163,7 @@ class SystemReport:
     at_s: float = 0.0
     number: int = 0
     is_child: bool = False
-    goals: SystemGoals | None = None
     participant: str = ""
-    last_sender: str = ""
-    last_step: int = 0
     callbacks: tuple[CallbackFigures, ...] = ()
     chains: tuple[ChainFigures, ...] = ()
     callbacks_at_s: float = 0.0
@@ -229,10 +225,6 @@ class SystemReport:
     def callbacks_at(self, process: str) -> float:
         """Return the time of the callbacks of a process, empty for the one that reports."""
         return self.processes_at_s.get(process, 0.0) if process else self.callbacks_at_s
-
-    def received(self, sender: str) -> int:
-        """Return the number of the last step that was received if it is from ``sender``, else 0."""
-        return self.last_step if self.last_sender == sender else 0
 
     @property
     def is_starting(self) -> bool:

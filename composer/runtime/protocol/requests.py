@@ -10,9 +10,8 @@ from typing import Any, ClassVar, TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.model.names import is_hidden
-from composer.plan import SystemGoals
 from composer.plan.drift import ObservedEndpoint
-from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.reports import SystemReport
 
 #: The manager node, its services and its topics.
 NAME = "manager"
@@ -247,16 +246,6 @@ class ChangeStates:
     steps: tuple[Step, ...]
     are_last: bool = False
     Answer: ClassVar = StepResults
-
-
-@dataclass(frozen=True, slots=True)
-class KeepGoals:
-    """Lets a process keep what is requested of the whole system, and asks it for its timings."""
-
-    participant: str
-    goals: SystemGoals | None = None
-    wants_timings: bool = False
-    Answer: ClassVar = TimingReport
 
 
 @dataclass(frozen=True, slots=True)

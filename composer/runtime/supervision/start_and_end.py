@@ -7,13 +7,13 @@ end tears them down, within the limits of time of :class:`.HostOptions`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState, System
 from composer.model.names import PROGRAM_LOGGER
-from composer.plan import Fault, Plan, SystemGoals, optional_nodes
+from composer.plan import Fault, Plan, optional_nodes, start_goals
 from composer.runtime.metrics.figures import merged_chains
 from composer.runtime.process.libraries import leave_ros_graph, supports_fast_exit
 from composer.runtime.supervision.events import (
@@ -60,12 +60,12 @@ class SystemStart:
     def run(self, within_s: float) -> str | None:
         """Bring the system up within a time, or take it over; return why that failed, or None."""
         self._wait_for_processes(within_s)
-        found = self.node_set.other_processes.found_goals
+        found = self.node_set.other_processes.found_goals()
         problem = None
         if found is None:
             problem = self._bring_up(within_s)
         else:
-            self._take_over(found)
+            self._take_over(*found)
         if problem is None and not self.main_queue.stopping:
             status = self.status.snapshot()
             self.reporter.report(
@@ -105,14 +105,15 @@ class SystemStart:
             self.status.set_activity("running")
         return problem
 
-    def _take_over(self, found: SystemGoals) -> None:
+    def _take_over(self, found: Mapping[str, PrimaryState], activity: str) -> None:
         """Lead the nodes to the goals that they had: those that are there do not move."""
-        text = f"an earlier process has coordinated the system, which is {found.activity}"
+        text = f"an earlier process has coordinated the system, which is {activity}"
         self.reporter.log(LogLevel.INFO, PROGRAM_LOGGER, text)
         serial = self.supervisor.desired.serial
         self.node_set.take_over()
-        self.supervisor.set_goals(found.states(self.system), serial, found.activity)
-        self.status.set_activity(found.activity)
+        goals = {**start_goals(self.system, PrimaryState.ACTIVE), **found}
+        self.supervisor.set_goals(goals, serial, activity)
+        self.status.set_activity(activity)
         self.supervisor.reconciler.reconcile_settled("goal under the earlier coordinating process")
 
 
@@ -121,7 +122,6 @@ _STEP_SHARE = 0.6
 _URGENT_S = 0.2
 #: This many nodes can be destroyed one by one within half a second.
 _FEW_NODES = 20
-_MESSAGES_ARRIVE_WITHIN_S = 0.2
 
 
 class SystemEnd:
@@ -166,13 +166,11 @@ class SystemEnd:
         stop_within_s = self._options.stop_within_s
         self._end_s = self._clock.monotonic() + stop_within_s
         self._node_set.limit_end(self._end_s)
-        self._node_set.other_processes.on_stop()
+        self._node_set.other_processes.forget_goals()
         if is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._end_s, limit_s):
                 self._has_failed = True
-        end_s = self._clock.monotonic() + _MESSAGES_ARRIVE_WITHIN_S
-        self._node_set.other_processes.wait_for_messages(end_s)
         self._summary = self._node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
             self._has_failed = True
@@ -205,7 +203,9 @@ class SystemEnd:
 
     def outcome(self, *, has_failed: bool) -> Outcome:
         """Return how the run went, which may have failed before its end."""
-        others = self._node_set.other_processes
+        others = self._node_set.other_processes.last_reports
+        of_others = (item for report in others for item in report.callbacks)
+        chains = (item for report in others for item in report.chains)
         return Outcome(
             exit_code=1 if has_failed or self._has_failed else 0,
             reason=self._reason,
@@ -213,8 +213,8 @@ class SystemEnd:
             nodes=self._summary,
             hung=self._is_left_to_exit,
             remarks=self._remarks,
-            callbacks=(*self._node_set.callbacks(), *others.callbacks()),
-            chains=merged_chains(self._node_set.chains(), others.chains()),
+            callbacks=(*self._node_set.callbacks(), *of_others),
+            chains=merged_chains(self._node_set.chains(), chains),
         )
 
     @property

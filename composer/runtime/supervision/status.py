@@ -11,7 +11,7 @@ from typing import Any
 
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
-from composer.plan import SystemGoals, optional_nodes, start_goals
+from composer.plan import optional_nodes, start_goals
 from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.metrics.figures import CountedRate
 from composer.runtime.metrics.statistics import Statistics
@@ -118,15 +118,6 @@ class Status:
         """Set the activity of the system."""
         with self._lock:
             self._status = replace(self._status, activity=activity)
-        self._changed()
-
-    def keep_goals(self, new: SystemGoals) -> None:
-        """Keep the goals of the whole system, unless there are newer ones."""
-        with self._lock:
-            known = self._status.goals
-            if known is not None and new.serial <= known.serial:
-                return
-            self._status = replace(self._status, goals=new)
         self._changed()
 
     def set_desired(

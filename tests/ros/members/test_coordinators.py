@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,12 +11,15 @@ from lifecycle_msgs.msg import TransitionEvent
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from composer.plan import SystemGoals
+from composer.model import PrimaryState
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.other_instances import Instance
-from composer.runtime.process.instance_lock import hold_instance_lock, local_systems
-from composer.runtime.protocol.codec import decode
-from composer.runtime.protocol.reports import SystemReport, split_signature
+from composer.runtime.members.kept_goals import KeptGoals
+from composer.runtime.process.instance_lock import (
+    goals_path,
+    hold_instance_lock,
+    local_systems,
+)
 from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
 from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, split, states
@@ -117,7 +119,7 @@ def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:
         coordinator.wait_for("3 of 3 nodes active")
         moves = peer.listen(TransitionEvent, "/lab/detector/transition_event")
         assert peer.change("/lab/arm", "deactivate")
-        wait_for_goals(peer, lambda goals: "/lab/arm" in goals.others)
+        wait_for_goals("arm", "running")
         coordinator.stop(signal.SIGKILL)
     found = peer.listen(String, "/lab/found")
     wait_until(lambda: len(found) > 10, "messages without the coordinator")
@@ -125,23 +127,21 @@ def coordinate_and_pause(path: Path, peer: Peer) -> list[TransitionEvent]:
         coordinator.wait_for("2 of 3 nodes active")
         assert not moves
         assert peer.call(Trigger, "/lab/robot/manager/pause").success
-        wait_for_goals(peer, lambda goals: goals.activity == "paused")
+        wait_for_goals("camera", "paused")
         coordinator.stop(signal.SIGKILL)
     forget(moves, "inactive")
     return moves
 
 
-def wait_for_goals(peer: Peer, known: Callable[[SystemGoals], bool]) -> None:
-    """Wait until all processes keep goals of the system: the next coordinator asks any of them."""
-    all_reports = [
-        peer.listen(String, f"{name}/state", STATE_QOS) for name in running_managers(peer)
-    ]
-    wait_until(
-        lambda: all(
-            reports and (goals := kept_goals(reports)) and known(goals) for reports in all_reports
-        ),
-        "the goals",
-    )
+def wait_for_goals(node: str, activity: str) -> None:
+    """Wait until the coordinator has kept that a node is to be inactive, and the activity."""
+    kept = KeptGoals(system_of(TEXT, Path()), goals_path("/lab/robot"))
+
+    def are_kept() -> bool:
+        goals, kept_activity = kept.found() or ({}, "")
+        return goals.get(node) is PrimaryState.INACTIVE and kept_activity == activity
+
+    wait_until(are_kept, "the goals")
 
 
 def forget(moves: list[TransitionEvent], goal: str) -> None:
@@ -212,11 +212,6 @@ def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
         assert system.node("camera").pid is not None
     finally:
         system.stop()
-
-
-def kept_goals(reports: list[String]) -> SystemGoals | None:
-    """Return the goals of the system that a process keeps, according to its last report."""
-    return decode(split_signature(reports[-1].data)[1], SystemReport).goals
 
 
 def running_managers(peer: Peer) -> list[str]:

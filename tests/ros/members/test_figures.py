@@ -42,8 +42,3 @@ def test_the_host_is_that_of_the_process_unless_the_node_has_another_one() -> No
 @pytest.mark.parametrize("activity", ["stopping", "stopped"])
 def test_a_process_that_stops_says_so(activity: str) -> None:
     assert SystemReport("robot", activity, (), "vm", "7").is_stopping
-
-
-def test_a_report_says_which_step_was_received_last() -> None:
-    report = SystemReport("robot", "running", (), "vm", "7", last_sender="cafe", last_step=7)
-    assert [report.received(sender) for sender in ("cafe", "other", "")] == [7, 0, 0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import nullcontext
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +12,18 @@ import pytest
 from std_msgs.msg import String
 
 from composer.model import ExecutorKind
-from composer.plan import STOPPED, SystemGoals
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.sources import Reply
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
 from composer.runtime.members.context import MemberContext, ProcessUnavailable
-from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.protocol.codec import ProtocolError
-from composer.runtime.protocol.reports import SystemReport, TimingReport
-from composer.runtime.protocol.requests import (
-    ChangeStates,
-    KeepGoals,
-    StepResult,
-    StepResults,
-)
+from composer.runtime.protocol.reports import SystemReport
+from composer.runtime.protocol.requests import ChangeStates, StepResult, StepResults
 from composer.runtime.ros.manager_interface import (
     STATE_QOS,
     RequestService,
@@ -43,8 +35,6 @@ from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
 
 SERVICE = "/robot/acting/manager/request"
-RUNNING = SystemGoals(1, "running")
-GOALS = SystemGoals(1, STOPPED)
 
 
 class Process:
@@ -55,26 +45,19 @@ class Process:
         self.steps: list[str] = []
         self.ids: list[tuple[str, int]] = []
         self.seen: list[int] = []
-        self.goals: list[SystemGoals | None] = []
-        self.asked = 0
         bench.serve(RequestService, SERVICE, self._on_request)
 
     def _on_request(self, message: RequestService.Request, reply: Reply) -> None:
-        request = read_request(message, ChangeStates, KeepGoals)
-        if isinstance(request, KeepGoals):
-            self.asked += request.wants_timings
-            self.goals.append(request.goals)
-            answer: Any = TimingReport(at_s=1.0)
-        else:
-            self.steps += map(str, request.steps)
-            self.ids += [(request.sender, step.number) for step in request.steps]
-            self.seen.append(request.seen_report)
-            answer = StepResults((StepResult(success=True, report=1),) * len(request.steps))
+        request = read_request(message, ChangeStates)
+        self.steps += map(str, request.steps)
+        self.ids += [(request.sender, step.number) for step in request.steps]
+        self.seen.append(request.seen_report)
         if self.answers:
-            reply(answer_message(answer))
+            results = (StepResult(success=True, report=1),) * len(request.steps)
+            reply(answer_message(StepResults(results)))
 
 
-def report_of(participant: str, number: int = 1, sender: str = "", step: int = 0) -> SystemReport:
+def report_of(participant: str, number: int = 1) -> SystemReport:
     return SystemReport(
         name="/robot/acting",
         activity="running",
@@ -83,32 +66,17 @@ def report_of(participant: str, number: int = 1, sender: str = "", step: int = 0
         pid="7",
         number=number,
         participant=participant,
-        last_sender=sender,
-        last_step=step,
     )
 
 
-def requests_of(
-    on: Bench, service: str, timings: list[TimingReport], on_problem: Callable[[str], None]
-) -> MemberRequests:
+def requests_of(on: Bench, on_problem: Callable[[str], None]) -> MemberRequests:
     return MemberRequests(
-        on.node,
-        on.loop,
-        service,
-        on_timings=timings.append,
-        on_report_key=lambda _: None,
-        on_problem=on_problem,
+        on.node, on.loop, SERVICE, on_report_key=lambda _: None, on_problem=on_problem
     )
 
 
-def client(
-    on: Bench,
-    timings: list[TimingReport],
-    problems: list[str] | None = None,
-    service: str = SERVICE,
-) -> MemberRequests:
-    on_problem = ([] if problems is None else problems).append
-    requests = requests_of(on, service, timings, on_problem)
+def client(on: Bench, problems: list[str] | None = None) -> MemberRequests:
+    requests = requests_of(on, ([] if problems is None else problems).append)
     wait_until(requests._client.service_is_ready, "the service")
     return requests
 
@@ -116,7 +84,7 @@ def client(
 def test_requests_whose_responses_are_lost_do_not_keep_others_from_being_sent() -> None:
     with bench(ExecutorKind.EVENTS) as on:
         process = Process(on)
-        requests = client(on, [])
+        requests = client(on)
         for number in range(member_requests._MAX_REQUESTS):
             step = f"/node{number}"
             result = on.loop.run(partial(requests.request, step, "activate"))
@@ -132,7 +100,7 @@ def test_a_canceled_request_is_not_sent_later() -> None:
     with bench(ExecutorKind.EVENTS) as on:
         process = Process(on)
         process.answers = True
-        requests = client(on, [])
+        requests = client(on)
         requests.hold()
         canceled = on.loop.run(lambda: requests.request("/camera", "activate"))
         canceled.cancel()
@@ -151,16 +119,15 @@ def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_steps_whose_responses_are_lost_are_requested_again() -> None:
     with bench(ExecutorKind.EVENTS) as on:
         process, problems = Process(on), list[str]()
-        requests = client(on, [], problems)
+        requests = client(on, problems)
         own = participant(servers_of(on.node, SERVICE)[0]).hex()
-        on.loop.run(lambda: requests.on_report(report_of(own, 4), None))
+        on.loop.run(lambda: requests.on_report(report_of(own, 4)))
         requests.hold()
         results = [on.loop.run(partial(requests.request, f"/node{n}", "activate")) for n in (1, 2)]
         requests.release()
         wait_until(lambda: len(process.steps) == 2, "the first request")
         (sender, first), (_, second) = process.ids
-        received = report_of(own, 9, sender, second)  # only the responses are lost
-        on.loop.run(lambda: requests.on_report(received, None))
+        on.loop.run(lambda: requests.on_report(report_of(own, 9)))
         results[0].cancel()  # its node has given up
         wait_until(lambda: len(process.steps) >= 4, "two more requests")
         assert process.steps[:4] == ["activate /node1", *["activate /node2"] * 3]
@@ -170,26 +137,6 @@ def test_steps_whose_responses_are_lost_are_requested_again() -> None:
         wait_until(results[1].done, "the response")
         assert results[1].result().success
         assert not problems
-        assert not requests.has_messages
-
-
-@pytest.mark.usefixtures("impatience")
-def test_a_request_that_is_lost_is_reported_once_for_each_process() -> None:
-    with bench(ExecutorKind.EVENTS) as on:
-        process, problems = Process(on), list[str]()
-        requests = client(on, [], problems)
-        own = participant(servers_of(on.node, SERVICE)[0]).hex()
-        reports = count(1)
-
-        def is_requested_again() -> bool:
-            """Report as a process that has received nothing."""
-            on.loop.run(lambda: requests.on_report(report_of(own, next(reports)), None))
-            return process.steps.count("activate /arm") > 3
-
-        result = on.loop.run(lambda: requests.request("/arm", "activate"))
-        wait_until(is_requested_again, "the requests")
-        assert problems == ["has not received 'activate /arm'; it is requested again"]
-        result.cancel()
 
 
 def test_a_process_whose_service_is_not_discovered_is_reported(
@@ -198,7 +145,7 @@ def test_a_process_whose_service_is_not_discovered_is_reported(
     monkeypatch.setattr(member_requests, "_READY_WITHIN_S", 0.0)
     with bench(ExecutorKind.EVENTS) as on:
         problems = list[str]()
-        requests = requests_of(on, SERVICE, [], problems.append)
+        requests = requests_of(on, problems.append)
         result = on.loop.run(lambda: requests.request("/arm", "activate"))
         wait_until(lambda: problems, "the report")
         Process(on).answers = True
@@ -214,48 +161,16 @@ def test_an_error_of_discovery_does_not_keep_requests_from_being_sent(
 
     with bench(ExecutorKind.EVENTS) as on:
         Process(on).answers = True
-        requests = client(on, [])
+        requests = client(on)
         report = report_of(participant(servers_of(on.node, SERVICE)[0]).hex())
-        on.loop.run(lambda: requests.on_report(report, None))
+        on.loop.run(lambda: requests.on_report(report))
         with monkeypatch.context() as patched:
             patched.setattr(member_requests, "servers_of", fail)
             result = on.loop.run(lambda: requests.request("/arm", "activate"))
             wait_until(lambda: on.errors() == [RuntimeError], "the error")
-        on.loop.run(lambda: requests.on_report(report, None))
+        on.loop.run(lambda: requests.on_report(report))
         wait_until(result.done, "the response")
         assert result.result().success
-
-
-def test_lost_goals_are_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(member_requests, "_ANSWERED_WITHIN_S", 0.05)
-    with bench(ExecutorKind.EVENTS) as on:
-        process = Process(on)
-        requests = client(on, [])
-
-        def is_kept_twice() -> bool:
-            on.loop.run(lambda: requests.keep(RUNNING))  # as each report asks for it
-            return len(process.goals) >= 2
-
-        wait_until(is_kept_twice, "the goals")
-        wait_until(lambda: not requests.has_messages, "the end of the wait")
-
-
-def test_timings_and_goals_need_no_steps() -> None:
-    with bench(ExecutorKind.EVENTS) as on:
-        process, timings = Process(on), list[TimingReport]()
-        process.answers = True
-        requests = client(on, timings)
-        requests.hold()
-        on.loop.run(requests.ask_for_timings)
-        on.loop.run(lambda: requests.keep(GOALS))
-        assert requests.has_messages
-        requests.release()
-        wait_until(lambda: timings == [TimingReport(at_s=1.0)], "the timings")
-        assert not requests.has_messages
-        assert (process.goals, process.asked, process.steps) == ([GOALS], 1, [])
-        on.loop.run(lambda: requests.keep(GOALS))
-        wait_until(lambda: not requests.has_messages, "the goals")
-        assert timings == [TimingReport(at_s=1.0)], "the answer to goals is not the timings"
 
 
 def test_a_process_that_is_not_meant_neither_follows_nor_answers(
@@ -268,21 +183,21 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
         asked.append("")
 
     with bench(ExecutorKind.EVENTS) as on:
-        callbacks = MemberCallbacks(dict, *[nothing] * 6, "")
+        callbacks = MemberCallbacks(dict, *[nothing] * 4, "")
         member = MemberService(on.loop, callbacks, MEANT, nothing)
         member.on_report(1)
         on.serve(
             RequestService,
             SERVICE,
             lambda message, reply: member.on_request(
-                read_request(message, ChangeStates, KeepGoals),
+                read_request(message, ChangeStates),
                 lambda answer: reply(answer_message(answer)),
             ),
         )
-        requests = client(on, [])
-        on.loop.run(lambda: requests.on_report(report_of(KILLED), RUNNING))
+        requests = client(on)
+        on.loop.run(lambda: requests.on_report(report_of(KILLED)))
         others = on.loop.run(lambda: requests.request("/camera", "activate"))
-        on.loop.run(lambda: requests.on_report(report_of(MEANT), None))
+        on.loop.run(lambda: requests.on_report(report_of(MEANT)))
         own = on.loop.run(lambda: requests.request("/camera", "activate"))
         wait_until(own.done, "the response")
         assert own.result().reason == "the process has no such node"
@@ -302,7 +217,6 @@ def silent_process(
         children=children or ChildProcesses(),
         namespace="/robot",
         command=command,
-        goals=KeptGoals(system),
         write_log=lambda *_: None,
     )
     return MemberProcess(system.processes[0], context)
@@ -356,20 +270,18 @@ def test_a_request_waits_for_the_service_of_the_process_that_has_reported(
     with bench(ExecutorKind.EVENTS) as on:
         process = Process(on)
         process.answers = True
-        requests = client(on, [])
-        on.loop.run(lambda: requests.on_report(report_of(KILLED), None))
+        requests = client(on)
+        on.loop.run(lambda: requests.on_report(report_of(KILLED)))
         result = on.loop.run(lambda: requests.request("/arm", "activate"))
         assert not on.loop.run(requests._is_ready)
         assert not requests._sent
         if is_discovered:
             (server,) = servers_of(on.node, SERVICE)
             report = report_of(participant(server).hex())
-            on.loop.run(lambda: requests.on_report(report, RUNNING))
+            on.loop.run(lambda: requests.on_report(report))
         else:
             requests._awaited_until_s = 0.0
         wait_until(result.done, "the response")
-        wait_until(lambda: not requests.has_messages, "the response to the goals")
-        assert process.goals == [RUNNING] * is_discovered
 
 
 def test_a_refused_request_says_why() -> None:
@@ -377,7 +289,7 @@ def test_a_refused_request_says_why() -> None:
     with bench(ExecutorKind.EVENTS) as on:
         error = ProtocolError("it is of ros2-composer '9.0' (protocol 9)")
         on.serve(RequestService, SERVICE, lambda _, reply: reply(answer_message(error)))
-        requests = client(on, [])
+        requests = client(on)
         result = on.loop.run(lambda: requests.request("/arm", "activate"))
         wait_until(result.done, "the response")
         assert result.result() == StepResult(success=False, reason=f"refused: {error}")

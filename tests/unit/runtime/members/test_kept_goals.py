@@ -1,61 +1,51 @@
-"""The latest goals win, over several coordinating processes."""
+"""The next coordinating process uses the goals that the last one has kept."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from composer.model import PrimaryState, System
-from composer.plan import STOPPED, SystemGoals
+from composer.model import PrimaryState
 from composer.runtime.members.kept_goals import KeptGoals
 from tests.unit.support.resolving import system_of
 
 ACTIVE, INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
-BOTH = {"arm": ACTIVE, "eye": ACTIVE}
+BOTH = {"arm": ACTIVE, "eye": INACTIVE}
 
 
-@pytest.fixture
-def goals() -> KeptGoals:
-    return KeptGoals(robot())
+def goals_of(path: Path | None, nodes: str = "arm: {}, eye: {}") -> KeptGoals:
+    return KeptGoals(system_of(f"{{system: robot, nodes: {{{nodes}}}}}"), path)
 
 
-def robot() -> System:
-    return system_of("{system: robot, nodes: {arm: {}, eye: {}}}")
+def test_goals_are_kept_until_the_system_is_shut_down(tmp_path: Path) -> None:
+    path = tmp_path / "robot.goals"
+    goals = goals_of(path)
+    assert goals.found() is None
+    goals.keep(BOTH, "running")
+    goals.keep(BOTH, "paused")
+    assert goals_of(path).found() == (BOTH, "paused")
+    goals.forget()
+    goals.forget()
+    assert goals_of(path).found() is None
 
 
-def running(serial: int) -> SystemGoals:
-    return SystemGoals(serial, "running")
+def test_nodes_that_are_gone_do_not_count(tmp_path: Path) -> None:
+    path = tmp_path / "robot.goals"
+    goals_of(path).keep(BOTH, "running")
+    assert goals_of(path, "eye: {}, leg: {}").found() == ({"eye": INACTIVE}, "running")
 
 
-def test_the_goals_with_the_highest_serial_are_used(goals: KeptGoals) -> None:
-    highest = SystemGoals(7, "paused", INACTIVE)
-    for found in (running(4), highest, None, SystemGoals(5, "reset", PrimaryState.UNCONFIGURED)):
-        assert goals.on_report(found) is None
-    assert goals.found == highest
-    changed = goals.change({"arm": ACTIVE, "eye": INACTIVE}, "running")
-    assert changed == SystemGoals(8, "running", ACTIVE, {"/eye": INACTIVE})
+@pytest.mark.parametrize("text", ["", "{}", "\xff", '{"version": 0, "type": "x", "content": {}}'])
+def test_a_file_that_cannot_be_read_does_not_count(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.goals"
+    path.write_text(text, encoding="latin-1")
+    assert goals_of(path).found() is None
 
 
-def test_goals_that_have_not_changed_are_not_sent(goals: KeptGoals) -> None:
-    assert goals.change(BOTH, "running") == running(0)
-    assert goals.change(BOTH, "running") is None
-    assert goals.change(BOTH, "paused") == SystemGoals(1, "paused")
-
-
-def test_a_process_with_other_goals_gets_those_of_now(goals: KeptGoals) -> None:
-    goals.change(BOTH, "running")
-    assert goals.on_report(running(0)) is None
-    assert goals.on_report(None) == running(0)
-    assert goals.on_report(SystemGoals(9, "paused", INACTIVE)) == running(10)  # found too late
-    assert goals.on_report(running(0)) == running(10)
-    assert goals.on_report(running(10)) is None
-
-
-def test_a_shutdown_ends_a_pause(goals: KeptGoals) -> None:
-    assert goals.stop() is None  # nothing has been brought up
-    goals.change(dict.fromkeys(BOTH, INACTIVE), "paused")
-    stopped = goals.stop()
-    assert stopped == SystemGoals(1, STOPPED)
-    following = KeptGoals(robot())
-    following.on_report(stopped)
-    assert following.found is None
-    assert following.change(BOTH, "running") == running(2)
+def test_without_a_folder_nothing_is_kept(tmp_path: Path) -> None:
+    for path in (None, tmp_path / "missing" / "robot.goals"):
+        goals = goals_of(path)
+        goals.keep(BOTH, "running")
+        goals.forget()
+        assert goals.found() is None
